@@ -1,0 +1,3 @@
+//! The command `umbracast`.
+
+fn main() {}

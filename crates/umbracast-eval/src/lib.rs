@@ -1,0 +1,1 @@
+//! Scores, error budget, tables, figures and the report.

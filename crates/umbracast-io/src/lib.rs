@@ -1,0 +1,3 @@
+//! Files and tables: pcap, PCD, MCAP recordings, trajectories, Parquet and CSV.
+
+pub mod rows;

@@ -1,0 +1,120 @@
+//! The rows of every table, once. Column names and units are CONVENTIONS'.
+
+use serde::{Deserialize, Serialize};
+use umbracast::{Outcome, STEPS};
+
+/// Truth: one body in one frame. Arrived ones too.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PeopleRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    pub person: u32,
+    pub x_m: f64,
+    pub y_m: f64,
+    pub vx_mps: f64,
+    pub vy_mps: f64,
+    pub heading_rad: f64,
+    pub height_m: f64,
+    pub arrived: bool,
+    /// Points on this body, all sensors.
+    pub returns: u32,
+}
+
+/// Truth: one link in one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PeopleLinkRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    /// Index into the site's access points.
+    pub access_point: u32,
+    pub person: u32,
+    /// By another person's body.
+    pub blocked: bool,
+    /// By hall or furniture.
+    pub static_blocked: bool,
+    /// By the own body; null while the UE is inside it.
+    pub self_blocked: Option<bool>,
+}
+
+/// Our answer: one track in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    pub track: u64,
+    pub x_m: f64,
+    pub y_m: f64,
+    pub vx_mps: f64,
+    pub vy_mps: f64,
+    /// Upper triangle of the covariance of (x, y, vx, vy): xx xy xvx xvy yy yvx yvy vxvx vxvy vyvy.
+    pub covariance: [f64; 10],
+    pub heading_rad: f64,
+    pub height_m: f64,
+    pub points: u32,
+    pub confirmed: bool,
+    /// min x y z, max x y z.
+    pub aabb_m: [f64; 6],
+    /// centre x y z, half x y z, then the rotation's columns.
+    pub obb: [f64; 15],
+    /// Steps 1..=9: x, y, cov xx, xy, yy.
+    pub steps: [[f64; 5]; STEPS],
+}
+
+/// Our answer: one link in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    pub access_point: u32,
+    pub track: u64,
+    pub blocked_now: bool,
+    pub p_now: f64,
+    /// Windows 1..=9.
+    pub blocked: [bool; STEPS],
+    /// Windows 1..=9.
+    pub p: [f64; STEPS],
+}
+
+/// The rows of one outcome.
+pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, links: &mut Vec<LinkRow>) {
+    for (track, forecast) in outcome.tracks.iter().zip(&outcome.forecasts) {
+        let c = &track.covariance;
+        let (b, o) = (&track.aabb, &track.obb);
+        let (lo, hi, m, h, r) = (b.min_m, b.max_m, o.center_m, o.half_m, o.site_from_box.to_cols_array());
+        tracks.push(TrackRow {
+            scene,
+            frame: outcome.frame,
+            time_ns: outcome.time_ns,
+            track: track.id,
+            x_m: track.position_m.x,
+            y_m: track.position_m.y,
+            vx_mps: track.velocity_mps.x,
+            vy_mps: track.velocity_mps.y,
+            covariance: [
+                c[0][0], c[0][1], c[0][2], c[0][3], c[1][1], c[1][2], c[1][3], c[2][2], c[2][3], c[3][3],
+            ],
+            heading_rad: track.heading_rad,
+            height_m: track.height_m,
+            points: track.points,
+            confirmed: track.confirmed,
+            aabb_m: [lo.x, lo.y, lo.z, hi.x, hi.y, hi.z],
+            obb: [m.x, m.y, m.z, h.x, h.y, h.z, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]],
+            steps: forecast.steps.map(|s| [s.mean_m.x, s.mean_m.y, s.xx_m2, s.xy_m2, s.yy_m2]),
+        });
+    }
+    links.extend(outcome.blockages.iter().map(|b| LinkRow {
+        scene,
+        frame: outcome.frame,
+        time_ns: outcome.time_ns,
+        access_point: b.access_point as u32,
+        track: b.track,
+        blocked_now: b.blocked_now,
+        p_now: b.p_now,
+        blocked: b.blocked,
+        p: b.p,
+    }));
+}

@@ -1,0 +1,70 @@
+//! Who walks where: ORCA crowds and replayed trajectories.
+
+use umbracast::geometry::DVec2;
+
+/// One person's way, sampled evenly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// Counts from 0 in a scene.
+    pub person: u32,
+    /// Time of the first sample.
+    pub start_ns: i64,
+    /// From one sample to the next: 10 ms.
+    pub step_ns: i64,
+    /// Ground points of the body axis.
+    pub positions_m: Vec<DVec2>,
+    /// When the person came within 1 m of the goal; the body stays. `None`: never, as with replayed people.
+    pub arrived_ns: Option<i64>,
+    /// Standing height where the source knows it.
+    pub height_m: Option<f64>,
+}
+
+/// A scene's people.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crowd {
+    /// In order of `person`.
+    pub trajectories: Vec<Trajectory>,
+    /// Length of the scene.
+    pub duration_ns: i64,
+}
+
+/// The parameter sets of the ORCA crowd (CONVENTIONS: presets are named by their radius).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preset {
+    /// Radius 0.3 m.
+    Orca03,
+    /// Radius 0.6 m.
+    Orca06,
+    /// Speeds, starts, stops, turns and groups.
+    Mixed,
+}
+
+impl Trajectory {
+    /// Position and velocity at a time, by cubic (Hermite) interpolation; `None` before the first and after the
+    /// last sample. A person is in the scene exactly while this is `Some`.
+    pub fn at(&self, time_ns: i64) -> Option<(DVec2, DVec2)> {
+        let last = self.start_ns + self.step_ns * (self.positions_m.len() as i64 - 1);
+        if self.positions_m.is_empty() || time_ns < self.start_ns || time_ns > last {
+            return None;
+        }
+        let step_s = self.step_ns as f64 * 1e-9;
+        let offset = (time_ns - self.start_ns) as f64 / self.step_ns as f64;
+        let i = (offset as usize).min(self.positions_m.len().saturating_sub(2));
+        let u = offset - i as f64;
+        let p = |k: isize| {
+            let k = (i as isize + k).clamp(0, self.positions_m.len() as isize - 1);
+            self.positions_m[k as usize]
+        };
+        // Catmull-Rom tangents: half the difference of the neighbours.
+        let (p0, p1) = (p(0), p(1));
+        let (m0, m1) = ((p(1) - p(-1)) * 0.5, (p(2) - p(0)) * 0.5);
+        let (u2, u3) = (u * u, u * u * u);
+        let position = p0 * (2.0 * u3 - 3.0 * u2 + 1.0)
+            + m0 * (u3 - 2.0 * u2 + u)
+            + p1 * (-2.0 * u3 + 3.0 * u2)
+            + m1 * (u3 - u2);
+        let slope =
+            (p1 - p0) * (6.0 * u - 6.0 * u2) + m0 * (3.0 * u2 - 4.0 * u + 1.0) + m1 * (3.0 * u2 - 2.0 * u);
+        Some((position, slope / step_s))
+    }
+}

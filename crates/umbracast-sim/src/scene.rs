@@ -1,0 +1,1 @@
+//! A whole scene: crowd, bodies, sensors and truth, frame by frame.

@@ -1,0 +1,1 @@
+//! What is really blocked: segments from access points to UEs against meshes and the hall.

@@ -1,0 +1,143 @@
+//! Every switch of the runtime. The defaults live in `config/default.toml`, embedded here; the other modes are
+//! the differences in `config/paper.toml` and `config/hdl.toml`. A user's file is laid over the mode's values.
+
+mod detect;
+mod track;
+mod forecast;
+mod blockage;
+mod overlay;
+
+use serde::{Deserialize, Serialize};
+
+pub use blockage::BlockageConfig;
+pub use detect::DetectConfig;
+pub use forecast::ForecastConfig;
+pub use track::TrackConfig;
+
+use crate::{Error, Site};
+
+/// The commented defaults, as text.
+pub const DEFAULT_TOML: &str = include_str!("../../config/default.toml");
+const PAPER_TOML: &str = include_str!("../../config/paper.toml");
+const HDL_TOML: &str = include_str!("../../config/hdl.toml");
+
+/// Whose method runs. A mode is a set of values, never a branch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// Stage 1 as the adapted code ships it, the paper's stages 2 and 3.
+    Hdl,
+    /// The authors' method as they describe it.
+    Paper,
+    /// The best we have.
+    Default,
+}
+
+impl Mode {
+    /// All three, in the order of the tables.
+    pub const ALL: [Self; 3] = [Self::Hdl, Self::Paper, Self::Default];
+
+    /// Its name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hdl => "hdl",
+            Self::Paper => "paper",
+            Self::Default => "default",
+        }
+    }
+}
+
+impl std::str::FromStr for Mode {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        Self::ALL
+            .into_iter()
+            .find(|mode| mode.name() == name)
+            .ok_or_else(|| Error::new(format!("mode: expected hdl, paper or default, found {name:?}")))
+    }
+}
+
+/// Everything the pipeline is told before it starts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Which mode the values come from.
+    pub mode: Mode,
+    /// Where everything stands.
+    pub site: Site,
+    /// Stage 1, from points to detections.
+    pub detect: DetectConfig,
+    /// Stage 1, from detections to tracks.
+    pub track: TrackConfig,
+    /// Stage 2.
+    pub forecast: ForecastConfig,
+    /// Stage 3.
+    pub blockage: BlockageConfig,
+}
+
+impl Config {
+    /// The values of a mode on the default site.
+    pub fn for_mode(mode: Mode) -> Self {
+        Self::with_overlay(mode, "", "").expect("the embedded files are proven by a test")
+    }
+
+    /// The values of a mode with a user's file laid over them. `text` is the file's content, `file` its name
+    /// for messages.
+    ///
+    /// # Errors
+    /// Text that is not TOML, a key that does not exist, or a value of the wrong kind: with file, line, what
+    /// was expected and what was found.
+    pub fn with_overlay(mode: Mode, text: &str, file: &str) -> Result<Self, Error> {
+        let mut layers = vec![("config/default.toml", DEFAULT_TOML)];
+        match mode {
+            Mode::Hdl => layers.push(("config/hdl.toml", HDL_TOML)),
+            Mode::Paper => layers.push(("config/paper.toml", PAPER_TOML)),
+            Mode::Default => {}
+        }
+        layers.push((file, text));
+        overlay::parse(&layers)
+    }
+
+    /// The same as TOML text, as every run writes it beside its output.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a configuration is plain data")
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::for_mode(Mode::Default)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_mode_parses_and_survives_a_round_trip() {
+        for mode in Mode::ALL {
+            let config = Config::for_mode(mode);
+            assert_eq!(config.mode, mode);
+            let again = Config::with_overlay(mode, &config.to_toml(), "config.toml").unwrap();
+            assert_eq!(again, config);
+        }
+    }
+
+    #[test]
+    fn a_wrong_key_names_file_line_and_what_was_expected() {
+        let text = "[site]\nname = \"lab\"\n[[site.sensors]]\nnome = \"x\"\n";
+        let message = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
+        assert!(message.starts_with("lab.toml:4:"), "{message}");
+        assert!(message.contains("nome") && message.contains("position_m"), "{message}");
+    }
+
+    #[test]
+    fn a_wrong_kind_names_file_line_expected_and_found() {
+        let text = "[site.hall]\nlength_m = \"long\"\n";
+        let message = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
+        assert!(message.starts_with("lab.toml:2:"), "{message}");
+        assert!(message.contains("expected a number") && message.contains("found a string"), "{message}");
+    }
+}

@@ -1,0 +1,125 @@
+//! Lays TOML texts over each other, and says of a wrong key or value where it stands.
+
+use serde::de::DeserializeOwned;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+use toml::{Table, Value};
+
+use crate::Error;
+
+/// Parses `(file name, text)` layers, each over the ones before it. The first layer is complete and says which
+/// keys exist and of which kind they are. Tables merge; arrays replace.
+pub(super) fn parse<T: DeserializeOwned>(layers: &[(&str, &str)]) -> Result<T, Error> {
+    let mut merged = Table::new();
+    let mut known: Option<Table> = None;
+    for &(file, text) in layers {
+        let spans = DeTable::parse(text)
+            .map_err(|e| at(file, text, e.span().map_or(0, |s| s.start), e.message().to_owned()))?;
+        if let Some(known) = &known {
+            check_table(spans.get_ref(), known, "", &|offset, message| at(file, text, offset, message))?;
+        }
+        let table: Table = toml::from_str(text).map_err(|e| Error::new(e.to_string()).within(file))?;
+        known.get_or_insert_with(|| table.clone());
+        merge(&mut merged, table);
+    }
+    let file = layers.last().map_or("", |layer| layer.0);
+    merged.try_into().map_err(|e: toml::de::Error| Error::new(e.message().to_owned()).within(file))
+}
+
+fn merge(base: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (base.get_mut(&key), value) {
+            (Some(Value::Table(base)), Value::Table(over)) => merge(base, over),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}
+
+type Complain<'a> = &'a dyn Fn(usize, String) -> Error;
+
+fn check_table(found: &DeTable<'_>, known: &Table, path: &str, complain: Complain<'_>) -> Result<(), Error> {
+    for (key, value) in found {
+        let name = key.get_ref();
+        let Some(expected) = known.get(name.as_ref()) else {
+            let keys: Vec<&str> = known.keys().map(String::as_str).collect();
+            let place = if path.is_empty() { "the file" } else { path };
+            return Err(complain(
+                key.span().start,
+                format!("unknown key `{name}` in {place}; expected one of: {}", keys.join(", ")),
+            ));
+        };
+        let path = if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
+        check_value(value, expected, &path, complain)?;
+    }
+    Ok(())
+}
+
+fn check_value(
+    found: &Spanned<DeValue<'_>>,
+    expected: &Value,
+    path: &str,
+    complain: Complain<'_>,
+) -> Result<(), Error> {
+    match (found.get_ref(), expected) {
+        (DeValue::Table(found), Value::Table(known)) => check_table(found, known, path, complain),
+        (DeValue::Array(found), Value::Array(known)) => {
+            // An element of an array is checked against the default's first: all elements are of one kind.
+            let Some(first) = known.first() else { return Ok(()) };
+            if !first.is_table() && found.len() != known.len() && !known.is_empty() && path_is_fixed(path) {
+                return Err(complain(
+                    found_start(found, 0),
+                    format!("{path}: expected {} values, found {}", known.len(), found.len()),
+                ));
+            }
+            found.iter().try_for_each(|element| check_value(element, first, path, complain))
+        }
+        (DeValue::Integer(_), Value::Float(_)) => Ok(()),
+        (found_value, expected) if kind(found_value) == kind_of(expected) => Ok(()),
+        (found_value, expected) => Err(complain(
+            found.span().start,
+            format!("{path}: expected {}, found {}", kind_of(expected), kind(found_value)),
+        )),
+    }
+}
+
+/// Vectors of coordinates have a fixed length.
+fn path_is_fixed(path: &str) -> bool {
+    path.ends_with("position_m") || path.ends_with("size_m")
+}
+
+fn found_start(array: &toml::de::DeArray<'_>, fallback: usize) -> usize {
+    array.iter().next().map_or(fallback, |v| v.span().start)
+}
+
+fn kind(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "a string",
+        DeValue::Integer(_) => "a whole number",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "an array",
+        DeValue::Table(_) => "a table",
+    }
+}
+
+fn kind_of(value: &Value) -> &'static str {
+    match value {
+        Value::String(_) => "a string",
+        Value::Integer(_) => "a whole number",
+        Value::Float(_) => "a number",
+        Value::Boolean(_) => "true or false",
+        Value::Datetime(_) => "a date",
+        Value::Array(_) => "an array",
+        Value::Table(_) => "a table",
+    }
+}
+
+fn at(file: &str, text: &str, offset: usize, message: String) -> Error {
+    let before = &text[..offset.min(text.len())];
+    let line = before.matches('\n').count() + 1;
+    let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
+    Error::new(format!("{file}:{line}:{column}: {message}"))
+}

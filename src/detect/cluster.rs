@@ -1,0 +1,1 @@
+//! Euclidean clusters in plan view.

@@ -1,0 +1,63 @@
+//! Stage 1, first half: from a frame to detections of people (paper, section IV-A).
+//!
+//! Foreground: the points that do not belong to the empty scene, in the site frame. Clusters: groups of them in
+//! plan view, split and merged until each is one person. Detections: position and boxes of each.
+
+pub mod background;
+pub mod cluster;
+pub mod split_merge;
+pub mod measure;
+
+pub use background::Background;
+pub use measure::Measurer;
+pub use split_merge::Clusterer;
+
+use crate::geometry::{Aabb, DVec2, DVec3, Obb};
+
+/// A foreground point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// In the site frame.
+    pub position_m: DVec3,
+    /// When it was measured.
+    pub time_ns: i64,
+    /// Which sensor of the site saw it.
+    pub sensor: u16,
+}
+
+/// Where a person is expected: a track of the last step, predicted to the frame's time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Predicted ground point of the body axis.
+    pub position_m: DVec2,
+    /// Its velocity.
+    pub velocity_mps: DVec2,
+    /// One standard deviation of the position, the larger axis, metres.
+    pub position_sigma_m: f64,
+    /// Standing height as the track knows it.
+    pub height_m: f64,
+    /// True once the track is confirmed.
+    pub confirmed: bool,
+}
+
+/// Points of one person: indices into the foreground, ascending.
+pub type Cluster = Vec<u32>;
+
+/// One person in one frame (the paper's D, without identity).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// Ground point of the body axis, corrected for the side that was seen where the config says so.
+    pub position_m: DVec2,
+    /// Mean height of the points above the floor (`hdl` tracks x, y and z).
+    pub z_m: f64,
+    /// Mean time of the points.
+    pub time_ns: i64,
+    /// How many points.
+    pub points: u32,
+    /// Highest point above the floor.
+    pub top_m: f64,
+    /// Box along the site's axes.
+    pub aabb: Aabb,
+    /// Box along the cluster's axes.
+    pub obb: Obb,
+}

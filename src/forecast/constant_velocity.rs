@@ -1,0 +1,1 @@
+//! Constant velocity on the filtered state.

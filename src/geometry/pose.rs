@@ -1,0 +1,62 @@
+//! A rigid motion, named for what it maps: `site_from_sensor`.
+
+use glam::{DMat3, DVec3};
+
+/// A rotation and a translation. `site_from_sensor.point(p)` takes a point of the sensor's frame to the site's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Columns are the source frame's axes, seen in the target frame.
+    pub rotation: DMat3,
+    /// The source frame's origin in the target frame, metres.
+    pub translation_m: DVec3,
+}
+
+impl Pose {
+    /// The motion that leaves every point where it is.
+    pub const IDENTITY: Self = Self { rotation: DMat3::IDENTITY, translation_m: DVec3::ZERO };
+
+    /// A pose from a file: yaw, pitch and roll in degrees, applied Z-Y'-X''. Positive pitch looks down (a
+    /// positive turn about the y axis takes x towards -z).
+    pub fn from_yaw_pitch_roll_deg(position_m: DVec3, yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> Self {
+        let rotation = DMat3::from_rotation_z(yaw_deg.to_radians())
+            * DMat3::from_rotation_y(pitch_deg.to_radians())
+            * DMat3::from_rotation_x(roll_deg.to_radians());
+        Self { rotation, translation_m: position_m }
+    }
+
+    /// A point taken from the source to the target frame.
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        self.rotation * p + self.translation_m
+    }
+
+    /// A direction taken from the source to the target frame.
+    pub fn direction(&self, v: DVec3) -> DVec3 {
+        self.rotation * v
+    }
+
+    /// The motion back. The rotation is orthogonal, so it is transposed, never inverted.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.transpose();
+        Self { rotation, translation_m: -(rotation * self.translation_m) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positive_pitch_looks_down() {
+        let pose = Pose::from_yaw_pitch_roll_deg(DVec3::new(0.0, 0.0, 9.0), 0.0, 35.0, 0.0);
+        let ahead = pose.point(DVec3::X);
+        assert!((ahead - DVec3::new(0.819_152, 0.0, 9.0 - 0.573_576)).length() < 1e-6, "{ahead}");
+    }
+
+    #[test]
+    fn inverse_undoes() {
+        let pose = Pose::from_yaw_pitch_roll_deg(DVec3::new(1.0, -2.0, 3.0), 170.0, 35.0, -5.0);
+        let p = DVec3::new(0.3, 0.4, -0.5);
+        assert!((pose.inverse().point(pose.point(p)) - p).length() < 1e-12);
+    }
+}

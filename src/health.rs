@@ -1,0 +1,43 @@
+//! What the running pipeline met that it could not use: counted here, skipped, and recovered from.
+
+use serde::Serialize;
+
+/// Counters of everything broken that was skipped. All zero on clean input.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Health {
+    /// Packets whose length is not a sensor packet's.
+    pub packets_wrong_size: u64,
+    /// Packets with a block flag, a model byte or a return mode that the codec does not know.
+    pub packets_not_understood: u64,
+    /// Packets older than a frame that is already closed.
+    pub packets_late: u64,
+    /// Jumps of a sensor's clock: forwards past a whole frame, or backwards.
+    pub clock_jumps: u64,
+    /// Frames that closed without one of the site's sensors.
+    pub sensors_missing: u64,
+    /// Points dropped because they are not finite, or nearer or farther than the sensor can measure.
+    pub points_invalid: u64,
+    /// Frames dropped because their time does not lie after the last one's.
+    pub frames_out_of_order: u64,
+    /// Foreground points dropped because there were more than the configured limit in one frame.
+    pub points_over_limit: u64,
+}
+
+impl Health {
+    /// True when nothing was skipped.
+    pub fn is_clean(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Adds another account to this one.
+    pub fn add(&mut self, other: &Self) {
+        self.packets_wrong_size += other.packets_wrong_size;
+        self.packets_not_understood += other.packets_not_understood;
+        self.packets_late += other.packets_late;
+        self.clock_jumps += other.clock_jumps;
+        self.sensors_missing += other.sensors_missing;
+        self.points_invalid += other.points_invalid;
+        self.frames_out_of_order += other.frames_out_of_order;
+        self.points_over_limit += other.points_over_limit;
+    }
+}

@@ -1,0 +1,106 @@
+//! Sensor models: the beams of a column and how they fire.
+
+use std::sync::Arc;
+
+use crate::Error;
+use crate::geometry::DVec3;
+
+/// One laser.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beam {
+    /// Above the horizon of the sensor, radians.
+    pub elevation_rad: f64,
+    /// Its origin above the sensor's origin, metres.
+    pub z_offset_m: f64,
+    /// When it fires after the column's first beam.
+    pub fire_offset_ns: u32,
+    /// Its place from the lowest beam, 0, to the highest.
+    pub ring: u16,
+}
+
+impl Beam {
+    /// A point at `range_m` in the sensor's frame: x ahead at azimuth 0, azimuth clockwise from above.
+    pub fn point_m(&self, azimuth_rad: f64, range_m: f64) -> DVec3 {
+        let (sin_el, cos_el) = self.elevation_rad.sin_cos();
+        let (sin_az, cos_az) = azimuth_rad.sin_cos();
+        DVec3::new(range_m * cos_el * cos_az, -range_m * cos_el * sin_az, range_m * sin_el + self.z_offset_m)
+    }
+}
+
+/// A spinning sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// Its name in a site file.
+    pub name: &'static str,
+    /// The beams of a column in firing order.
+    pub beams: Arc<[Beam]>,
+    /// From one column to the next.
+    pub column_period_ns: f64,
+    /// Factory byte of its packets.
+    pub product_id: u8,
+    /// Columns in one block of a packet.
+    pub columns_per_block: usize,
+}
+
+impl Model {
+    /// The model named in a site file.
+    ///
+    /// # Errors
+    /// A name that is not known, with those that are.
+    pub fn by_name(name: &str) -> Result<Self, Error> {
+        match name {
+            "hdl-32e" => Ok(Self::hdl_32e()),
+            "vlp-16" => Ok(Self::vlp_16()),
+            _ => Err(Error::new(format!("sensor model: expected hdl-32e or vlp-16, found {name:?}"))),
+        }
+    }
+
+    /// Velodyne HDL-32E.
+    pub fn hdl_32e() -> Self {
+        const ELEVATION_DEG: [f64; 32] = [
+            -30.67, -9.33, -29.33, -8.00, -28.00, -6.67, -26.67, -5.33, -25.33, -4.00, -24.00, -2.67, -22.67,
+            -1.33, -21.33, 0.00, -20.00, 1.33, -18.67, 2.67, -17.33, 4.00, -16.00, 5.33, -14.67, 6.67,
+            -13.33, 8.00, -12.00, 9.33, -10.67, 10.67,
+        ];
+        const Z_OFFSET_MM: [f64; 32] = [
+            17.17, 4.76, 16.27, 4.07, 15.40, 3.38, 14.54, 2.70, 13.71, 2.02, 12.89, 1.35, 12.09, 0.67, 11.31,
+            0.00, 10.54, -0.67, 9.78, -1.35, 9.04, -2.02, 8.30, -2.70, 7.58, -3.38, 6.86, -4.07, 6.15, -4.76,
+            5.45, -5.45,
+        ];
+        Self {
+            name: "hdl-32e",
+            beams: beams(&ELEVATION_DEG, &Z_OFFSET_MM, 1152),
+            column_period_ns: 46_080.0,
+            product_id: 0x21,
+            columns_per_block: 1,
+        }
+    }
+
+    /// Velodyne VLP-16.
+    pub fn vlp_16() -> Self {
+        const ELEVATION_DEG: [f64; 16] =
+            [-15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0, -7.0, 9.0, -5.0, 11.0, -3.0, 13.0, -1.0, 15.0];
+        Self {
+            name: "vlp-16",
+            beams: beams(&ELEVATION_DEG, &[0.0; 16], 2304),
+            column_period_ns: 55_296.0,
+            product_id: 0x22,
+            columns_per_block: 2,
+        }
+    }
+}
+
+fn beams(elevation_deg: &[f64], z_offset_mm: &[f64], fire_period_ns: u32) -> Arc<[Beam]> {
+    let ring = |own: f64| elevation_deg.iter().filter(|&&other| other < own).count() as u16;
+    elevation_deg
+        .iter()
+        .zip(z_offset_mm)
+        .enumerate()
+        .map(|(i, (&elevation, &z))| Beam {
+            elevation_rad: elevation.to_radians(),
+            z_offset_m: z * 1e-3,
+            fire_offset_ns: i as u32 * fire_period_ns,
+            ring: ring(elevation),
+        })
+        .collect()
+}

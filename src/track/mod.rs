@@ -1,0 +1,42 @@
+//! Stage 1, second half: detections of frame after frame joined to tracks (paper, section IV-A).
+
+pub mod kalman;
+pub mod association;
+pub mod visibility;
+pub mod tracker;
+
+pub use tracker::Tracker;
+
+use std::collections::VecDeque;
+
+use crate::geometry::{Aabb, DVec2, Obb};
+
+/// Positions of the observation window: 10 frames (paper, section V-B).
+pub const OBSERVED: usize = 10;
+
+/// One person followed over time, at the frame's instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// Never used twice in a run.
+    pub id: u64,
+    /// Ground point of the body axis.
+    pub position_m: DVec2,
+    /// Its velocity.
+    pub velocity_mps: DVec2,
+    /// Of (x, y, vx, vy); metres and seconds.
+    pub covariance: [[f64; 4]; 4],
+    /// The trunk's, counter-clockwise from +x, held while standing.
+    pub heading_rad: f64,
+    /// Standing height.
+    pub height_m: f64,
+    /// Points of this frame's detection; 0 while it coasts.
+    pub points: u32,
+    /// False until the track has been seen often enough to be believed.
+    pub confirmed: bool,
+    /// The person's box along the site's axes, at `position_m`.
+    pub aabb: Aabb,
+    /// The person's oriented box, at `position_m`.
+    pub obb: Obb,
+    /// The last positions with their times, oldest first, this frame's last: at most [`OBSERVED`].
+    pub observed: VecDeque<(i64, DVec2)>,
+}
