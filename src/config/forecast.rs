@@ -5,4 +5,33 @@ use serde::{Deserialize, Serialize};
 /// See `config/default.toml` for every value and its reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ForecastConfig {}
+pub struct ForecastConfig {
+    /// Who foresees.
+    pub method: ForecastMethod,
+    /// Spectral density of the unforeseen acceleration, each axis.
+    pub acceleration_psd_m2ps3: f64,
+    /// How the LSTM goes on from one step to the next.
+    pub rollout: Rollout,
+    /// Of the draws.
+    pub seed: u64,
+}
+
+/// Who foresees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ForecastMethod {
+    /// The filtered state carried on.
+    ConstantVelocity,
+    /// The paper's network.
+    Lstm,
+}
+
+/// What an LSTM step feeds to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rollout {
+    /// The mean of its Gaussian.
+    Mean,
+    /// A draw from it.
+    Draw,
+}

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 pub use blockage::BlockageConfig;
 pub use detect::DetectConfig;
-pub use forecast::ForecastConfig;
+pub use forecast::{ForecastConfig, ForecastMethod, Rollout};
 pub use track::TrackConfig;
 
 use crate::{Error, Site};
