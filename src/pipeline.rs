@@ -73,7 +73,7 @@ impl Pipeline {
         self.measurer.detections(&o.foreground, &o.clusters, &priors, &mut o.detections);
         self.tracker.update(frame, &o.detections, &mut o.tracks);
         self.forecaster.forecast(&o.tracks, &mut o.forecasts);
-        self.caster.cast(o.time_ns, &o.tracks, &o.forecasts, &mut o.blockages);
+        self.caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
         o
     }
 }

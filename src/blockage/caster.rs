@@ -1,30 +1,135 @@
 //! Casts a ray from every access point to every person, by the method of the config.
 
 use super::Blockage;
-use crate::Site;
-use crate::config::BlockageConfig;
+use super::algorithm1::{self, PersonBox};
+use super::body::BodySize;
+use super::probability::Sampler;
+use crate::config::{BlockageConfig, BlockageMethod, BoxKind};
 use crate::forecast::Forecast;
+use crate::geometry::{DVec2, DVec3};
+use crate::site::Ue;
 use crate::track::Track;
+use crate::{STEPS, Site};
 
-/// Casts.
+/// Below this step length a forecast says nothing about where a person faces: 0.3 m/s.
+const TURNS_FROM_M: f64 = 0.03;
+
+/// Stage 3 with what it needs to know.
 #[derive(Debug)]
-pub struct Caster {}
+pub struct Caster {
+    config: BlockageConfig,
+    access_points_m: Vec<DVec3>,
+    ue: Ue,
+    sampler: Sampler,
+}
 
 impl Caster {
     /// Needs the site's access points and where the UE is.
-    pub fn new(_config: &BlockageConfig, _site: &Site) -> Self {
-        Self {}
+    pub fn new(config: &BlockageConfig, site: &Site) -> Self {
+        Self {
+            config: config.clone(),
+            access_points_m: site.access_points.iter().map(|ap| ap.position()).collect(),
+            ue: site.ue,
+            sampler: Sampler::default(),
+        }
     }
 
     /// One blockage for each access point and confirmed track, access points first. `forecasts[i]` belongs to
-    /// `tracks[i]`; `time_ns` is the frame's.
-    pub fn cast(
-        &mut self,
-        _time_ns: i64,
-        _tracks: &[Track],
-        _forecasts: &[Forecast],
-        blockages: &mut Vec<Blockage>,
-    ) {
+    /// `tracks[i]`.
+    pub fn cast(&mut self, tracks: &[Track], forecasts: &[Forecast], blockages: &mut Vec<Blockage>) {
         blockages.clear();
+        let people: Vec<(&Track, &Forecast)> =
+            tracks.iter().zip(forecasts).filter(|(track, _)| track.confirmed).collect();
+        match self.config.method {
+            BlockageMethod::Algorithm1 => self.cast_boxes(&people, blockages),
+            BlockageMethod::Probability => self.cast_samples(&people, blockages),
+        }
     }
+
+    /// The paper's way: boxes at the means, yes or no.
+    fn cast_boxes(&self, people: &[(&Track, &Forecast)], blockages: &mut Vec<Blockage>) {
+        let boxes_now: Vec<PersonBox> = people
+            .iter()
+            .map(|(track, _)| match self.config.person_box {
+                BoxKind::Aabb => PersonBox::Aabb(track.aabb),
+                BoxKind::Obb => PersonBox::Obb(track.obb),
+            })
+            .collect();
+        let moved: Vec<Vec<(DVec2, PersonBox)>> = (0..=STEPS)
+            .map(|step| {
+                let place = |((track, forecast), person_box): (&(&Track, &Forecast), &PersonBox)| {
+                    let position = position_at(track, forecast, step);
+                    let turn = heading_at(track, forecast, step) - track.heading_rad;
+                    (position, person_box.moved_by(position - track.position_m, turn))
+                };
+                people.iter().zip(&boxes_now).map(place).collect()
+            })
+            .collect();
+        for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
+            let mut now = vec![false; people.len()];
+            algorithm1::cast_step(ap_m, &moved[0], &mut now);
+            let mut windows = vec![[false; STEPS]; people.len()];
+            let mut blocked = vec![false; people.len()];
+            for step in 1..=STEPS {
+                // Algorithm 1, line 4
+                algorithm1::cast_step(ap_m, &moved[step], &mut blocked);
+                windows.iter_mut().zip(&blocked).for_each(|(window, &b)| window[step - 1] = b);
+            }
+            blockages.extend(people.iter().enumerate().map(|(i, (track, _))| Blockage {
+                access_point,
+                track: track.id,
+                blocked_now: now[i],
+                p_now: f64::from(u8::from(now[i])),
+                blocked: windows[i],
+                p: windows[i].map(|b| f64::from(u8::from(b))),
+            }));
+        }
+    }
+
+    /// Our way: bodies on sampled ways, a probability and a threshold.
+    fn cast_samples(&mut self, people: &[(&Track, &Forecast)], blockages: &mut Vec<Blockage>) {
+        let size = BodySize {
+            trunk_depth_m: self.config.trunk_depth_m,
+            trunk_width_m: self.config.trunk_width_m,
+            shoulder_share: self.config.shoulder_share,
+            head_diameter_m: self.config.head_diameter_m,
+        };
+        self.sampler.draw(&self.config, people);
+        for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
+            for (person, (track, _)) in people.iter().enumerate() {
+                let (p_now, p) = self.sampler.probabilities(&size, &self.ue, ap_m, person);
+                let mut blocked = [false; STEPS];
+                for w in 0..STEPS {
+                    blocked[w] = p[w] >= self.config.threshold[w];
+                }
+                blockages.push(Blockage {
+                    access_point,
+                    track: track.id,
+                    blocked_now: p_now >= self.config.threshold_now,
+                    p_now,
+                    blocked,
+                    p,
+                });
+            }
+        }
+    }
+}
+
+/// Mean position at a step; step 0 is now.
+pub(super) fn position_at(track: &Track, forecast: &Forecast, step: usize) -> DVec2 {
+    if step == 0 { track.position_m } else { forecast.steps[step - 1].mean_m }
+}
+
+/// Heading at a step: the track's, turned as the forecast's way turns. The paper turns the boxes and does not
+/// say by what.
+pub(super) fn heading_at(track: &Track, forecast: &Forecast, step: usize) -> f64 {
+    if step < 2 {
+        return track.heading_rad;
+    }
+    let stride = |s: usize| position_at(track, forecast, s) - position_at(track, forecast, s - 1);
+    let (first, last) = (stride(1), stride(step));
+    if first.length() < TURNS_FROM_M || last.length() < TURNS_FROM_M {
+        return track.heading_rad;
+    }
+    track.heading_rad + first.angle_to(last)
 }

@@ -9,7 +9,7 @@ mod overlay;
 
 use serde::{Deserialize, Serialize};
 
-pub use blockage::BlockageConfig;
+pub use blockage::{BlockageConfig, BlockageMethod, BoxKind};
 pub use detect::DetectConfig;
 pub use forecast::{ForecastConfig, ForecastMethod, Rollout};
 pub use track::TrackConfig;

@@ -1,0 +1,97 @@
+//! Every implementation of stage 3 against `testdata/blockage/scenes.toml`, whose answers were computed by hand.
+
+use serde::Deserialize;
+use umbracast::blockage::algorithm1::{PersonBox, cast_step};
+use umbracast::blockage::body::{BodySize, UprightBody};
+use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Corpus {
+    scene: Vec<Scene>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Scene {
+    name: String,
+    why: String,
+    access_point_m: DVec3,
+    people: Vec<Person>,
+    aabb: Option<Vec<bool>>,
+    obb: Vec<bool>,
+    body: Vec<bool>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Person {
+    position_m: DVec2,
+    size_m: DVec3,
+    yaw_deg: f64,
+}
+
+impl Person {
+    fn aabb(&self) -> Aabb {
+        let half = self.size_m.truncate() * 0.5;
+        Aabb {
+            min_m: (self.position_m - half).extend(0.0),
+            max_m: (self.position_m + half).extend(self.size_m.z),
+        }
+    }
+
+    fn obb(&self) -> Obb {
+        Obb {
+            site_from_box: DMat3::from_rotation_z(self.yaw_deg.to_radians()),
+            ..Obb::from_aabb(&self.aabb())
+        }
+    }
+}
+
+fn corpus() -> Vec<Scene> {
+    let text = include_str!("../testdata/blockage/scenes.toml");
+    toml::from_str::<Corpus>(text).expect("the corpus is TOML").scene
+}
+
+fn algorithm1(scene: &Scene, person_box: impl Fn(&Person) -> PersonBox) -> Vec<bool> {
+    let people: Vec<_> = scene.people.iter().map(|p| (p.position_m, person_box(p))).collect();
+    let mut blocked = vec![false; people.len()];
+    cast_step(scene.access_point_m, &people, &mut blocked);
+    blocked
+}
+
+#[test]
+fn algorithm_1_on_axis_aligned_boxes() {
+    for scene in corpus() {
+        let Some(expected) = &scene.aabb else { continue };
+        let found = algorithm1(&scene, |p| PersonBox::Aabb(p.aabb()));
+        assert_eq!(&found, expected, "{}: {}", scene.name, scene.why);
+    }
+}
+
+#[test]
+fn algorithm_1_on_oriented_boxes() {
+    for scene in corpus() {
+        let found = algorithm1(&scene, |p| PersonBox::Obb(p.obb()));
+        assert_eq!(found, scene.obb, "{}: {}", scene.name, scene.why);
+    }
+}
+
+#[test]
+fn trunk_and_head() {
+    let size =
+        BodySize { trunk_depth_m: 0.26, trunk_width_m: 0.56, shoulder_share: 0.82, head_diameter_m: 0.2 };
+    for scene in corpus() {
+        let body = |p: &Person| {
+            UprightBody::new(&size, p.position_m, DVec2::from_angle(p.yaw_deg.to_radians()), p.size_m.z)
+        };
+        let people = &scene.people;
+        let blocked = |q: usize| {
+            let ue_m = people[q].position_m.extend(0.5 * people[q].size_m.z);
+            let hit = |p: usize| body(&people[p]).hit(scene.access_point_m, ue_m).is_some();
+            (0..people.len()).any(|p| p != q && hit(p))
+        };
+        let found: Vec<bool> = (0..people.len()).map(blocked).collect();
+        assert_eq!(found, scene.body, "{}: {}", scene.name, scene.why);
+    }
+}

@@ -1,0 +1,106 @@
+//! The sampled probability against answers known in closed form.
+
+use umbracast::blockage::{Blockage, Caster};
+use umbracast::forecast::{Coupling, Forecast, Gaussian2};
+use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
+use umbracast::track::Track;
+use umbracast::{Config, STEP_S};
+
+/// One access point at 1 m at the origin; bodies of 0.56 m turned towards it, of exactly known size and heading.
+fn config(samples: usize) -> Config {
+    let mut config = Config::default();
+    config.site.access_points.truncate(1);
+    config.site.access_points[0].position_m = [0.0, 0.0, 1.0];
+    config.blockage.samples = samples;
+    config.blockage.size_sigma_share = 0.0;
+    config.blockage.height_sigma_m = 0.0;
+    config.blockage.heading_sigma_deg = 0.0;
+    config.blockage.trunk_width_m = 0.56;
+    config.blockage.trunk_depth_m = 0.26;
+    config
+}
+
+fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -> (Track, Forecast) {
+    let aabb = Aabb {
+        min_m: position_m.extend(0.0) - DVec3::new(0.25, 0.25, 0.0),
+        max_m: position_m.extend(1.75) + DVec3::new(0.25, 0.25, 0.0),
+    };
+    let mut covariance = [[0.0; 4]; 4];
+    (0..4).for_each(|i| covariance[i][i] = variance[i]);
+    let track = Track {
+        id,
+        position_m,
+        velocity_mps,
+        covariance,
+        heading_rad: 0.0,
+        height_m: 1.75,
+        points: 30,
+        confirmed: true,
+        aabb,
+        obb: Obb::from_aabb(&aabb),
+        observed: [(0, position_m)].into(),
+    };
+    let mean = |s: usize| position_m + velocity_mps * (STEP_S * (s + 1) as f64);
+    let steps = std::array::from_fn(|s| Gaussian2 { mean_m: mean(s), ..Gaussian2::default() });
+    (track, Forecast { track: id, steps, coupling: Coupling { state: covariance, acceleration_psd: 0.0 } })
+}
+
+fn cast(config: &Config, people: Vec<(Track, Forecast)>) -> Vec<Blockage> {
+    let (tracks, forecasts): (Vec<_>, Vec<_>) = people.into_iter().unzip();
+    let mut blockages = Vec::new();
+    Caster::new(&config.blockage, &config.site).cast(&tracks, &forecasts, &mut blockages);
+    blockages
+}
+
+#[test]
+fn without_uncertainty_the_probability_is_zero_or_one() {
+    let still = DVec2::ZERO;
+    let near = person(1, DVec2::new(4.0, 0.0), still, [0.0; 4]);
+    let hidden = person(2, DVec2::new(8.0, 0.1), still, [0.0; 4]);
+    let clear = person(3, DVec2::new(8.0, 3.0), still, [0.0; 4]);
+    let found = cast(&config(16), vec![near, hidden, clear]);
+    assert_eq!(found.iter().map(|b| b.p_now).collect::<Vec<_>>(), [0.0, 1.0, 0.0]);
+    assert_eq!(found.iter().map(|b| b.p[8]).collect::<Vec<_>>(), [0.0, 1.0, 0.0]);
+}
+
+#[test]
+fn a_person_who_walks_in_blocks_from_the_step_he_arrives_at() {
+    // 1 m/s towards the ray from 0.65 m beside it, half width 0.28 m: in the way from step 4 (0.25 m) on.
+    let walker = person(1, DVec2::new(4.0, 0.65), DVec2::new(0.0, -1.0), [0.0; 4]);
+    let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
+    let found = cast(&config(4), vec![walker, user]);
+    assert!(!found[1].blocked_now);
+    assert_eq!(found[1].blocked, std::array::from_fn(|w| w + 1 >= 4));
+}
+
+#[test]
+fn the_share_of_samples_is_the_integral_of_the_gaussian() {
+    // Lateral offset 0.28 m with sigma 0.1 m: half of the mass is inside the edge, nearly none passes the other.
+    let near = person(1, DVec2::new(4.0, 0.28), DVec2::ZERO, [0.0, 0.01, 0.0, 0.0]);
+    let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
+    let found = cast(&config(20_000), vec![near, user]);
+    assert!((found[1].p_now - 0.5).abs() < 0.015, "{}", found[1].p_now);
+    // One sigma further out: 1 - Phi(1) = 0.1587.
+    let near = person(1, DVec2::new(4.0, 0.38), DVec2::ZERO, [0.0, 0.01, 0.0, 0.0]);
+    let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
+    let found = cast(&config(20_000), vec![near, user]);
+    assert!((found[1].p_now - 0.1587).abs() < 0.015, "{}", found[1].p_now);
+}
+
+#[test]
+fn the_probability_never_falls_with_the_window() {
+    let walker = person(1, DVec2::new(4.0, 0.6), DVec2::new(0.3, -0.8), [0.01, 0.01, 0.04, 0.04]);
+    let user = person(2, DVec2::new(8.0, -0.2), DVec2::new(-0.5, 0.4), [0.01, 0.01, 0.04, 0.04]);
+    for b in cast(&config(128), vec![walker, user]) {
+        assert!(b.p.is_sorted(), "{:?}", b.p);
+    }
+}
+
+#[test]
+fn standing_still_a_window_is_no_likelier_than_now() {
+    // Steps are not independent: a position that is wrong now is as wrong in all steps.
+    let near = person(1, DVec2::new(4.0, 0.3), DVec2::ZERO, [0.01, 0.01, 0.0, 0.0]);
+    let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.01, 0.01, 0.0, 0.0]);
+    let b = cast(&config(512), vec![near, user])[1];
+    assert_eq!(b.p[8], b.p_now);
+}
