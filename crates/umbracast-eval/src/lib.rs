@@ -1,1 +1,13 @@
 //! Scores, error budget, tables, figures and the report.
+//!
+//! Every score is computed from the rows of the tables (`umbracast_io::rows`), so a run in memory and a run
+//! read back from files give the same numbers. A scene is scored alone and leaves sums behind; the sums of many
+//! scenes are pooled, and the spread between scenes gives the intervals.
+
+pub mod scene;
+#[cfg(test)]
+mod hand_made;
+pub mod instances;
+pub mod tally;
+pub mod displacement;
+pub mod bootstrap;

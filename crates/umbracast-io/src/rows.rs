@@ -1,4 +1,5 @@
-//! The rows of every table, once. Column names and units are CONVENTIONS'.
+//! The rows of every table, once. A field is a column of the same name; name and unit say what it holds.
+#![allow(missing_docs, reason = "names carry the unit; what needs a word has one")]
 
 use serde::{Deserialize, Serialize};
 use umbracast::{Outcome, STEPS};

@@ -1,0 +1,112 @@
+//! Intervals by bootstrap over scenes: instances of one scene hang together, scenes do not.
+
+use rand::RngExt;
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+use crate::tally::Counts;
+
+/// How often the scenes are drawn anew.
+const RESAMPLES: usize = 1000;
+/// Where the generator starts: the same scores give the same intervals.
+const SEED: u64 = 0x756d_6272_6163_6173;
+
+/// Sums of a scene that can be added, several times over, to those of others.
+pub trait Pooled: Default {
+    /// These sums with `times` those of `other`.
+    #[must_use]
+    fn plus(&self, other: &Self, times: u64) -> Self;
+}
+
+impl Pooled for Counts {
+    fn plus(&self, other: &Self, times: u64) -> Self {
+        Self {
+            true_positive: self.true_positive + times * other.true_positive,
+            false_positive: self.false_positive + times * other.false_positive,
+            false_negative: self.false_negative + times * other.false_negative,
+            true_negative: self.true_negative + times * other.true_negative,
+        }
+    }
+}
+
+/// The same draws of scenes for every score, so that scores of one table can be compared.
+#[derive(Debug)]
+pub struct Bootstrap {
+    /// For each resample, how often each scene was drawn.
+    draws: Vec<Vec<u32>>,
+    scenes: usize,
+}
+
+impl Bootstrap {
+    /// For this many scenes.
+    pub fn new(scenes: usize) -> Self {
+        let mut random = Pcg64Mcg::seed_from_u64(SEED);
+        let mut draw = || {
+            let mut times = vec![0; scenes];
+            (0..scenes).for_each(|_| times[random.random_range(0..scenes as u64) as usize] += 1);
+            times
+        };
+        Self { draws: (0..RESAMPLES).map(|_| draw()).collect(), scenes }
+    }
+
+    /// The middle 95 % of `score` over resamples of the scenes; `sums[i]` is scene i's. `None` with fewer than
+    /// two scenes, or where the score is undefined in some resample.
+    pub fn interval<T: Pooled>(&self, sums: &[T], score: impl Fn(&T) -> Option<f64>) -> Option<[f64; 2]> {
+        if self.scenes < 2 || sums.len() != self.scenes {
+            return None;
+        }
+        let resampled = |times: &Vec<u32>| {
+            let pooled = sums.iter().zip(times).fold(T::default(), |all, (sum, &n)| match n {
+                0 => all,
+                n => all.plus(sum, u64::from(n)),
+            });
+            score(&pooled)
+        };
+        let mut values = self.draws.iter().map(resampled).collect::<Option<Vec<f64>>>()?;
+        values.sort_unstable_by(f64::total_cmp);
+        Some([quantile(&values, 0.025), quantile(&values, 0.975)])
+    }
+}
+
+/// Of sorted values, by linear interpolation between neighbours.
+pub fn quantile(sorted: &[f64], q: f64) -> f64 {
+    let at = q * (sorted.len() - 1) as f64;
+    let low = at as usize;
+    let high = (low + 1).min(sorted.len() - 1);
+    sorted[low] + (sorted[high] - sorted[low]) * (at - low as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(hits: u64, misses: u64) -> Counts {
+        Counts { true_positive: hits, false_negative: misses, ..Counts::default() }
+    }
+
+    #[test]
+    fn equal_scenes_leave_no_doubt() {
+        let interval = Bootstrap::new(5).interval(&[scene(3, 1); 5], Counts::recall).unwrap();
+        assert_eq!(interval, [0.75, 0.75]);
+    }
+
+    #[test]
+    fn the_interval_is_that_of_the_binomial_when_scenes_are_all_or_nothing() {
+        // 50 scenes of one instance each, half of them hit: recall is a mean of 50 coin flips, sd 0.0707.
+        let scenes: Vec<Counts> = (0..50).map(|i| scene(i % 2, 1 - i % 2)).collect();
+        let [low, high] = Bootstrap::new(50).interval(&scenes, Counts::recall).unwrap();
+        assert!((low - 0.36).abs() < 0.03 && (high - 0.64).abs() < 0.03, "{low} {high}");
+    }
+
+    #[test]
+    fn one_scene_has_no_interval() {
+        assert_eq!(Bootstrap::new(1).interval(&[scene(3, 1)], Counts::recall), None);
+    }
+
+    #[test]
+    fn the_same_scenes_give_the_same_interval() {
+        let scenes: Vec<Counts> = (0..7).map(|i| scene(i, 7 - i)).collect();
+        let twice = [0, 1].map(|_| Bootstrap::new(7).interval(&scenes, Counts::f1));
+        assert_eq!(twice[0], twice[1]);
+    }
+}
