@@ -1,6 +1,15 @@
 //! Who walks where: ORCA crowds and replayed trajectories.
 
+pub mod orca;
+pub mod circle;
+pub mod mixed;
+
+use std::str::FromStr;
+
+use umbracast::Error;
 use umbracast::geometry::DVec2;
+
+pub use circle::circle_crossing;
 
 /// One person's way, sampled evenly.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +46,31 @@ pub enum Preset {
     Orca06,
     /// Speeds, starts, stops, turns and groups.
     Mixed,
+}
+
+impl Preset {
+    /// All of them, in the order of every table.
+    pub const ALL: [Self; 3] = [Self::Orca03, Self::Orca06, Self::Mixed];
+
+    /// As it is written on the command line and in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Orca03 => "orca-03",
+            Self::Orca06 => "orca-06",
+            Self::Mixed => "mixed",
+        }
+    }
+}
+
+impl FromStr for Preset {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        Self::ALL
+            .into_iter()
+            .find(|preset| preset.name() == name)
+            .ok_or_else(|| Error::new(format!("preset: expected orca-03, orca-06 or mixed, found {name:?}")))
+    }
 }
 
 impl Trajectory {

@@ -1,0 +1,150 @@
+//! The paper's scene: people start on a circle and walk to the opposite point, driven by ORCA.
+
+use glam::Vec2;
+use rand::RngExt;
+use umbracast::geometry::DVec2;
+
+use super::orca::{Agent, Orca, Parameters};
+use super::{Crowd, Preset, Trajectory, mixed};
+use crate::random::stream;
+
+/// One simulated step: 10 ms.
+pub(super) const STEP_NS: i64 = 10_000_000;
+/// One step as ORCA takes it.
+pub(super) const STEP_S: f32 = 0.01;
+/// A person has arrived when nearer to the goal.
+pub(super) const ARRIVED_M: f32 = 1.0;
+/// A scene in which somebody walks longer is dropped.
+pub(super) const MOST_STEPS: usize = 6000;
+/// Steps from one 10 Hz sample to the next.
+pub(super) const SAMPLE_STEPS: usize = 10;
+/// After so many dropped scenes the last one stands, whatever its faults.
+pub(super) const MOST_ATTEMPTS: u64 = 100;
+/// Preferred speed of everybody.
+const PREFERRED_MPS: f32 = 1.0;
+/// Start points lie on the circle within this, on each axis.
+const START_NOISE_M: f32 = 0.5;
+
+/// A scene of people who cross a circle. A scene in which not all arrive or somebody turns back at once is
+/// dropped and drawn anew.
+///
+/// Where the circle is too small for so many people, they start nearer to each other than the preset says; if
+/// no scene out of a hundred will do, the last one stands, with `arrived_ns` empty for those who did not arrive.
+pub fn circle_crossing(preset: Preset, people: usize, radius_m: f64, seed: u64) -> Crowd {
+    let (parameters, spacing_m) = match preset {
+        Preset::Orca03 => (parameters(10.0, 5.0, 0.3, 1.0), 0.8),
+        Preset::Orca06 => (parameters(4.0, 4.0, 0.6, 1.5), 2.0),
+        Preset::Mixed => return mixed::crowd(people, radius_m, seed),
+    };
+    let mut attempt = 0;
+    loop {
+        let mut rng = stream(seed, "circle starts", attempt);
+        let starts = starts(people, radius_m as f32, spacing_m, &mut rng);
+        let crowd = walk(parameters, &starts);
+        attempt += 1;
+        if acceptable(&crowd) || attempt == MOST_ATTEMPTS {
+            return crowd;
+        }
+    }
+}
+
+/// What the generator's two parameter sets have in common: 10 neighbours, 5 s for obstacles, no limit of
+/// acceleration.
+pub(super) fn parameters(
+    neighbor_distance_m: f32,
+    horizon_s: f32,
+    radius_m: f32,
+    max_speed_mps: f32,
+) -> Parameters {
+    Parameters {
+        neighbor_distance_m,
+        max_neighbors: 10,
+        horizon_s,
+        obstacle_horizon_s: 5.0,
+        radius_m,
+        max_speed_mps,
+        max_acceleration_mps2: f32::INFINITY,
+    }
+}
+
+/// Points on a noisy circle, each at least `spacing_m` from the others.
+fn starts(people: usize, radius_m: f32, mut spacing_m: f32, rng: &mut impl rand::Rng) -> Vec<Vec2> {
+    let mut starts: Vec<Vec2> = Vec::with_capacity(people);
+    let mut refused = 0;
+    while starts.len() < people {
+        let angle = rng.random_range(0.0..std::f32::consts::TAU);
+        let noise = Vec2::new(
+            rng.random_range(-START_NOISE_M..START_NOISE_M),
+            rng.random_range(-START_NOISE_M..START_NOISE_M),
+        );
+        let start = Vec2::from_angle(angle) * radius_m + noise;
+        if starts.iter().all(|other| other.distance(start) >= spacing_m) {
+            starts.push(start);
+        } else {
+            refused += 1;
+            // No place left.
+            if refused % 1000 == 0 {
+                spacing_m *= 0.9;
+            }
+        }
+    }
+    starts
+}
+
+/// Everybody walks to minus the start until all have arrived.
+fn walk(parameters: Parameters, starts: &[Vec2]) -> Crowd {
+    let agents = starts.iter().map(|&start| Agent::new(parameters, start)).collect();
+    let mut orca = Orca::new(STEP_S, agents, &[]);
+    let mut positions: Vec<Vec<DVec2>> = starts.iter().map(|start| vec![start.as_dvec2()]).collect();
+    let mut arrived = vec![None; starts.len()];
+    let mut steps = 0;
+    loop {
+        for (i, agent) in orca.agents.iter_mut().enumerate() {
+            let to_goal = -starts[i] - agent.position_m;
+            let distance = to_goal.length();
+            if distance < ARRIVED_M {
+                arrived[i] = arrived[i].or(Some(steps as i64 * STEP_NS));
+                agent.preferred_mps = Vec2::ZERO;
+            } else {
+                // The reference lets everybody stand for the first step; here they follow the goal at once.
+                agent.preferred_mps = to_goal * (1.0 / distance) * PREFERRED_MPS;
+            }
+        }
+        let done = arrived.iter().all(Option::is_some) || steps >= MOST_STEPS;
+        // The last arrival, rounded up to a frame.
+        if done && steps % SAMPLE_STEPS == 0 {
+            break;
+        }
+        orca.step();
+        steps += 1;
+        for (way, agent) in positions.iter_mut().zip(&orca.agents) {
+            way.push(agent.position_m.as_dvec2());
+        }
+    }
+    Crowd {
+        trajectories: positions
+            .into_iter()
+            .zip(arrived)
+            .enumerate()
+            .map(|(person, (positions_m, arrived_ns))| Trajectory {
+                person: person as u32,
+                start_ns: 0,
+                step_ns: STEP_NS,
+                positions_m,
+                arrived_ns,
+                height_m: None,
+            })
+            .collect(),
+        duration_ns: steps as i64 * STEP_NS,
+    }
+}
+
+/// Everybody arrived, and nobody turned by 90 deg or more within three samples at 10 Hz before that.
+fn acceptable(crowd: &Crowd) -> bool {
+    crowd.trajectories.iter().all(|way| {
+        let Some(arrived_ns) = way.arrived_ns else { return false };
+        let walked = &way.positions_m[..=(arrived_ns / STEP_NS) as usize];
+        let samples: Vec<DVec2> = walked.iter().step_by(SAMPLE_STEPS).copied().collect();
+        samples.windows(3).all(|p| (p[1] - p[0]).dot(p[2] - p[1]) > 0.0)
+    })
+}

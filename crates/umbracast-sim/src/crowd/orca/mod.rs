@@ -1,0 +1,155 @@
+//! Optimal reciprocal collision avoidance: agents that pick, each step, the velocity nearest to the wished one
+//! that keeps every pair apart for a while (van den Berg, Guy, Lin, Manocha: Reciprocal n-body collision
+//! avoidance, ISRR 2009).
+//!
+//! Single precision and the order of operations of the authors' RVO2 library: without fused multiply-add the
+//! positions are equal to the last bit (`testdata/rvo2_golden`). The motion is chaotic, so anything less exact
+//! cannot be compared at all. One difference: RVO2 may cut an edge in two where its obstacle tree splits it,
+//! here edges stay whole; a single convex obstacle is never cut.
+
+mod grid;
+mod obstacles;
+mod velocity;
+
+use glam::Vec2;
+
+use grid::Grid;
+use obstacles::Corner;
+use velocity::{HalfPlane, tangents};
+
+/// How an agent sees and keeps clear of the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameters {
+    /// Agents farther away are not seen.
+    pub neighbor_distance_m: f32,
+    /// Of those, only the nearest so many count.
+    pub max_neighbors: usize,
+    /// For how long agents must stay clear of each other.
+    pub horizon_s: f32,
+    /// For how long of obstacles.
+    pub obstacle_horizon_s: f32,
+    /// Of the disc that stays free of others.
+    pub radius_m: f32,
+    /// No velocity is longer.
+    pub max_speed_mps: f32,
+    /// The velocity changes no faster; infinite in the published method.
+    pub max_acceleration_mps2: f32,
+}
+
+/// A disc that wants to go somewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Agent {
+    /// How it avoids.
+    pub parameters: Parameters,
+    /// Centre.
+    pub position_m: Vec2,
+    /// Of the last step.
+    pub velocity_mps: Vec2,
+    /// Where it would go alone; to be set before every step.
+    pub preferred_mps: Vec2,
+}
+
+impl Agent {
+    /// At rest.
+    pub fn new(parameters: Parameters, position_m: Vec2) -> Self {
+        Self { parameters, position_m, velocity_mps: Vec2::ZERO, preferred_mps: Vec2::ZERO }
+    }
+}
+
+/// Agents among fixed polygons.
+#[derive(Debug, Clone)]
+pub struct Orca {
+    step_s: f32,
+    /// In the order they were given.
+    pub agents: Vec<Agent>,
+    corners: Vec<Corner>,
+    grid: Grid,
+    next_mps: Vec<Vec2>,
+    neighbors: Vec<(f32, usize)>,
+    edges: Vec<(f32, usize)>,
+    lines: Vec<HalfPlane>,
+}
+
+impl Orca {
+    /// Agents with a time step. Polygons list their corners counter-clockwise; clockwise ones are walls around
+    /// the agents.
+    pub fn new(step_s: f32, agents: Vec<Agent>, polygons: &[Vec<Vec2>]) -> Self {
+        Self {
+            step_s,
+            next_mps: vec![Vec2::ZERO; agents.len()],
+            agents,
+            corners: obstacles::corners(polygons),
+            grid: Grid::default(),
+            neighbors: Vec::new(),
+            edges: Vec::new(),
+            lines: Vec::new(),
+        }
+    }
+
+    /// Moves everybody by one step: all choose first, then all move.
+    pub fn step(&mut self) {
+        self.grid.rebuild(&self.agents);
+        for i in 0..self.agents.len() {
+            self.next_mps[i] = self.choose_velocity(i);
+        }
+        for (agent, &next) in self.agents.iter_mut().zip(&self.next_mps) {
+            let change = next - agent.velocity_mps;
+            let limit = agent.parameters.max_acceleration_mps2 * self.step_s;
+            let length = change.length();
+            agent.velocity_mps =
+                if length > limit { agent.velocity_mps + change * (limit / length) } else { next };
+            agent.position_m += agent.velocity_mps * self.step_s;
+        }
+    }
+
+    fn choose_velocity(&mut self, i: usize) -> Vec2 {
+        let agent = &self.agents[i];
+        self.lines.clear();
+
+        obstacles::visible_edges(&self.corners, agent, &mut self.edges);
+        for &(_, edge) in &self.edges {
+            let line = obstacles::half_plane(&self.corners, edge, agent, &self.lines);
+            self.lines.extend(line);
+        }
+        let obstacle_lines = self.lines.len();
+
+        self.grid.nearest(&self.agents, i, &mut self.neighbors);
+        for &(_, other) in &self.neighbors {
+            self.lines.push(half_plane(agent, &self.agents[other], self.step_s));
+        }
+        velocity::nearest_allowed(
+            &self.lines,
+            obstacle_lines,
+            agent.parameters.max_speed_mps,
+            agent.preferred_mps,
+        )
+    }
+}
+
+/// Velocities that take half the effort to stay clear of `other` for the horizon.
+fn half_plane(agent: &Agent, other: &Agent, step_s: f32) -> HalfPlane {
+    let position = other.position_m - agent.position_m;
+    let velocity = agent.velocity_mps - other.velocity_mps;
+    let distance_sq = position.length_squared();
+    let radius = agent.parameters.radius_m + other.parameters.radius_m;
+    let radius_sq = radius * radius;
+
+    // The forbidden relative velocities are a cone with a round tip, the disc (position, radius) / time.
+    // Discs that overlap must part within one step.
+    let overlapping = distance_sq <= radius_sq;
+    let inverse_time = if overlapping { 1.0 / step_s } else { 1.0 / agent.parameters.horizon_s };
+    let from_tip = velocity - position * inverse_time;
+    let from_tip_sq = from_tip.length_squared();
+    let along = from_tip.dot(position);
+
+    let (direction, to_border) = if overlapping || (along < 0.0 && along * along > radius_sq * from_tip_sq) {
+        let length = from_tip_sq.sqrt();
+        let outward = from_tip * (1.0 / length);
+        (-outward.perp(), outward * (radius * inverse_time - length))
+    } else {
+        let (left, right) = tangents(position, radius, distance_sq);
+        let leg = if position.perp_dot(from_tip) > 0.0 { left } else { -right };
+        (leg, leg * velocity.dot(leg) - velocity)
+    };
+    HalfPlane { point: agent.velocity_mps + to_border * 0.5, direction }
+}
