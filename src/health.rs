@@ -11,9 +11,11 @@ pub struct Health {
     pub packets_not_understood: u64,
     /// Packets older than a frame that is already closed.
     pub packets_late: u64,
-    /// Jumps of a sensor's clock: forwards past a whole frame, or backwards.
+    /// Packets with a column that is there already.
+    pub packets_duplicate: u64,
+    /// Jumps of a sensor's clock, or leaps of all time, by more than a frame.
     pub clock_jumps: u64,
-    /// Frames that closed without one of the site's sensors.
+    /// Scans that are not there: one a sensor and frame without a packet of it.
     pub sensors_missing: u64,
     /// Points dropped because they are not finite, or nearer or farther than the sensor can measure.
     pub points_invalid: u64,
@@ -34,6 +36,7 @@ impl Health {
         self.packets_wrong_size += other.packets_wrong_size;
         self.packets_not_understood += other.packets_not_understood;
         self.packets_late += other.packets_late;
+        self.packets_duplicate += other.packets_duplicate;
         self.clock_jumps += other.clock_jumps;
         self.sensors_missing += other.sensors_missing;
         self.points_invalid += other.points_invalid;

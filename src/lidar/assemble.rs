@@ -1,29 +1,273 @@
 //! Packets of several sensors, cut into frames by time.
 
-use super::{Frame, Packet};
-use crate::{Error, Health, Site};
+use std::collections::{BTreeMap, VecDeque};
+use std::ops::RangeInclusive;
 
-/// Collects packets and gives frames. A frame closes when every sensor has gone past its end.
+use super::packet::{TIME_LIMIT_NS, decode};
+use super::{Cloud, Column, Frame, Model, Packet, RangeImage, Scan};
+use crate::geometry::Pose;
+use crate::{Error, Health, STEP_NS, Site};
+
+/// Collects packets and gives frames of 100 ms, counted from the first packet's time rounded down to a whole
+/// tenth of a second: frame k of a simulated scene, which starts at time 0, covers [k, k + 1) x 100 ms.
+///
+/// A frame closes when every sensor has gone past its end, or one is a whole frame further. A sensor that gave
+/// nothing to the last frame is not waited for. Frames without any packet are not given.
+///
+/// Each sensor's clock is its own. One that is not on the time of the others (more than a frame away from where
+/// the time of reception puts it, from its first packet on or after a jump) is shifted there and counted, so
+/// that a clock that was set, a sensor without one, or a broken time stamp loses no data. When all time leaps
+/// (every sensor was silent, or the host's clock was set forward) one packet is given up to be sure.
+///
+/// Memory: two frames beyond those that wait for [`pop`](Self::pop); call it after every push.
 #[derive(Debug)]
-pub struct Assembler {}
+pub struct Assembler {
+    sensors: Vec<Intake>,
+    /// Start of frame 0; set by the first packet.
+    origin_ns: Option<i64>,
+    /// The first frame that is not closed.
+    next: i64,
+    /// By frame, then by sensor.
+    open: BTreeMap<i64, BTreeMap<usize, RangeImage>>,
+    closed: VecDeque<Frame>,
+    /// Time and time of reception of the packet taken last whose clock did not jump.
+    now: Option<(i64, i64)>,
+    /// Where the packet before would have taken the time, more than a frame ahead: believed when a second says so.
+    leap_ns: Option<i64>,
+    /// Those of the packet at hand.
+    columns: Columns,
+}
+
+/// Columns with a range and a reflectivity a beam.
+#[derive(Debug, Default)]
+struct Columns {
+    column: Vec<Column>,
+    range_m: Vec<f32>,
+    reflectivity: Vec<u8>,
+}
+
+/// What the assembler knows of one sensor.
+#[derive(Debug)]
+struct Intake {
+    /// None for a sensor known only by its clouds, which sends no packets.
+    model: Option<Model>,
+    site_from_sensor: Pose,
+    valid_range_m: RangeInclusive<f32>,
+    /// From its own clock to the time of the frames.
+    shift_ns: i64,
+    /// Its latest column.
+    newest_ns: Option<i64>,
+    /// Whether frames wait for it.
+    awaited: bool,
+}
 
 impl Assembler {
     /// For the sensors of a site.
     ///
     /// # Errors
     /// A sensor model that is not known.
-    pub fn new(_site: &Site) -> Result<Self, Error> {
-        Ok(Self {})
+    pub fn new(site: &Site) -> Result<Self, Error> {
+        let intake = |sensor: &crate::site::Sensor| {
+            let model = match sensor.model.as_str() {
+                "points" => None,
+                name => {
+                    Some(Model::by_name(name).map_err(|e| e.within(format!("sensor {:?}", sensor.name)))?)
+                }
+            };
+            Ok(Intake {
+                awaited: model.is_some(),
+                model,
+                site_from_sensor: sensor.site_from_sensor(),
+                valid_range_m: sensor.range_min_m as f32..=sensor.range_max_m as f32,
+                shift_ns: 0,
+                newest_ns: None,
+            })
+        };
+        Ok(Self {
+            sensors: site.sensors.iter().map(intake).collect::<Result<_, Error>>()?,
+            origin_ns: None,
+            next: 0,
+            open: BTreeMap::new(),
+            closed: VecDeque::new(),
+            now: None,
+            leap_ns: None,
+            columns: Columns::default(),
+        })
     }
 
     /// Takes one packet of `site.sensors[sensor]`.
-    pub fn push(&mut self, _sensor: usize, _packet: &Packet, _health: &mut Health) {}
+    pub fn push(&mut self, sensor: usize, packet: &Packet, health: &mut Health) {
+        let Some(model) = self.sensors.get(sensor).and_then(|s| s.model.clone()) else {
+            health.packets_not_understood += 1;
+            return;
+        };
+        let columns = &mut self.columns;
+        columns.clear();
+        decode(&model, packet, health, |column, range_m, reflectivity| {
+            columns.push(column, range_m, reflectivity)
+        });
+        let (Some(first), Some(last)) = (columns.column.first(), columns.column.last()) else { return };
+
+        let intake = &mut self.sensors[sensor];
+        let (shift_ns, jumped) = intake.settle_clock(first.time_ns, packet.time_ns, self.now);
+        health.clock_jumps += u64::from(jumped);
+        let first_ns = first.time_ns.saturating_add(shift_ns);
+        let last_ns = last.time_ns.saturating_add(shift_ns);
+        let origin_ns = self.origin_ns.unwrap_or(first_ns - first_ns.rem_euclid(STEP_NS));
+        let spans_ns =
+            [first_ns, last_ns, first_ns.saturating_sub(origin_ns), last_ns.saturating_sub(origin_ns)];
+        if spans_ns.iter().any(|ns| ns.unsigned_abs() >= TIME_LIMIT_NS) {
+            health.packets_not_understood += 1;
+            return;
+        }
+        let leaps = self.now.is_some_and(|(now_ns, _)| first_ns.saturating_sub(now_ns) > STEP_NS);
+        if leaps && !self.leap_ns.is_some_and(|leap_ns| near(first_ns, leap_ns)) {
+            health.clock_jumps += u64::from(!jumped);
+            self.leap_ns = Some(first_ns);
+            return;
+        }
+        self.leap_ns = None;
+        self.origin_ns = Some(origin_ns);
+        intake.shift_ns = shift_ns;
+        intake.newest_ns = intake.newest_ns.max(Some(last_ns));
+        if !jumped {
+            self.now = Some((first_ns, packet.time_ns));
+        }
+        self.store(sensor, &model, health);
+        self.close_ready(health);
+    }
 
     /// The next closed frame.
     pub fn pop(&mut self) -> Option<Frame> {
-        None
+        self.closed.pop_front()
     }
 
-    /// At the end of the input: closes what is open.
-    pub fn finish(&mut self) {}
+    /// At the end of the input: closes what is open, without counting the sensors that these frames lack.
+    pub fn finish(&mut self) {
+        while let Some((number, images)) = self.open.pop_first() {
+            self.close(number, images, &mut Health::default());
+        }
+    }
+
+    /// Puts the columns of the packet at hand into their frames.
+    fn store(&mut self, sensor: usize, model: &Model, health: &mut Health) {
+        let intake = &mut self.sensors[sensor];
+        let beams = model.beams.len();
+        let (mut late, mut duplicate) = (false, false);
+        for (c, &column) in self.columns.column.iter().enumerate() {
+            let column = Column { time_ns: column.time_ns + intake.shift_ns, ..column };
+            let number = frame_number(self.origin_ns, column.time_ns);
+            if number < self.next {
+                late = true;
+                continue;
+            }
+            let image = self.open.entry(number).or_default().entry(sensor).or_insert_with(|| RangeImage {
+                beams: model.beams.clone(),
+                columns: Vec::new(),
+                range_m: Vec::new(),
+                reflectivity: Vec::new(),
+            });
+            // Columns come in order but for packets that overtook one another.
+            let at = image.columns.partition_point(|other| other.time_ns < column.time_ns);
+            let apart = |other: &Column| {
+                (other.time_ns - column.time_ns).unsigned_abs() as f64 >= model.column_period_ns / 2.0
+            };
+            if !image.columns[at.saturating_sub(1)..].iter().take(2).all(apart) {
+                duplicate = true;
+                continue;
+            }
+            intake.awaited = true;
+            image.columns.insert(at, column);
+            let cells = c * beams..(c + 1) * beams;
+            let range_m = self.columns.range_m[cells.clone()].iter().map(|&range_m| {
+                let valid = range_m == 0.0 || intake.valid_range_m.contains(&range_m);
+                health.points_invalid += u64::from(!valid);
+                if valid { range_m } else { 0.0 }
+            });
+            image.range_m.splice(at * beams..at * beams, range_m);
+            let reflectivity = self.columns.reflectivity[cells].iter().copied();
+            image.reflectivity.splice(at * beams..at * beams, reflectivity);
+        }
+        health.packets_late += u64::from(late);
+        health.packets_duplicate += u64::from(duplicate);
+    }
+
+    /// Closes every frame that waits for no sensor any more.
+    fn close_ready(&mut self, health: &mut Health) {
+        while let Some((&number, _)) = self.open.first_key_value() {
+            let reached = |s: &Intake| s.newest_ns.map(|newest_ns| frame_number(self.origin_ns, newest_ns));
+            let all_past = self.sensors.iter().all(|s| !s.awaited || reached(s) > Some(number));
+            let one_far_past = self.sensors.iter().any(|s| reached(s) > Some(number + 1));
+            if !all_past && !one_far_past {
+                break;
+            }
+            let images = self.open.remove(&number).unwrap_or_default();
+            self.close(number, images, health);
+        }
+    }
+
+    fn close(&mut self, number: i64, images: BTreeMap<usize, RangeImage>, health: &mut Health) {
+        let with_packets = self.sensors.iter().filter(|s| s.model.is_some()).count();
+        let frames = number + 1 - self.next;
+        health.sensors_missing += frames as u64 * with_packets as u64 - images.len() as u64;
+        self.next = number + 1;
+        for (s, sensor) in self.sensors.iter_mut().enumerate() {
+            sensor.awaited = images.contains_key(&s);
+        }
+        let scans = images.into_iter().map(|(sensor, image)| Scan {
+            sensor,
+            site_from_sensor: self.sensors[sensor].site_from_sensor,
+            cloud: Cloud::Organised(image),
+        });
+        self.closed.push_back(Frame {
+            index: number as u64,
+            time_ns: self.origin_ns.unwrap_or(0) + (number + 1) * STEP_NS,
+            scans: scans.collect(),
+        });
+    }
 }
+
+impl Intake {
+    /// The shift for a packet of this sensor whose clock says `own_ns`, and whether the clock jumped. `now` is the
+    /// time and the time of reception of the packet before, of any sensor.
+    fn settle_clock(&self, own_ns: i64, received_ns: i64, now: Option<(i64, i64)>) -> (i64, bool) {
+        let Some((now_ns, now_received_ns)) = now else { return (0, false) };
+        let expected_ns = now_ns.saturating_add(received_ns.saturating_sub(now_received_ns).max(0));
+        let time_ns = own_ns.saturating_add(self.shift_ns);
+        let runs_on = self.newest_ns.is_some_and(|newest_ns| near(time_ns, newest_ns));
+        if runs_on || near(time_ns, expected_ns) {
+            (self.shift_ns, false)
+        } else if near(own_ns, expected_ns) {
+            (0, true)
+        } else {
+            (expected_ns.saturating_sub(own_ns), true)
+        }
+    }
+}
+
+impl Columns {
+    fn clear(&mut self) {
+        self.column.clear();
+        self.range_m.clear();
+        self.reflectivity.clear();
+    }
+
+    fn push(&mut self, column: Column, range_m: &[f32], reflectivity: &[u8]) {
+        self.column.push(column);
+        self.range_m.extend_from_slice(range_m);
+        self.reflectivity.extend_from_slice(reflectivity);
+    }
+}
+
+/// Within a frame's length.
+fn near(a_ns: i64, b_ns: i64) -> bool {
+    a_ns.saturating_sub(b_ns).unsigned_abs() <= STEP_NS.unsigned_abs()
+}
+
+fn frame_number(origin_ns: Option<i64>, time_ns: i64) -> i64 {
+    (time_ns - origin_ns.unwrap_or(0)).div_euclid(STEP_NS)
+}
+
+#[cfg(test)]
+#[path = "assemble_tests.rs"]
+mod tests;

@@ -23,7 +23,7 @@ const RANGE_UNIT_M: f32 = 0.002;
 const TURN_CDEG: u32 = 36_000;
 const HOUR_NS: i64 = 3_600_000_000_000;
 /// Times beyond this (146 years from the epoch) are no sensor's; below it sums of times cannot overflow.
-const TIME_LIMIT_NS: u64 = 1 << 62;
+pub(super) const TIME_LIMIT_NS: u64 = 1 << 62;
 
 /// A sensor's UDP payload with the time it was received (simulation: sent).
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,0 +1,272 @@
+//! Tests of the assembler: two sensors that turn in step, with one thing wrong in each test.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use super::*;
+use crate::Config;
+use crate::lidar::packet::{columns_per_packet, encode};
+
+const MS: i64 = 1_000_000;
+
+/// Packets of one HDL-32E from `start_ns` on, for `length_ns`, all ranges 5 m, received 1 ms after.
+fn packets(start_ns: i64, length_ns: i64) -> Vec<Packet> {
+    let model = Model::hdl_32e();
+    let per_packet = columns_per_packet(&model);
+    let count = (length_ns as f64 / (per_packet as f64 * model.column_period_ns)) as usize;
+    (0..count)
+        .map(|p| {
+            let columns: Vec<_> = (p * per_packet..(p + 1) * per_packet)
+                .map(|c| {
+                    let after_ns = c as f64 * model.column_period_ns;
+                    Column {
+                        time_ns: start_ns + after_ns.round() as i64,
+                        azimuth_cdeg: (after_ns * 36_000.0 / 1e8 % 36_000.0) as f32,
+                        azimuth_rate_cdeg_per_ns: 36_000.0 / 1e8,
+                    }
+                })
+                .collect();
+            let returns = per_packet * model.beams.len();
+            encode(&model, &columns, &vec![5.0; returns], &vec![7; returns], columns[0].time_ns + MS)
+        })
+        .collect()
+}
+
+/// The packets of both sensors in turn.
+fn both(east: Vec<Packet>, west: Vec<Packet>) -> Vec<(usize, Packet)> {
+    let mut all: Vec<_> = east.into_iter().map(|p| (0, p)).chain(west.into_iter().map(|p| (1, p))).collect();
+    all.sort_by_key(|(_, packet)| packet.time_ns);
+    all
+}
+
+fn assemble(packets: &[(usize, Packet)]) -> (Vec<Frame>, Health) {
+    let mut assembler = Assembler::new(&Config::default().site).unwrap();
+    let mut health = Health::default();
+    let mut frames = Vec::new();
+    for (sensor, packet) in packets {
+        assembler.push(*sensor, packet, &mut health);
+        frames.extend(std::iter::from_fn(|| assembler.pop()));
+        assert!(assembler.open.len() <= 3, "memory must not grow");
+    }
+    assembler.finish();
+    frames.extend(std::iter::from_fn(|| assembler.pop()));
+    (frames, health)
+}
+
+fn columns_of(frame: &Frame) -> Vec<(usize, usize)> {
+    let columns = |scan: &Scan| match &scan.cloud {
+        Cloud::Organised(image) => {
+            assert_eq!(image.range_m.len(), image.columns.len() * image.beams.len());
+            assert_eq!(image.reflectivity.len(), image.range_m.len());
+            assert!(image.columns.is_sorted_by_key(|c| c.time_ns));
+            image.columns.len()
+        }
+        Cloud::Unorganised(_) => panic!("packets give organised clouds"),
+    };
+    frame.scans.iter().map(|scan| (scan.sensor, columns(scan))).collect()
+}
+
+fn assert_whole(frame: &Frame) {
+    let columns = columns_of(frame);
+    assert_eq!(columns.iter().map(|c| c.0).collect::<Vec<_>>(), [0, 1], "frame {}", frame.index);
+    assert!(columns.iter().all(|c| (2169..=2171).contains(&c.1)), "frame {}: {columns:?}", frame.index);
+}
+
+#[test]
+fn frames_cover_whole_tenths_of_a_second_in_order() {
+    let (frames, health) = assemble(&both(packets(0, 1000 * MS), packets(0, 1000 * MS)));
+    assert!(health.is_clean(), "{health:?}");
+    assert_eq!(frames.len(), 10);
+    for (k, frame) in frames.iter().enumerate() {
+        assert_eq!((frame.index, frame.time_ns), (k as u64, (k as i64 + 1) * STEP_NS));
+        if k < 9 {
+            assert_whole(frame);
+        }
+        for scan in &frame.scans {
+            let Cloud::Organised(image) = &scan.cloud else { panic!() };
+            let inside = frame.time_ns - STEP_NS..frame.time_ns;
+            assert!(image.columns.iter().all(|c| inside.contains(&c.time_ns)));
+        }
+    }
+}
+
+#[test]
+fn a_capture_counts_from_the_tenth_of_a_second_it_starts_in() {
+    let start_ns = 1_700_000_000_030 * MS;
+    let (frames, _) = assemble(&both(packets(start_ns, 200 * MS), packets(start_ns, 200 * MS)));
+    assert_eq!((frames[0].index, frames[0].time_ns), (0, 1_700_000_000_100 * MS));
+    assert_whole(&frames[1]);
+}
+
+#[test]
+fn a_frame_closes_as_soon_as_every_sensor_is_past_its_end() {
+    let mut assembler = Assembler::new(&Config::default().site).unwrap();
+    let mut health = Health::default();
+    let closed_at_ns =
+        both(packets(0, 300 * MS), packets(0, 300 * MS)).iter().find_map(|(sensor, packet)| {
+            assembler.push(*sensor, packet, &mut health);
+            assembler.pop().map(|_| packet.time_ns - MS)
+        });
+    let closed_at_ns = closed_at_ns.unwrap();
+    assert!((99 * MS..101 * MS).contains(&closed_at_ns), "{closed_at_ns}");
+}
+
+#[test]
+fn a_lost_sensor_delays_one_frame_is_counted_and_comes_back() {
+    let mut west = packets(0, 1000 * MS);
+    west.retain(|p| !(300 * MS..600 * MS).contains(&p.time_ns));
+    let all = both(packets(0, 1000 * MS), west);
+    let (frames, health) = assemble(&all);
+    assert_eq!(frames.len(), 10);
+    assert_eq!(columns_of(&frames[4]).len(), 1);
+    assert_whole(&frames[7]);
+    assert_eq!(health.sensors_missing, 2, "{health:?}");
+
+    // Once known as lost it is not waited for.
+    let mut assembler = Assembler::new(&Config::default().site).unwrap();
+    for (sensor, packet) in all.iter().take_while(|(_, p)| p.time_ns < 510 * MS) {
+        assembler.push(*sensor, packet, &mut Health::default());
+    }
+    let last = std::iter::from_fn(|| assembler.pop()).last().unwrap();
+    assert_eq!(last.index, 4);
+}
+
+#[test]
+fn packets_that_overtake_one_another_are_put_in_order() {
+    let in_order = both(packets(0, 400 * MS), packets(0, 400 * MS));
+    let mut shuffled = in_order.clone();
+    // Not at the end of a frame: it closes with the first packet past it.
+    for few in
+        shuffled.chunks_exact_mut(4).filter(|p| (5 * MS..95 * MS).contains(&(p[0].1.time_ns % STEP_NS)))
+    {
+        few.reverse();
+    }
+    let (frames, health) = assemble(&shuffled);
+    assert_eq!(health.packets_late, 0);
+    assert_eq!(frames, assemble(&in_order).0);
+}
+
+#[test]
+fn a_packet_of_a_closed_frame_is_late() {
+    let mut all = both(packets(0, 400 * MS), packets(0, 400 * MS));
+    let packet = all.remove(100);
+    all.insert(400, packet);
+    let (frames, health) = assemble(&all);
+    assert_eq!(health.packets_late, 1, "{health:?}");
+    assert_eq!(columns_of(&frames[0]).iter().map(|c| c.1).sum::<usize>(), 2 * 2171 - 12);
+}
+
+#[test]
+fn a_packet_that_comes_twice_counts_once() {
+    let once = both(packets(0, 300 * MS), packets(0, 300 * MS));
+    let twice: Vec<_> = once.iter().flat_map(|p| [p.clone(), p.clone()]).collect();
+    let (frames, health) = assemble(&twice);
+    assert_eq!(frames, assemble(&once).0);
+    assert!(health.packets_duplicate > 1000, "{health:?}");
+}
+
+#[test]
+fn a_clock_set_back_or_forward_costs_no_frame() {
+    for jump_ns in [-10_000 * MS, 25_000 * MS] {
+        let mut west = packets(60_000 * MS, 500 * MS);
+        let mut after = packets(60_500 * MS + jump_ns, 500 * MS);
+        after.iter_mut().for_each(|p| p.time_ns -= jump_ns);
+        west.extend(after);
+        let (frames, health) = assemble(&both(packets(60_000 * MS, 1000 * MS), west));
+        assert_eq!(health.clock_jumps, 1, "{health:?}");
+        assert_eq!(frames.len(), 10);
+        frames[..9].iter().filter(|f| !(4..=5).contains(&f.index)).for_each(assert_whole);
+    }
+}
+
+#[test]
+fn all_clocks_set_back_leave_time_running_forward() {
+    let mut all = both(packets(60_000 * MS, 500 * MS), packets(60_000 * MS, 500 * MS));
+    all.extend(both(packets(50_000 * MS, 500 * MS), packets(50_000 * MS, 500 * MS)));
+    let (frames, health) = assemble(&all);
+    assert_eq!(health.clock_jumps, 2, "{health:?}");
+    assert!(frames.is_sorted_by_key(|f| f.time_ns));
+    assert!((9..=10).contains(&frames.len()));
+    assert_whole(&frames[7]);
+}
+
+#[test]
+fn one_broken_time_stamp_is_put_right() {
+    let mut all = both(packets(0, 300 * MS), packets(0, 300 * MS));
+    all[200].1.payload[1202] ^= 0x40;
+    let (frames, health) = assemble(&all);
+    assert_eq!(health.clock_jumps, 2, "there and back");
+    assert_whole(&frames[0]);
+}
+
+#[test]
+fn the_top_of_the_hour_is_no_jump() {
+    let start_ns = 3_600_000 * MS - 250 * MS;
+    let (frames, health) = assemble(&both(packets(start_ns, 500 * MS), packets(start_ns, 500 * MS)));
+    assert!(health.is_clean(), "{health:?}");
+    assert_eq!(frames.len(), 6, "half a frame, four whole ones, half a frame");
+    frames[1..4].iter().for_each(assert_whole);
+}
+
+#[test]
+fn a_silence_of_all_sensors_leaves_out_frames_and_is_counted() {
+    let mut all = both(packets(0, 200 * MS), packets(0, 200 * MS));
+    all.extend(both(packets(5000 * MS, 200 * MS), packets(5000 * MS, 200 * MS)));
+    let (frames, health) = assemble(&all);
+    assert_eq!(frames.iter().map(|f| f.index).collect::<Vec<_>>(), [0, 1, 50, 51]);
+    assert_eq!((health.clock_jumps, health.sensors_missing), (1, 2 * 48));
+}
+
+#[test]
+fn a_sensor_without_the_others_time_is_shifted_by_the_time_of_reception() {
+    let mut west = packets(1_200_000 * MS, 500 * MS);
+    west.iter_mut().for_each(|p| p.time_ns -= 1_200_000 * MS);
+    let (frames, health) = assemble(&both(packets(0, 500 * MS), west));
+    assert_eq!(health.clock_jumps, 1);
+    frames[..4].iter().for_each(assert_whole);
+}
+
+#[test]
+fn ranges_beyond_the_sensors_limits_are_dropped_and_counted() {
+    let model = Model::hdl_32e();
+    let column = Column { time_ns: 0, azimuth_cdeg: 0.0, azimuth_rate_cdeg_per_ns: 0.0 };
+    let mut range_m = [5.0; 32];
+    range_m[..3].copy_from_slice(&[0.4, 60.0, 0.0]);
+    let packet = encode(&model, &[column], &range_m, &[1; 32], 0);
+    let (frames, health) = assemble(&[(0, packet)]);
+    assert_eq!(health.points_invalid, 2);
+    let Cloud::Organised(image) = &frames[0].scans[0].cloud else { panic!() };
+    assert_eq!(image.range_m[..4], [0.0, 0.0, 0.0, 5.0]);
+}
+
+#[test]
+fn an_unknown_sensor_is_counted_and_an_unknown_model_refused() {
+    let mut site = Config::default().site;
+    let mut health = Health::default();
+    Assembler::new(&site).unwrap().push(7, &packets(0, MS)[0], &mut health);
+    assert_eq!(health.packets_not_understood, 1);
+    site.sensors[1].model = "hdl-64".into();
+    let message = Assembler::new(&site).unwrap_err().to_string();
+    assert_eq!(message, "sensor \"lidar_west\": sensor model: expected hdl-32e or vlp-16, found \"hdl-64\"");
+}
+
+/// Time stamps, times of reception and order at random: no panic, frames in order, memory bounded.
+#[test]
+fn broken_input_is_survived() {
+    let mut random = Pcg64Mcg::seed_from_u64(3);
+    let mut all = both(packets(0, 600 * MS), packets(0, 600 * MS));
+    for (sensor, packet) in &mut all {
+        match random.random_range(0..20) {
+            0 => packet.time_ns = random.random::<i64>() >> random.random_range(0..64),
+            1 => packet.payload[1200..1204].copy_from_slice(&random.random::<[u8; 4]>()),
+            2 => packet.payload[random.random_range(0..1206)] = random.random(),
+            3 => *sensor = 2 - *sensor,
+            _ => {}
+        }
+    }
+    let (frames, health) = assemble(&all);
+    assert!(frames.is_sorted_by(|a, b| a.index < b.index && a.time_ns < b.time_ns));
+    assert!(health.clock_jumps > 0);
+    let columns: usize = frames.iter().flat_map(columns_of).map(|c| c.1).sum();
+    assert!(columns > all.len() * 12 / 2, "{columns} columns of {} packets", all.len());
+}
