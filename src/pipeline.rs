@@ -49,7 +49,7 @@ impl Pipeline {
     pub fn new(config: &Config, weights: Option<&Weights>) -> Result<Self, Error> {
         Ok(Self {
             background: Background::new(&config.detect, &config.site)?,
-            clusterer: Clusterer::new(&config.detect),
+            clusterer: Clusterer::new(&config.detect, &config.site),
             measurer: Measurer::new(&config.detect, &config.site),
             tracker: Tracker::new(&config.track, &config.site),
             forecaster: Forecaster::new(&config.forecast, weights)?,

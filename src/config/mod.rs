@@ -10,7 +10,10 @@ mod overlay;
 use serde::{Deserialize, Serialize};
 
 pub use blockage::{BlockageConfig, BlockageMethod, BoxKind};
-pub use detect::DetectConfig;
+pub use detect::{
+    BackgroundConfig, BackgroundMethod, ClusterConfig, DetectConfig, MeasureConfig, MergeMean, ObbAxes,
+    PositionMethod, SplitConfig, SplitMethod,
+};
 pub use forecast::{ForecastConfig, ForecastMethod, Rollout};
 pub use track::TrackConfig;
 

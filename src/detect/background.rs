@@ -1,35 +1,350 @@
 //! Removes the points that belong to the empty scene.
 
+use super::range_model::RangeModel;
+use super::voxel::{VoxelMap, thin};
 use super::{Point, Prior};
-use crate::config::DetectConfig;
+use crate::config::{BackgroundConfig, BackgroundMethod, DetectConfig};
+use crate::geometry::{DVec3, Pose};
+use crate::lidar::{Cloud, RangeImage, Scan, SensorPoint};
 use crate::{Error, Frame, Health, Site};
 
 /// What the empty scene looks like to each sensor.
 #[derive(Debug)]
-pub struct Background {}
+pub struct Background {
+    config: BackgroundConfig,
+    sensors: Vec<SensorModel>,
+    half_length_m: f64,
+    half_width_m: f64,
+    /// True once an empty frame was given: then nothing more is learned.
+    known: bool,
+    map: Option<VoxelMap>,
+    keys: Vec<(u64, u32)>,
+}
+
+#[derive(Debug)]
+struct SensorModel {
+    range_min_m: f32,
+    range_max_m: f32,
+    ranges: RangeModel,
+    /// Row of each bin of elevation, for clouds whose beams are not known.
+    row_of_elevation: Vec<Option<u16>>,
+    elevation_bins_per_rad: f64,
+    returns: Vec<Return>,
+}
+
+/// A point of an unorganised cloud as the sensor saw it.
+#[derive(Debug, Clone, Copy)]
+struct Return {
+    elevation_bin: usize,
+    pixel: usize,
+    range_m: f32,
+    point: SensorPoint,
+}
 
 impl Background {
     /// Knows nothing yet.
     ///
     /// # Errors
-    /// A setting that contradicts the site.
-    pub fn new(_config: &DetectConfig, _site: &Site) -> Result<Self, Error> {
-        Ok(Self {})
+    /// A bin, voxel or share that is not positive.
+    pub fn new(config: &DetectConfig, site: &Site) -> Result<Self, Error> {
+        let config = config.background.clone();
+        for (name, value) in [
+            ("azimuth_bin_deg", config.azimuth_bin_deg),
+            ("elevation_bin_deg", config.elevation_bin_deg),
+            ("voxel_m", config.voxel_m),
+        ] {
+            if !(value > 0.0 && value < 360.0) {
+                return Err(Error::new(format!(
+                    "detect.background.{name}: expected a number above 0 and below 360, found {value}"
+                )));
+            }
+        }
+        let sensors = site
+            .sensors
+            .iter()
+            .map(|sensor| SensorModel {
+                range_min_m: sensor.range_min_m as f32,
+                range_max_m: sensor.range_max_m as f32,
+                ranges: RangeModel::new(&config, 0),
+                row_of_elevation: vec![None; (180.0 / config.elevation_bin_deg) as usize + 3],
+                elevation_bins_per_rad: 1.0_f64.to_degrees() / config.elevation_bin_deg,
+                returns: Vec::new(),
+            })
+            .collect();
+        Ok(Self {
+            sensors,
+            half_length_m: site.hall.length_m * 0.5 - config.wall_m,
+            half_width_m: site.hall.width_m * 0.5 - config.wall_m,
+            known: false,
+            map: None,
+            keys: Vec::new(),
+            config,
+        })
     }
 
     /// Learns from a frame without people (the paper's global map).
-    pub fn learn_empty(&mut self, _frame: &Frame) {}
+    pub fn learn_empty(&mut self, frame: &Frame) {
+        match self.config.method {
+            BackgroundMethod::RangeImage => {
+                self.known = true;
+                let mut nothing = Vec::new();
+                for scan in &frame.scans {
+                    let learn = Learn { priors: &[], freeze_m: 0.0 };
+                    self.scan(scan, Some(learn), &mut Health::default(), &mut nothing);
+                }
+            }
+            BackgroundMethod::Voxel => {
+                let mut points = Vec::new();
+                self.all_points(frame, &mut Health::default(), &mut points);
+                self.learn_map(&points);
+            }
+        }
+    }
 
     /// The points that are new, in the site frame. Where no empty scan was learned, the background is learned
     /// on the way, but not where a person is expected.
     pub fn foreground(
         &mut self,
-        _frame: &Frame,
-        _priors: &[Prior],
+        frame: &Frame,
+        priors: &[Prior],
         health: &mut Health,
         points: &mut Vec<Point>,
     ) {
-        let _ = health;
         points.clear();
+        match self.config.method {
+            BackgroundMethod::RangeImage => {
+                for scan in &frame.scans {
+                    let learn = (!self.known).then_some(Learn { priors, freeze_m: self.config.freeze_m });
+                    self.scan(scan, learn, health, points);
+                }
+            }
+            BackgroundMethod::Voxel => {
+                self.all_points(frame, health, points);
+                self.learn_map(points);
+                let map = self.map.as_ref().expect("just learned");
+                points.retain(|p| map.is_new(p.position_m, self.config.voxel_points));
+            }
+        }
+        let limit = self.config.points_limit;
+        health.points_over_limit += points.len().saturating_sub(limit) as u64;
+        points.truncate(limit);
     }
+
+    /// The first cloud is the map, and nothing changes it after (as in the adapted code).
+    fn learn_map(&mut self, points: &[Point]) {
+        if self.map.is_none() {
+            self.map = Some(VoxelMap::new(self.config.voxel_m, points));
+        }
+    }
+
+    /// All points of a frame in the site frame, thinned where the config says so.
+    fn all_points(&mut self, frame: &Frame, health: &mut Health, points: &mut Vec<Point>) {
+        points.clear();
+        for scan in &frame.scans {
+            let Some(sensor) = self.sensors.get(scan.sensor) else { continue };
+            let valid = |r: f32, health: &mut Health| {
+                let ok = r >= sensor.range_min_m && r <= sensor.range_max_m;
+                health.points_invalid += u64::from(!ok);
+                ok
+            };
+            match &scan.cloud {
+                Cloud::Organised(image) => {
+                    for (i, &range_m) in image.range_m.iter().enumerate() {
+                        let (c, b) = (i / image.beams.len().max(1), i % image.beams.len().max(1));
+                        if range_m != 0.0 && c < image.columns.len() && valid(range_m, health) {
+                            points.push(organised_point(scan, image, c, b, range_m));
+                        }
+                    }
+                }
+                Cloud::Unorganised(cloud) => {
+                    for point in cloud {
+                        if valid(DVec3::from(point.position_m.map(f64::from)).length() as f32, health) {
+                            points.push(unorganised_point(scan, point));
+                        }
+                    }
+                }
+            }
+        }
+        if self.config.thin_m > 0.0 {
+            thin(points, self.config.thin_m, &mut self.keys);
+        }
+    }
+
+    /// One scan against its sensor's range image; what is new goes to `points`.
+    fn scan(&mut self, scan: &Scan, learn: Option<Learn>, health: &mut Health, points: &mut Vec<Point>) {
+        let clip = Clip {
+            half_length_m: self.half_length_m,
+            half_width_m: self.half_width_m,
+            z_min_m: self.config.z_min_m,
+            z_max_m: self.config.z_max_m,
+        };
+        let Some(sensor) = self.sensors.get_mut(scan.sensor) else { return };
+        match &scan.cloud {
+            Cloud::Organised(image) => sensor.organised(scan, image, &clip, learn, health, points),
+            Cloud::Unorganised(cloud) => sensor.unorganised(scan, cloud, &clip, learn, health, points),
+        }
+        if learn.is_some() {
+            sensor.ranges.close_revolution(self.known);
+        }
+    }
+}
+
+/// Where nothing may be learned.
+#[derive(Clone, Copy)]
+struct Learn<'a> {
+    priors: &'a [Prior],
+    freeze_m: f64,
+}
+
+impl Learn<'_> {
+    fn is_frozen(&self, position_m: DVec3) -> bool {
+        let near = |prior: &Prior| {
+            let reach_m = self.freeze_m + prior.position_sigma_m.min(self.freeze_m);
+            prior.position_m.distance_squared(position_m.truncate()) < reach_m * reach_m
+        };
+        self.priors.iter().any(near)
+    }
+}
+
+/// Where people can be.
+struct Clip {
+    half_length_m: f64,
+    half_width_m: f64,
+    z_min_m: f64,
+    z_max_m: f64,
+}
+
+impl Clip {
+    fn holds(&self, p: DVec3) -> bool {
+        p.x.abs() <= self.half_length_m
+            && p.y.abs() <= self.half_width_m
+            && p.z >= self.z_min_m
+            && p.z <= self.z_max_m
+    }
+}
+
+impl SensorModel {
+    fn organised(
+        &mut self,
+        scan: &Scan,
+        image: &RangeImage,
+        clip: &Clip,
+        learn: Option<Learn>,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
+        let beams = image.beams.len();
+        if beams == 0 {
+            return;
+        }
+        self.ranges.grow(beams);
+        let (range_min_m, range_max_m) = (self.range_min_m, self.range_max_m);
+        for (c, (column, ranges_m)) in image.columns.iter().zip(image.range_m.chunks_exact(beams)).enumerate()
+        {
+            for (b, (&range_m, beam)) in ranges_m.iter().zip(image.beams.iter()).enumerate() {
+                if range_m == 0.0 {
+                    continue;
+                }
+                let azimuth_cdeg =
+                    column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * beam.fire_offset_ns as f32;
+                let pixel = self.ranges.pixel(b, azimuth_cdeg);
+                // Written so that NaN is caught: it is neither beyond the limit nor in the range.
+                let background = range_m >= self.ranges.limit_m(pixel);
+                if background && learn.is_none() {
+                    continue;
+                }
+                if !(range_m >= range_min_m && range_m <= range_max_m) {
+                    health.points_invalid += 1;
+                    continue;
+                }
+                let mut frozen = false;
+                if !background {
+                    let point = organised_point(scan, image, c, b, range_m);
+                    if clip.holds(point.position_m) {
+                        points.push(point);
+                        frozen = learn.is_some_and(|learn| learn.is_frozen(point.position_m));
+                    }
+                }
+                if learn.is_some() && !frozen {
+                    self.ranges.observe(pixel, range_m);
+                }
+            }
+        }
+    }
+
+    fn unorganised(
+        &mut self,
+        scan: &Scan,
+        cloud: &[SensorPoint],
+        clip: &Clip,
+        learn: Option<Learn>,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
+        self.sort_returns(cloud, health);
+        for i in 0..self.returns.len() {
+            let Return { elevation_bin, pixel, range_m, point } = self.returns[i];
+            // Beams sit between two bins of elevation, so both neighbours count as well.
+            let rows = &self.row_of_elevation[elevation_bin.saturating_sub(1)..=elevation_bin + 1];
+            let limit_m = rows
+                .iter()
+                .flatten()
+                .map(|&row| self.ranges.limit_m(self.ranges.in_row(pixel, usize::from(row))))
+                .fold(f32::INFINITY, f32::min);
+            let mut frozen = false;
+            if range_m < limit_m {
+                let point = unorganised_point(scan, &point);
+                if clip.holds(point.position_m) {
+                    points.push(point);
+                    frozen = learn.is_some_and(|learn| learn.is_frozen(point.position_m));
+                }
+            }
+            if learn.is_some() && !frozen {
+                self.ranges.observe(pixel, range_m);
+            }
+        }
+    }
+
+    /// The cloud as a spinning sensor saw it, in an order that does not depend on the cloud's.
+    fn sort_returns(&mut self, cloud: &[SensorPoint], health: &mut Health) {
+        self.returns.clear();
+        for &point in cloud {
+            let [x, y, z] = point.position_m;
+            let range_m = (x * x + y * y + z * z).sqrt();
+            if !(range_m >= self.range_min_m && range_m <= self.range_max_m) {
+                health.points_invalid += 1;
+                continue;
+            }
+            let elevation_rad = f64::from(z / range_m).clamp(-1.0, 1.0).asin();
+            let above_nadir_rad = elevation_rad + std::f64::consts::FRAC_PI_2;
+            // Bins are centred on their multiples, where beams use to be; bin 0 stays empty for the neighbours.
+            let elevation_bin = (above_nadir_rad * self.elevation_bins_per_rad).round() as usize + 1;
+            let elevation_bin = elevation_bin.min(self.row_of_elevation.len() - 2);
+            let row = *self.row_of_elevation[elevation_bin].get_or_insert_with(|| {
+                self.ranges.grow(self.ranges.rows() + 1);
+                self.ranges.rows() as u16 - 1
+            });
+            let azimuth_cdeg = (-y).atan2(x).to_degrees() * 100.0;
+            let pixel = self.ranges.pixel(usize::from(row), azimuth_cdeg);
+            self.returns.push(Return { elevation_bin, pixel, range_m, point });
+        }
+        self.returns.sort_unstable_by(|a, b| {
+            let key = |r: &Return| (r.elevation_bin, r.point.time_ns, r.range_m.to_bits());
+            let place = |r: &Return| r.point.position_m.map(f32::to_bits);
+            key(a).cmp(&key(b)).then_with(|| place(a).cmp(&place(b)))
+        });
+    }
+}
+
+fn organised_point(scan: &Scan, image: &RangeImage, c: usize, b: usize, range_m: f32) -> Point {
+    to_site(&scan.site_from_sensor, scan.sensor, image.point_m(c, b, f64::from(range_m)), image.time_ns(c, b))
+}
+
+fn unorganised_point(scan: &Scan, point: &SensorPoint) -> Point {
+    let position_m = DVec3::from(point.position_m.map(f64::from));
+    to_site(&scan.site_from_sensor, scan.sensor, position_m, point.time_ns)
+}
+
+fn to_site(site_from_sensor: &Pose, sensor: usize, position_m: DVec3, time_ns: i64) -> Point {
+    Point { position_m: site_from_sensor.point(position_m), time_ns, sensor: sensor as u16 }
 }

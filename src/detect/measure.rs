@@ -2,26 +2,158 @@
 
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
-use crate::config::DetectConfig;
+use crate::config::{DetectConfig, MeasureConfig, ObbAxes, PositionMethod};
+use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 /// Turns clusters into detections.
 #[derive(Debug)]
-pub struct Measurer {}
+pub struct Measurer {
+    config: MeasureConfig,
+    sensors_m: Vec<DVec3>,
+}
 
 impl Measurer {
     /// Needs the site to know from where each point was seen.
-    pub fn new(_config: &DetectConfig, _site: &Site) -> Self {
-        Self {}
+    pub fn new(config: &DetectConfig, site: &Site) -> Self {
+        Self {
+            config: config.measure.clone(),
+            sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
+        }
     }
 
     /// One detection a cluster that has a person's size.
     pub fn detections(
         &mut self,
-        _points: &[Point],
-        _clusters: &[Cluster],
+        points: &[Point],
+        clusters: &[Cluster],
         _priors: &[Prior],
         detections: &mut Vec<Detection>,
     ) {
         detections.clear();
+        for cluster in clusters {
+            let aabb = Aabb::around(cluster.iter().map(|&i| points[i as usize].position_m));
+            if self.has_size_of_person(cluster.len(), &aabb) {
+                detections.push(self.detection(points, cluster, aabb));
+            }
+        }
+    }
+
+    fn has_size_of_person(&self, points: usize, aabb: &Aabb) -> bool {
+        let c = &self.config;
+        let size_m = aabb.size_m();
+        let diagonal_m = size_m.truncate().length();
+        (c.points_min..=c.points_max).contains(&points)
+            && diagonal_m > c.diagonal_min_m
+            && diagonal_m < c.diagonal_max_m
+            && size_m.z > c.extent_min_m
+            && size_m.z < c.extent_max_m
+            && aabb.max_m.z > c.top_min_m
+            && aabb.max_m.z < c.top_max_m
+    }
+
+    fn detection(&self, points: &[Point], cluster: &[u32], aabb: Aabb) -> Detection {
+        let n = cluster.len() as f64;
+        let of = || cluster.iter().map(|&i| &points[i as usize]);
+        let mean_m: DVec3 = of().map(|p| p.position_m).sum::<DVec3>() / n;
+        let first_ns = of().map(|p| p.time_ns).min().unwrap_or_default();
+        let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
+        let (position_m, z_m) = match self.config.position {
+            PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z),
+            PositionMethod::ShiftedMean => {
+                // What is seen is the side toward the sensor: every point moves away from its own sensor.
+                let shift: DVec2 =
+                    of().map(|p| self.line_of_sight(p)).sum::<DVec2>() / n * self.config.shift_m;
+                (mean_m.truncate() + shift, mean_m.z)
+            }
+        };
+        Detection {
+            position_m,
+            z_m,
+            time_ns: first_ns + late_ns / cluster.len() as i64,
+            points: cluster.len() as u32,
+            top_m: aabb.max_m.z,
+            aabb,
+            obb: obb(of().map(|p| p.position_m), mean_m, self.config.obb_axes),
+        }
+    }
+
+    /// Horizontal unit vector from the point's sensor to the point.
+    fn line_of_sight(&self, point: &Point) -> DVec2 {
+        self.sensors_m
+            .get(usize::from(point.sensor))
+            .map_or(DVec2::ZERO, |s| (point.position_m - s).truncate().normalize_or_zero())
+    }
+}
+
+/// The box along the points' own axes: extremes in object space (paper, section IV-A).
+fn obb(points_m: impl Iterator<Item = DVec3> + Clone, mean_m: DVec3, axes: ObbAxes) -> Obb {
+    let mut covariance = DMat3::ZERO;
+    for p in points_m.clone() {
+        let d = p - mean_m;
+        covariance += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+    }
+    let site_from_box = match axes {
+        ObbAxes::Eigenvectors => eigenvectors(covariance),
+        ObbAxes::Yaw => {
+            let (xx, xy, yy) = (covariance.x_axis.x, covariance.x_axis.y, covariance.y_axis.y);
+            DMat3::from_rotation_z(0.5 * f64::atan2(2.0 * xy, xx - yy))
+        }
+    };
+    let box_from_site = site_from_box.transpose();
+    let extremes = Aabb::around(points_m.map(|p| box_from_site * (p - mean_m)));
+    Obb {
+        center_m: mean_m + site_from_box * extremes.center_m(),
+        half_m: extremes.size_m() * 0.5,
+        site_from_box,
+    }
+}
+
+/// Eigenvectors of a symmetric matrix as the columns of a rotation, by Jacobi's cyclic rotations.
+fn eigenvectors(symmetric: DMat3) -> DMat3 {
+    let mut a = symmetric.to_cols_array_2d();
+    let mut v = DMat3::IDENTITY;
+    // Convergence is quadratic; six sweeps reach the last bit.
+    for (p, q) in [(0, 1), (0, 2), (1, 2)].into_iter().cycle().take(18) {
+        if a[p][q] == 0.0 {
+            continue;
+        }
+        let angle = 0.5 * f64::atan2(2.0 * a[p][q], a[p][p] - a[q][q]);
+        let (sin, cos) = angle.sin_cos();
+        let mut turn = DMat3::IDENTITY.to_cols_array_2d();
+        (turn[p][p], turn[p][q]) = (cos, sin);
+        (turn[q][p], turn[q][q]) = (-sin, cos);
+        let turn = DMat3::from_cols_array_2d(&turn);
+        a = (turn.transpose() * DMat3::from_cols_array_2d(&a) * turn).to_cols_array_2d();
+        v *= turn;
+    }
+    v
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eigenvectors_turn_a_matrix_diagonal() {
+        let m = DMat3::from_cols(
+            DVec3::new(2.0, 0.3, -0.5),
+            DVec3::new(0.3, 1.0, 0.7),
+            DVec3::new(-0.5, 0.7, 3.0),
+        );
+        let v = eigenvectors(m);
+        let d = v.transpose() * m * v;
+        let off = d.x_axis.y.abs() + d.x_axis.z.abs() + d.y_axis.z.abs();
+        assert!(off < 1e-12, "{d}");
+        assert!((v.determinant() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_upright_box_finds_the_turn_of_its_points() {
+        let turn = DMat3::from_rotation_z(0.6);
+        let corners = [(-0.3, -0.1), (-0.3, 0.1), (0.3, -0.1), (0.3, 0.1)];
+        let points: Vec<DVec3> = corners.iter().map(|&(x, y)| turn * DVec3::new(x, y, x)).collect();
+        let found = obb(points.iter().copied(), DVec3::ZERO, ObbAxes::Yaw);
+        assert!((found.half_m - DVec3::new(0.3, 0.1, 0.3)).length() < 1e-12, "{}", found.half_m);
+        assert!(found.site_from_box.x_axis.dot(turn.x_axis).abs() > 1.0 - 1e-12);
     }
 }

@@ -3,8 +3,12 @@
 //! Foreground: the points that do not belong to the empty scene, in the site frame. Clusters: groups of them in
 //! plan view, split and merged until each is one person. Detections: position and boxes of each.
 
+pub mod range_model;
+pub mod voxel;
 pub mod background;
 pub mod cluster;
+pub mod dp_means;
+pub mod evidence;
 pub mod split_merge;
 pub mod measure;
 

@@ -1,20 +1,109 @@
 //! One cluster, one person: Haselich's split-merge, or evidence for one person more or fewer.
 
-use super::{Cluster, Point, Prior};
-use crate::config::DetectConfig;
+use super::cluster::PlanGrid;
+use super::{Cluster, Point, Prior, dp_means, evidence};
+use crate::Site;
+use crate::config::{ClusterConfig, DetectConfig, SplitConfig, SplitMethod};
+use crate::geometry::{DVec2, DVec3};
 
 /// Groups foreground points into people.
 #[derive(Debug)]
-pub struct Clusterer {}
+pub struct Clusterer {
+    cluster: ClusterConfig,
+    split: SplitConfig,
+    sensors_m: Vec<DVec3>,
+    person_points_min: usize,
+    grid: PlanGrid,
+    plan_m: Vec<DVec2>,
+    radius_m: Vec<f64>,
+    labels: Vec<u32>,
+    components: Vec<Cluster>,
+}
 
 impl Clusterer {
-    /// With the switches of `detect`.
-    pub fn new(_config: &DetectConfig) -> Self {
-        Self {}
+    /// Needs the site to know how far each point is from a sensor.
+    pub fn new(config: &DetectConfig, site: &Site) -> Self {
+        Self {
+            cluster: config.cluster.clone(),
+            split: config.split.clone(),
+            sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
+            person_points_min: config.measure.points_min,
+            grid: PlanGrid::default(),
+            plan_m: Vec::new(),
+            radius_m: Vec::new(),
+            labels: Vec::new(),
+            components: Vec::new(),
+        }
     }
 
     /// One cluster a person, in an order that does not depend on the order of the points.
-    pub fn clusters(&mut self, _points: &[Point], _priors: &[Prior], clusters: &mut Vec<Cluster>) {
+    pub fn clusters(&mut self, points: &[Point], priors: &[Prior], clusters: &mut Vec<Cluster>) {
         clusters.clear();
+        self.components(points);
+        for component in self.components.drain(..) {
+            if component.len() < self.cluster.points_min {
+                continue;
+            }
+            match self.split.method {
+                SplitMethod::DpMeans => haselich(points, &component, &self.split, clusters),
+                SplitMethod::Evidence => {
+                    let _ = priors;
+                    evidence::split(points, component, self.person_points_min, clusters);
+                }
+            }
+        }
+        let first = |cluster: &Cluster| {
+            cluster
+                .iter()
+                .map(|&i| points[i as usize].position_m.to_array())
+                .min_by(order)
+                .unwrap_or_default()
+        };
+        clusters.sort_by(|a, b| order(&first(a), &first(b)));
     }
+
+    /// Connected components in plan view.
+    fn components(&mut self, points: &[Point]) {
+        self.plan_m.clear();
+        self.radius_m.clear();
+        for point in points {
+            let range_m =
+                self.sensors_m.iter().map(|s| s.distance(point.position_m)).fold(f64::INFINITY, f64::min);
+            let range_m = if range_m.is_finite() { range_m } else { 0.0 };
+            self.plan_m.push(point.position_m.truncate());
+            self.radius_m.push(self.cluster.radius_m + self.cluster.radius_per_range * range_m);
+        }
+        let found =
+            self.grid.components(&self.plan_m, &self.radius_m, self.cluster.radius_m, &mut self.labels);
+        self.components.resize_with(found, Vec::new);
+        for (&label, i) in self.labels.iter().zip(0..) {
+            self.components[label as usize].push(i);
+        }
+    }
+}
+
+fn order(a: &[f64; 3], b: &[f64; 3]) -> std::cmp::Ordering {
+    a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+}
+
+/// DP-means and the merge; what is merged keeps the order of the points.
+fn haselich(points: &[Point], component: &[u32], config: &SplitConfig, clusters: &mut Vec<Cluster>) {
+    let plan_m: Vec<DVec2> = component.iter().map(|&i| points[i as usize].position_m.truncate()).collect();
+    let labels = dp_means::split(&plan_m, config.lambda_m, config.passes);
+    let mut parts: Vec<(Cluster, Vec<DVec2>)> = Vec::new();
+    parts.resize_with(labels.iter().max().map_or(0, |&l| l + 1), Default::default);
+    for ((&label, &i), &p) in labels.iter().zip(component).zip(&plan_m) {
+        parts[label].0.push(i);
+        parts[label].1.push(p);
+    }
+    parts.retain(|(part, _)| !part.is_empty());
+    let (mut people, plans): (Vec<Cluster>, Vec<Vec<DVec2>>) = parts.into_iter().unzip();
+    for (part, into) in dp_means::merge(&plans, config).into_iter().enumerate() {
+        if into != part {
+            let moved = std::mem::take(&mut people[part]);
+            people[into].extend(moved);
+            people[into].sort_unstable();
+        }
+    }
+    clusters.extend(people.into_iter().filter(|person| !person.is_empty()));
 }

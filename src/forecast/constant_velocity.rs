@@ -2,9 +2,9 @@
 //! may be.
 
 use super::{Coupling, Forecast, Gaussian2};
+use crate::STEP_S;
 use crate::geometry::DVec2;
 use crate::track::Track;
-use crate::STEP_S;
 
 /// Carries a track's state on. `acceleration_psd` is the unforeseen acceleration's, m^2/s^3, each axis.
 pub fn forecast(track: &Track, acceleration_psd: f64) -> Forecast {

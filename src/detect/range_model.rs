@@ -1,0 +1,152 @@
+//! What the empty scene looks like to one sensor: for each pixel (a row of one beam, a bin of azimuth) the ranges
+//! that came back most often.
+
+use crate::config::BackgroundConfig;
+
+/// How many ranges a pixel remembers: an edge returns two, and one more passes by.
+const MODES: usize = 3;
+/// A mode's mean follows at least this fast: 1/50 a revolution.
+const GAIN_MIN: f32 = 0.02;
+
+/// One range that comes back, with how often it did.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mode {
+    range_m: f32,
+    /// Mean absolute deviation, metres.
+    spread_m: f32,
+    /// Revolutions; halved by forgetting.
+    weight: f32,
+}
+
+/// The pixels of one sensor, row after row.
+#[derive(Debug)]
+pub struct RangeModel {
+    bins: usize,
+    bins_per_cdeg: f32,
+    rows: usize,
+    modes: Vec<[Mode; MODES]>,
+    /// Nearest background of each pixel, before the margin; infinite where nothing stands, 0 while unknown.
+    nearest_m: Vec<f32>,
+    /// The same, less margin, over the neighbours in azimuth: a nearer return is new.
+    limit_m: Vec<f32>,
+    /// Revolutions learned; halved by forgetting.
+    revolutions: f32,
+    margin_m: f32,
+    share: f32,
+    start: f32,
+    memory: f32,
+}
+
+impl RangeModel {
+    /// Knows nothing yet.
+    pub fn new(config: &BackgroundConfig, rows: usize) -> Self {
+        let bins = (360.0 / config.azimuth_bin_deg).round().clamp(1.0, 36_000.0) as usize;
+        let mut model = Self {
+            bins,
+            bins_per_cdeg: bins as f32 / 36_000.0,
+            rows: 0,
+            modes: Vec::new(),
+            nearest_m: Vec::new(),
+            limit_m: Vec::new(),
+            revolutions: 0.0,
+            margin_m: config.margin_m as f32,
+            share: config.share as f32,
+            start: config.start_revolutions as f32,
+            memory: config.memory_revolutions as f32,
+        };
+        model.grow(rows);
+        model
+    }
+
+    /// How many rows there are.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Adds rows about which nothing is known.
+    pub fn grow(&mut self, rows: usize) {
+        self.rows = self.rows.max(rows);
+        let pixels = self.rows * self.bins;
+        self.modes.resize(pixels, [Mode::default(); MODES]);
+        self.nearest_m.resize(pixels, 0.0);
+        self.limit_m.resize(pixels, 0.0);
+    }
+
+    /// The pixel of a row that looks at this azimuth, hundredths of a degree.
+    #[inline]
+    pub fn pixel(&self, row: usize, azimuth_cdeg: f32) -> usize {
+        // A turn more or less is common, more than one is not: no remainder in the hot loop.
+        let mut bin = (azimuth_cdeg * self.bins_per_cdeg).floor() as i32;
+        let bins = self.bins as i32;
+        if bin >= bins {
+            bin -= bins;
+        } else if bin < 0 {
+            bin += bins;
+        }
+        row * self.bins + bin.clamp(0, bins - 1) as usize
+    }
+
+    /// Returns nearer than this are new. Zero, so that nothing is, until the scene is known.
+    #[inline]
+    pub fn limit_m(&self, pixel: usize) -> f32 {
+        self.limit_m[pixel]
+    }
+
+    /// The pixel in the same place of another row.
+    pub fn in_row(&self, pixel: usize, row: usize) -> usize {
+        row * self.bins + pixel % self.bins
+    }
+
+    /// Remembers one return.
+    pub fn observe(&mut self, pixel: usize, range_m: f32) {
+        let modes = &mut self.modes[pixel];
+        for mode in modes.iter_mut() {
+            let off_m = range_m - mode.range_m;
+            if mode.weight > 0.0 && off_m.abs() < self.margin_m {
+                mode.weight += 1.0;
+                let gain = (1.0 / mode.weight).max(GAIN_MIN);
+                mode.range_m += gain * off_m;
+                mode.spread_m += gain * (off_m.abs() - mode.spread_m);
+                return;
+            }
+        }
+        // No mode fits: the rarest gives way once it is outvoted.
+        let rarest = modes.iter_mut().min_by(|a, b| a.weight.total_cmp(&b.weight)).expect("there are modes");
+        rarest.weight -= 1.0;
+        if rarest.weight <= 0.0 {
+            *rarest = Mode { range_m, spread_m: 0.0, weight: 1.0 };
+        }
+    }
+
+    /// Closes a revolution that was observed and works out the limits anew. What was always empty counts as
+    /// open once `known` or once enough revolutions were seen.
+    pub fn close_revolution(&mut self, known: bool) {
+        self.revolutions += 1.0;
+        if self.revolutions > self.memory {
+            self.revolutions *= 0.5;
+            self.modes.iter_mut().flatten().for_each(|mode| mode.weight *= 0.5);
+        }
+        let unseen_m = if known || self.revolutions >= self.start { f32::INFINITY } else { 0.0 };
+        // An empty scan is believed as it is; what walks by has to be outvoted.
+        let least =
+            if known { self.share * self.revolutions } else { (self.share * self.revolutions).max(1.5) };
+        for (nearest, modes) in self.nearest_m.iter_mut().zip(&self.modes) {
+            *nearest = modes
+                .iter()
+                .filter(|mode| mode.weight > 0.0 && mode.weight >= least)
+                .map(|mode| mode.range_m - 2.0 * mode.spread_m)
+                .fold(unseen_m, |a, b| if unseen_m == 0.0 { 0.0 } else { a.min(b) });
+        }
+        for (row, limit) in
+            self.nearest_m.chunks_exact(self.bins).zip(self.limit_m.chunks_exact_mut(self.bins))
+        {
+            let last = row.len() - 1;
+            for bin in 0..row.len() {
+                let left = row[if bin == 0 { last } else { bin - 1 }];
+                let right = row[if bin == last { 0 } else { bin + 1 }];
+                // Edges jitter by one bin from revolution to revolution.
+                limit[bin] = row[bin].min(left).min(right) - self.margin_m;
+            }
+        }
+    }
+}

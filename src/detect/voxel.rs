@@ -1,0 +1,114 @@
+//! The empty scene as occupied voxels, and the voxel centroids that thin a cloud: both as hdl_people_tracking has
+//! them, quirks included (facts and values: koide3/hdl_people_tracking at 2d12516).
+
+use super::Point;
+use crate::geometry::{Aabb, DVec3};
+
+/// More voxels than this are not kept; what lies beyond counts as new.
+const VOXELS_MAX: usize = 1 << 28;
+
+/// How many points of the map lie in each voxel of the map's box.
+#[derive(Debug)]
+pub struct VoxelMap {
+    bounds: Aabb,
+    edge_m: f64,
+    size: [usize; 3],
+    counts: Vec<u8>,
+}
+
+impl VoxelMap {
+    /// Counts the points of the empty scene.
+    pub fn new(edge_m: f64, points: &[Point]) -> Self {
+        let bounds = Aabb::around(points.iter().map(|p| p.position_m));
+        let cells = if points.is_empty() { DVec3::ZERO } else { (bounds.size_m() / edge_m).ceil() };
+        let mut size = [cells.x as usize, cells.y as usize, cells.z as usize];
+        let layer = size[0].saturating_mul(size[1]).max(1);
+        size[2] = size[2].min(VOXELS_MAX / layer);
+        let mut map = Self { bounds, edge_m, size, counts: vec![0; size[0] * size[1] * size[2]] };
+        for point in points {
+            // A point on the far face falls into the next row, as in the original.
+            let [x, y, z] = map.voxel(point.position_m);
+            let flat = x + map.size[0] as i64 * (y + map.size[1] as i64 * z);
+            if let Some(count) = usize::try_from(flat).ok().and_then(|flat| map.counts.get_mut(flat)) {
+                *count = count.saturating_add(1);
+            }
+        }
+        map
+    }
+
+    /// True when fewer than `points_min` points of the map share the point's voxel, or it lies outside the map.
+    pub fn is_new(&self, position_m: DVec3, points_min: u8) -> bool {
+        let [x, y, z] = self.voxel(position_m);
+        let inside = |i: i64, n: usize| i >= 0 && i < n as i64;
+        if !(inside(x, self.size[0]) && inside(y, self.size[1]) && inside(z, self.size[2])) {
+            return points_min > 0;
+        }
+        self.counts[x as usize + self.size[0] * (y as usize + self.size[1] * z as usize)] < points_min
+    }
+
+    fn voxel(&self, position_m: DVec3) -> [i64; 3] {
+        // Truncated toward zero, so the first voxel below the box counts as inside, as in the original.
+        let v = (position_m - self.bounds.min_m) / self.edge_m;
+        [v.x as i64, v.y as i64, v.z as i64]
+    }
+}
+
+/// Replaces the points of each voxel by their centroid, in order of z, y, x. `keys` is scratch.
+pub fn thin(points: &mut Vec<Point>, edge_m: f64, keys: &mut Vec<(u64, u32)>) {
+    const HALF: i64 = 1 << 20;
+    keys.clear();
+    keys.extend(points.iter().zip(0..).map(|(p, i)| {
+        let v = (p.position_m / edge_m).floor();
+        let part = |c: f64| (c as i64 + HALF).clamp(0, 2 * HALF - 1) as u64;
+        (part(v.z) << 42 | part(v.y) << 21 | part(v.x), i)
+    }));
+    keys.sort_unstable();
+    let mut thinned = Vec::with_capacity(points.len() / 2);
+    for voxel in keys.chunk_by(|a, b| a.0 == b.0) {
+        let first = points[voxel[0].1 as usize];
+        let n = voxel.len() as f64;
+        let sum: DVec3 = voxel.iter().map(|&(_, i)| points[i as usize].position_m).sum();
+        let late: i64 = voxel.iter().map(|&(_, i)| points[i as usize].time_ns - first.time_ns).sum();
+        thinned.push(Point {
+            position_m: sum / n,
+            time_ns: first.time_ns + late / voxel.len() as i64,
+            sensor: first.sensor,
+        });
+    }
+    *points = thinned;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(x: f64, y: f64, z: f64) -> Point {
+        Point { position_m: DVec3::new(x, y, z), time_ns: 0, sensor: 0 }
+    }
+
+    #[test]
+    fn a_voxel_needs_two_points_to_hide_what_comes_later() {
+        let corners = [point(0.0, 0.0, 0.0), point(1.05, 1.05, 1.05)];
+        let twice = [point(0.5, 0.5, 0.5), point(0.51, 0.5, 0.5), point(0.9, 0.5, 0.5)];
+        let map = VoxelMap::new(0.2, &[&corners[..], &twice[..]].concat());
+        assert!(!map.is_new(DVec3::new(0.45, 0.45, 0.45), 2));
+        assert!(map.is_new(DVec3::new(0.9, 0.5, 0.5), 2), "one point is not enough");
+        assert!(map.is_new(DVec3::new(3.0, 0.5, 0.5), 2), "outside the map");
+    }
+
+    #[test]
+    fn the_first_voxel_below_the_map_counts_as_inside() {
+        let map = VoxelMap::new(0.2, &[point(0.0, 0.0, 0.0), point(0.01, 0.0, 0.0), point(1.0, 1.0, 1.0)]);
+        assert!(!map.is_new(DVec3::new(-0.15, 0.0, 0.0), 2));
+        assert!(map.is_new(DVec3::new(-0.25, 0.0, 0.0), 2));
+    }
+
+    #[test]
+    fn thinning_keeps_one_centroid_a_voxel() {
+        let mut points = vec![point(0.02, 0.05, 0.05), point(0.06, 0.05, 0.05), point(-0.02, 0.05, 0.05)];
+        thin(&mut points, 0.1, &mut Vec::new());
+        assert_eq!(points.len(), 2);
+        assert_eq!(points[0].position_m.x, -0.02);
+        assert!((points[1].position_m.x - 0.04).abs() < 1e-12);
+    }
+}
