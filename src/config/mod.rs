@@ -15,7 +15,7 @@ pub use detect::{
     PositionMethod, SplitConfig, SplitMethod,
 };
 pub use forecast::{ForecastConfig, ForecastMethod, Rollout};
-pub use track::TrackConfig;
+pub use track::{Assignment, Boxes, GateOn, MeasuredAt, ProcessNoise, TrackConfig};
 
 use crate::{Error, Site};
 

@@ -1,1 +1,253 @@
-//! See the tracker.
+//! Constant-velocity Kalman filters over the floor.
+//!
+//! x: state (x, y, vx, vy); P: its covariance; F: motion; Q: process noise (the base of the paper calls it R);
+//! H: picks the position; R: measurement noise; S: covariance of the innovation; K: gain.
+#![allow(non_snake_case)]
+
+use crate::config::{ProcessNoise, TrackConfig};
+use crate::geometry::DVec2;
+
+/// A symmetric 2x2 matrix.
+pub type Mat2 = [[f64; 2]; 2];
+/// A symmetric 4x4 matrix over (x, y, vx, vy).
+pub type Mat4 = [[f64; 4]; 4];
+
+/// A Gaussian over (x, y, vx, vy), metres and seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// Mean.
+    pub x: [f64; 4],
+    /// Covariance.
+    pub P: Mat4,
+}
+
+/// A Gaussian over one coordinate and its rate: the height of the points, where it is followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vertical {
+    /// Mean.
+    pub x: [f64; 2],
+    /// Covariance.
+    pub P: Mat2,
+}
+
+/// One person's filter: a constant velocity under one or several process noises at once (interacting multiple
+/// models: Blom and Bar-Shalom 1988), so that it is calm while a person walks on and quick when one turns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filter {
+    hypotheses: Vec<Hypothesis>,
+    /// Present where the height of the points is followed.
+    pub vertical: Option<Vertical>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Hypothesis {
+    weight: f64,
+    state: State,
+}
+
+/// What a step adds to the covariance: `position`, `cross` and `velocity` on the diagonals of P's blocks.
+struct Q {
+    position: f64,
+    cross: f64,
+    velocity: f64,
+}
+
+impl Filter {
+    /// A track's first state: somewhere near the first detection, at any walking velocity.
+    pub fn new(config: &TrackConfig, position_m: DVec2, z_m: f64, R: f64) -> Self {
+        let (p, v) = (config.birth_variance_per_noise * R, config.birth_speed_mps.powi(2));
+        let mut P = [[0.0; 4]; 4];
+        for (i, variance) in [p, p, v, v].into_iter().enumerate() {
+            P[i][i] = variance;
+        }
+        let state = State { x: [position_m.x, position_m.y, 0.0, 0.0], P };
+        let hypotheses = config.model_share.iter().map(|&weight| Hypothesis { weight, state }).collect();
+        let vertical = config.follow_z.then_some(Vertical { x: [z_m, 0.0], P: [[p, 0.0], [0.0, v]] });
+        Self { hypotheses, vertical }
+    }
+
+    /// The one Gaussian with the mean and the covariance of all hypotheses together.
+    pub fn state(&self) -> State {
+        let parts: Vec<(f64, &State)> = self.hypotheses.iter().map(|h| (h.weight, &h.state)).collect();
+        mixture(&parts)
+    }
+
+    /// [`Filter::state`] as it will be `dt_s` later, without changing the filter.
+    pub fn state_after(&self, config: &TrackConfig, dt_s: f64) -> State {
+        let mut later = self.state();
+        if dt_s > 0.0 {
+            let density = |(h, &q): (&Hypothesis, &f64)| h.weight * q;
+            let density = self.hypotheses.iter().zip(&config.acceleration_m2ps3).map(density).sum();
+            later.predict(dt_s, &process_noise(config, density, dt_s));
+        }
+        later
+    }
+
+    /// Moves the filter `dt_s` on; not at all where no time has passed.
+    pub fn predict(&mut self, config: &TrackConfig, dt_s: f64) {
+        if dt_s <= 0.0 {
+            return;
+        }
+        // The chance to stay in a model is exp(-dt / dwell), else one is drawn by its share; so two steps do the
+        // same as one that is as long as both.
+        let all = self.state();
+        let stay = (-dt_s / config.model_dwell_s).exp();
+        let models = config.acceleration_m2ps3.iter().zip(&config.model_share);
+        for (h, (&density, &share)) in self.hypotheses.iter_mut().zip(models) {
+            let stayed = stay * h.weight;
+            h.weight = stayed + (1.0 - stay) * share;
+            h.state = mixture(&[(stayed, &h.state), (h.weight - stayed, &all)]);
+            h.state.predict(dt_s, &process_noise(config, density, dt_s));
+        }
+        if let Some(z) = &mut self.vertical {
+            let q = process_noise(config, config.acceleration_m2ps3[0], dt_s);
+            z.x[0] += dt_s * z.x[1];
+            z.P = [
+                [
+                    z.P[0][0] + 2.0 * dt_s * z.P[0][1] + dt_s * dt_s * z.P[1][1] + q.position,
+                    z.P[0][1] + dt_s * z.P[1][1] + q.cross,
+                ],
+                [z.P[1][0] + dt_s * z.P[1][1] + q.cross, z.P[1][1] + q.velocity],
+            ];
+        }
+    }
+
+    /// Takes a measured position whose error has covariance `R`, and the height of the points where followed.
+    pub fn correct(&mut self, position_m: DVec2, z_m: f64, R: Mat2) {
+        let mut logs = Vec::with_capacity(self.hypotheses.len());
+        for h in &mut self.hypotheses {
+            logs.push(h.weight.ln() + h.state.correct(position_m, R));
+        }
+        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = logs.iter().map(|log| (log - most).exp()).sum();
+        for (h, log) in self.hypotheses.iter_mut().zip(logs) {
+            h.weight = (log - most).exp() / total;
+        }
+        if let Some(z) = &mut self.vertical {
+            let S = z.P[0][0] + R[0][0];
+            let K = [z.P[0][0] / S, z.P[1][0] / S];
+            let y = z_m - z.x[0];
+            z.x = [z.x[0] + K[0] * y, z.x[1] + K[1] * y];
+            let (p, c) = (z.P[0][0], z.P[0][1]);
+            z.P = [[(1.0 - K[0]) * p, (1.0 - K[0]) * c], [(1.0 - K[0]) * c, z.P[1][1] - K[1] * c]];
+        }
+    }
+}
+
+impl State {
+    /// The position's mean.
+    pub fn position_m(&self) -> DVec2 {
+        DVec2::new(self.x[0], self.x[1])
+    }
+
+    /// The velocity's mean.
+    pub fn velocity_mps(&self) -> DVec2 {
+        DVec2::new(self.x[2], self.x[3])
+    }
+
+    /// The position's covariance.
+    pub fn position_covariance(&self) -> Mat2 {
+        [[self.P[0][0], self.P[0][1]], [self.P[1][0], self.P[1][1]]]
+    }
+
+    /// x = F x, P = F P F' + Q, with F the motion over `dt_s`.
+    fn predict(&mut self, dt_s: f64, q: &Q) {
+        let (dt, P) = (dt_s, self.P);
+        for i in 0..2 {
+            self.x[i] += dt * self.x[i + 2];
+            for j in 0..2 {
+                self.P[i][j] = P[i][j] + dt * (P[i][j + 2] + P[i + 2][j]) + dt * dt * P[i + 2][j + 2];
+                self.P[i][j + 2] = P[i][j + 2] + dt * P[i + 2][j + 2];
+                self.P[j + 2][i] = self.P[i][j + 2];
+            }
+        }
+        for i in 0..2 {
+            self.P[i][i] += q.position;
+            self.P[i][i + 2] += q.cross;
+            self.P[i + 2][i] += q.cross;
+            self.P[i + 2][i + 2] += q.velocity;
+        }
+    }
+
+    /// The Kalman update with a position; returns the log of the measurement's likelihood.
+    fn correct(&mut self, position_m: DVec2, R: Mat2) -> f64 {
+        let P = self.P;
+        let S = plus(self.position_covariance(), R);
+        let (inverse, det) = inverted(S);
+        let y = position_m - self.position_m();
+        // K = P H' S^-1.
+        let K: [[f64; 2]; 4] = std::array::from_fn(|i| {
+            std::array::from_fn(|j| P[i][0] * inverse[0][j] + P[i][1] * inverse[1][j])
+        });
+        for i in 0..4 {
+            self.x[i] += K[i][0] * y.x + K[i][1] * y.y;
+        }
+        // Joseph's form, (I - K H) P (I - K H)' + K R K': stays symmetric and positive whatever the rounding.
+        let mut A = [[0.0; 4]; 4];
+        for i in 0..4 {
+            for j in 0..4 {
+                A[i][j] = P[i][j] - K[i][0] * P[0][j] - K[i][1] * P[1][j];
+            }
+        }
+        for i in 0..4 {
+            for j in i..4 {
+                let left = A[i][j] - A[i][0] * K[j][0] - A[i][1] * K[j][1];
+                let right: f64 =
+                    (0..2).map(|a| (0..2).map(|b| K[i][a] * R[a][b] * K[j][b]).sum::<f64>()).sum();
+                self.P[i][j] = left + right;
+                self.P[j][i] = left + right;
+            }
+        }
+        -0.5 * (quadratic(inverse, y) + det.ln()) - std::f64::consts::TAU.ln()
+    }
+}
+
+fn process_noise(config: &TrackConfig, density_m2ps3: f64, dt_s: f64) -> Q {
+    match config.process_noise {
+        // White acceleration integrated over the step: two steps add what one of their length adds.
+        ProcessNoise::WhiteAcceleration => Q {
+            position: density_m2ps3 * dt_s.powi(3) / 3.0,
+            cross: density_m2ps3 * dt_s.powi(2) / 2.0,
+            velocity: density_m2ps3 * dt_s,
+        },
+        ProcessNoise::PerStep => {
+            Q { position: config.step_position_m2, cross: 0.0, velocity: config.step_velocity_m2ps2 }
+        }
+    }
+}
+
+/// One Gaussian with the mean and covariance of a weighted mixture.
+fn mixture(parts: &[(f64, &State)]) -> State {
+    let total: f64 = parts.iter().map(|part| part.0).sum();
+    let mut mean = State { x: [0.0; 4], P: [[0.0; 4]; 4] };
+    for (weight, part) in parts {
+        for i in 0..4 {
+            mean.x[i] += weight / total * part.x[i];
+        }
+    }
+    for (weight, part) in parts {
+        let d: [f64; 4] = std::array::from_fn(|i| part.x[i] - mean.x[i]);
+        for i in 0..4 {
+            for j in 0..4 {
+                mean.P[i][j] += weight / total * (part.P[i][j] + d[i] * d[j]);
+            }
+        }
+    }
+    mean
+}
+
+/// Sum of two matrices.
+pub fn plus(a: Mat2, b: Mat2) -> Mat2 {
+    [[a[0][0] + b[0][0], a[0][1] + b[0][1]], [a[1][0] + b[1][0], a[1][1] + b[1][1]]]
+}
+
+/// Inverse and determinant of a positive definite matrix.
+pub fn inverted(a: Mat2) -> (Mat2, f64) {
+    let det = a[0][0] * a[1][1] - a[0][1] * a[1][0];
+    ([[a[1][1] / det, -a[0][1] / det], [-a[1][0] / det, a[0][0] / det]], det)
+}
+
+/// y' A y.
+pub fn quadratic(a: Mat2, y: DVec2) -> f64 {
+    a[0][0] * y.x * y.x + (a[0][1] + a[1][0]) * y.x * y.y + a[1][1] * y.y * y.y
+}

@@ -3,6 +3,8 @@
 pub mod kalman;
 pub mod association;
 pub mod visibility;
+mod height;
+mod person;
 pub mod tracker;
 
 pub use tracker::Tracker;

@@ -1,1 +1,223 @@
-//! See the tracker.
+//! Can a person at a place be seen? From where the sensors hang, which beams a frame holds, and what stands
+//! between: pillars, furniture and other people.
+
+use std::f64::consts::TAU;
+
+use crate::geometry::slab::hit_obb;
+use crate::geometry::{DMat3, DVec2, DVec3, Obb, Pose};
+use crate::lidar::{Cloud, Frame, RangeImage};
+use crate::site::Site;
+
+/// Radius of the upright cylinder that stands for a body, both as what is seen and as what hides: the trunk,
+/// 0.26 m by 0.46 m, averaged over all directions.
+const BODY_RADIUS_M: f64 = 0.18;
+/// A body is looked at in so many slices from the feet to the top.
+const SLICES: usize = 8;
+/// Directions round a sensor, counted apart, so that a lost packet hides a sector only.
+const SECTORS: usize = 90;
+/// Returns from a body in free sight of a sensor whose beams are unknown: enough to be found.
+const RETURNS_OF_UNKNOWN_BEAMS: f64 = 50.0;
+
+/// A body as sight knows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Body {
+    /// Ground point of its axis.
+    pub position_m: DVec2,
+    /// Standing height.
+    pub height_m: f64,
+}
+
+/// What stands still between sensors and people.
+#[derive(Debug)]
+pub struct Visibility {
+    pillars: Vec<(DVec2, f64)>,
+    furniture: Vec<Obb>,
+    /// Shortest and longest range of each sensor of the site.
+    ranges_m: Vec<(f64, f64)>,
+}
+
+/// One scan's view.
+#[derive(Debug)]
+pub struct Eye {
+    origin_m: DVec3,
+    sensor_from_site: Pose,
+    range_m: (f64, f64),
+    fan: Option<Fan>,
+}
+
+/// Where the beams of a scan go.
+#[derive(Debug)]
+struct Fan {
+    /// Ascending.
+    elevations_rad: Vec<f64>,
+    /// Columns fired into each sector.
+    columns: [f64; SECTORS],
+}
+
+/// What a body gives.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct View {
+    /// Returns expected from all sensors together.
+    pub returns: f64,
+    /// Beams that meet a metre of upright head, all sensors together.
+    pub beams_per_m_at_top: f64,
+}
+
+impl Visibility {
+    /// For what stands in the site.
+    pub fn new(site: &Site) -> Self {
+        let furniture = site.furniture.iter().map(|f| {
+            let half_m = DVec3::from_array(f.size_m) * 0.5;
+            Obb {
+                center_m: DVec3::new(f.position_m[0], f.position_m[1], half_m.z),
+                half_m,
+                site_from_box: DMat3::from_rotation_z(f.yaw_deg.to_radians()),
+            }
+        });
+        Self {
+            pillars: site.pillars.iter().map(|p| (DVec2::from_array(p.position_m), p.radius_m)).collect(),
+            furniture: furniture.collect(),
+            ranges_m: site.sensors.iter().map(|s| (s.range_min_m, s.range_max_m)).collect(),
+        }
+    }
+
+    /// The views that a frame holds. A sensor that sent nothing sees nobody.
+    pub fn eyes(&self, frame: &Frame) -> Vec<Eye> {
+        frame
+            .scans
+            .iter()
+            .map(|scan| Eye {
+                origin_m: scan.site_from_sensor.translation_m,
+                sensor_from_site: scan.site_from_sensor.inverse(),
+                range_m: self.ranges_m.get(scan.sensor).copied().unwrap_or((0.0, f64::INFINITY)),
+                fan: match &scan.cloud {
+                    Cloud::Organised(image) => Some(Fan::of(image)),
+                    Cloud::Unorganised(_) => None,
+                },
+            })
+            .collect()
+    }
+
+    /// What `body` gives to all `eyes` while `others` stand round it.
+    pub fn view(&self, eyes: &[Eye], body: &Body, others: &[Body]) -> View {
+        let mut view = View::default();
+        for eye in eyes {
+            let near = |point: DVec2, radius: f64| {
+                distance_to_segment(point, eye.origin_m.truncate(), body.position_m) < radius + BODY_RADIUS_M
+            };
+            let hiding: Vec<&Body> =
+                others.iter().filter(|o| *o != body && near(o.position_m, BODY_RADIUS_M)).collect();
+            let pillars: Vec<&(DVec2, f64)> = self.pillars.iter().filter(|p| near(p.0, p.1)).collect();
+            let free = |target: DVec3| {
+                !pillars.iter().any(|p| cylinder_hides(p.0, p.1, f64::INFINITY, eye.origin_m, target))
+                    && !hiding.iter().any(|o| {
+                        cylinder_hides(o.position_m, BODY_RADIUS_M, o.height_m, eye.origin_m, target)
+                    })
+                    && !self.furniture.iter().any(|f| hit_obb(f, eye.origin_m, target).is_some())
+            };
+            let across = (body.position_m - eye.origin_m.truncate()).perp().normalize_or_zero();
+            for slice in 0..SLICES {
+                let z = |edge: usize| body.height_m * edge as f64 / SLICES as f64;
+                let (low, high) = (z(slice), z(slice + 1));
+                for side in [-0.5, 0.5] {
+                    let foot = body.position_m + across * (side * BODY_RADIUS_M);
+                    if free(foot.extend(0.5 * (low + high))) {
+                        let beams = eye.beams_between(foot.extend(low), foot.extend(high));
+                        view.returns += beams * eye.columns_on(foot.extend(low)) * 0.5;
+                        if slice + 1 == SLICES {
+                            view.beams_per_m_at_top += 0.5 * beams / (high - low);
+                        }
+                    }
+                }
+            }
+        }
+        view
+    }
+}
+
+impl Eye {
+    /// Beams that pass between two points of a vertical line.
+    fn beams_between(&self, low_m: DVec3, high_m: DVec3) -> f64 {
+        let (low, high) = (self.sensor_from_site.point(low_m), self.sensor_from_site.point(high_m));
+        let range = low.length();
+        if range < self.range_m.0 || range > self.range_m.1 {
+            return 0.0;
+        }
+        let elevation = |p: DVec3| p.z.atan2(p.x.hypot(p.y));
+        match &self.fan {
+            Some(fan) => (fan.beam_at(elevation(high)) - fan.beam_at(elevation(low))).abs(),
+            None => RETURNS_OF_UNKNOWN_BEAMS / SLICES as f64,
+        }
+    }
+
+    /// Columns that meet a body at a point.
+    fn columns_on(&self, point_m: DVec3) -> f64 {
+        let Some(fan) = &self.fan else { return 1.0 };
+        let p = self.sensor_from_site.point(point_m);
+        let width_rad = 2.0 * BODY_RADIUS_M / p.x.hypot(p.y).max(BODY_RADIUS_M);
+        fan.columns[sector((-p.y).atan2(p.x))] * width_rad * SECTORS as f64 / TAU
+    }
+}
+
+impl Fan {
+    fn of(image: &RangeImage) -> Self {
+        let mut elevations_rad: Vec<f64> = image.beams.iter().map(|b| b.elevation_rad).collect();
+        elevations_rad.sort_by(f64::total_cmp);
+        let mut columns = [0.0; SECTORS];
+        for column in &image.columns {
+            columns[sector((f64::from(column.azimuth_cdeg) * 0.01).to_radians())] += 1.0;
+        }
+        Self { elevations_rad, columns }
+    }
+
+    /// How many beams lie below an elevation, counted smoothly: half a beam at the lowest one.
+    fn beam_at(&self, elevation_rad: f64) -> f64 {
+        let all = &self.elevations_rad;
+        let n = all.partition_point(|&e| e < elevation_rad);
+        let (low, high) = match n {
+            0 => return 0.0,
+            n if n == all.len() => return n as f64,
+            n => (all[n - 1], all[n]),
+        };
+        n as f64 - 0.5 + (elevation_rad - low) / (high - low)
+    }
+}
+
+/// The sector of an azimuth, clockwise from above.
+fn sector(azimuth_rad: f64) -> usize {
+    let turn = (azimuth_rad / TAU).rem_euclid(1.0);
+    ((turn * SECTORS as f64) as usize).min(SECTORS - 1)
+}
+
+fn distance_to_segment(point: DVec2, start: DVec2, end: DVec2) -> f64 {
+    let along = end - start;
+    let share = ((point - start).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+    (start + along * share - point).length()
+}
+
+/// Does an upright cylinder stand on the line from the eye to the target? One that holds the target does not.
+fn cylinder_hides(axis_m: DVec2, radius_m: f64, height_m: f64, eye_m: DVec3, target_m: DVec3) -> bool {
+    let (eye, target) = (eye_m.truncate(), target_m.truncate());
+    let along = target - eye;
+    let length_squared = along.length_squared();
+    if length_squared == 0.0 || (target - axis_m).length() < radius_m {
+        return false;
+    }
+    let middle = (axis_m - eye).dot(along) / length_squared;
+    let off_squared = (eye + along * middle - axis_m).length_squared();
+    let half_squared = (radius_m * radius_m - off_squared) / length_squared;
+    if half_squared <= 0.0 {
+        return false;
+    }
+    // Where the line leaves the cylinder it is lowest, if the eye looks down; where it enters, if up.
+    let half = half_squared.sqrt();
+    let (enter, leave) = ((middle - half).max(0.0), (middle + half).min(1.0));
+    let z = |share: f64| eye_m.z + (target_m.z - eye_m.z) * share;
+    enter < leave && z(enter).min(z(leave)) < height_m
+}
+
+/// Chance that a body with so many expected returns is detected.
+pub fn detection_probability(returns: f64, most: f64, returns_at_half: f64) -> f64 {
+    let (n, half) = (returns * returns, returns_at_half * returns_at_half);
+    if n + half > 0.0 { most * n / (n + half) } else { 0.0 }
+}

@@ -1,0 +1,187 @@
+//! One person followed: filter, height, heading, boxes, and how sure it is that somebody is there.
+
+use std::collections::VecDeque;
+
+use super::height::Height;
+use super::kalman::{Filter, Mat2, State};
+use super::visibility::{Body, View};
+use super::{OBSERVED, Track};
+use crate::config::{Boxes, TrackConfig};
+use crate::detect::{Detection, Prior};
+use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+
+/// Nobody is believed in more firmly than this, so that a track that should be seen dies within frames.
+const EXISTENCE_MAX: f64 = 0.99;
+/// What one sighting alone is worth.
+const EXISTENCE_AT_BIRTH: f64 = 0.5;
+/// The step that chances of detection are meant for.
+const STEP_S: f64 = crate::STEP_S;
+/// The width of a box until one was seen.
+const WIDTH_M: f64 = 0.5;
+
+/// A track with everything behind it, at the time of the last frame.
+#[derive(Debug)]
+pub(super) struct Person {
+    pub(super) id: u64,
+    pub(super) filter: Filter,
+    pub(super) confirmed: bool,
+    /// Probability that somebody is there.
+    pub(super) existence: f64,
+    pub(super) hits: u32,
+    /// How long an elder track has stood in the same place.
+    pub(super) doubled_s: f64,
+    born_ns: i64,
+    last_hit_ns: i64,
+    points: u32,
+    heading_rad: f64,
+    height: Height,
+    /// The last detection's boxes, moved so that the detection's position is at the origin.
+    aabb: Aabb,
+    obb: Obb,
+    /// Averaged extent along x and y.
+    extent_m: DVec2,
+    observed: VecDeque<(i64, DVec2)>,
+}
+
+impl Person {
+    pub(super) fn born(config: &TrackConfig, id: u64, detection: &Detection, time_ns: i64) -> Self {
+        let variance = noise(config, detection.points)[0][0];
+        let mut person = Self {
+            id,
+            filter: Filter::new(config, detection.position_m, detection.z_m, variance),
+            confirmed: config.confirm_hits <= 1,
+            existence: EXISTENCE_AT_BIRTH,
+            hits: 1,
+            doubled_s: 0.0,
+            born_ns: time_ns,
+            last_hit_ns: time_ns,
+            points: 0,
+            heading_rad: 0.0,
+            height: Height::new(config.height_mean_m, config.height_sigma_m),
+            aabb: Aabb::EMPTY,
+            obb: Obb::from_aabb(&Aabb::EMPTY),
+            extent_m: DVec2::splat(WIDTH_M),
+            observed: VecDeque::with_capacity(OBSERVED),
+        };
+        person.see(detection, &View::default(), 0.0, config);
+        person
+    }
+
+    /// The frame's detection of this person, `after_s` after the last frame; the filter stands at it.
+    pub(super) fn hit(
+        &mut self,
+        config: &TrackConfig,
+        detection: &Detection,
+        view: &View,
+        time_ns: i64,
+        step_s: f64,
+    ) {
+        self.filter.correct(detection.position_m, detection.z_m, noise(config, detection.points));
+        let there = self.existence * config.hit_ratio;
+        self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
+        self.hits += 1;
+        self.last_hit_ns = time_ns;
+        self.confirmed |= self.hits >= config.confirm_hits;
+        self.see(detection, view, step_s, config);
+    }
+
+    /// No detection in this frame, although there was one with chance `detection_probability` a step.
+    pub(super) fn missed(&mut self, detection_probability: f64, step_s: f64) {
+        let unseen = (1.0 - detection_probability).powf(step_s / STEP_S);
+        self.existence = self.existence * unseen / (1.0 - self.existence * (1.0 - unseen));
+        self.points = 0;
+    }
+
+    pub(super) fn is_dead(&self, config: &TrackConfig, time_ns: i64) -> bool {
+        let seconds_since = |then_ns: i64| (time_ns - then_ns) as f64 * 1e-9;
+        let spread = self.filter.state().position_covariance();
+        let spread_z = self.filter.vertical.map_or(0.0, |z| z.P[0][0]);
+        self.existence < config.existence_min
+            || seconds_since(self.last_hit_ns) > config.coast_max_s
+            || spread[0][0] + spread[1][1] + spread_z >= config.position_variance_max_m2
+            || self.doubled_s > config.duplicate_after_s
+            || !self.confirmed && seconds_since(self.born_ns) > config.confirm_within_s
+    }
+
+    /// The body that others may hide behind.
+    pub(super) fn body(&self, position_m: DVec2) -> Body {
+        Body { position_m, height_m: self.height.mean_m() }
+    }
+
+    pub(super) fn prior(&self, config: &TrackConfig, after_s: f64) -> Prior {
+        let state = self.filter.state_after(config, after_s);
+        Prior {
+            position_m: state.position_m(),
+            velocity_mps: state.velocity_mps(),
+            position_sigma_m: largest_sigma(state.position_covariance()),
+            height_m: self.height.mean_m(),
+            confirmed: self.confirmed,
+        }
+    }
+
+    /// The track at the frame's time, where the filter stands.
+    pub(super) fn track(&mut self, config: &TrackConfig, time_ns: i64) -> Track {
+        let state = self.filter.state();
+        let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
+        if velocity_mps.length() > config.heading_speed_mps {
+            self.heading_rad = velocity_mps.y.atan2(velocity_mps.x);
+        }
+        if self.observed.len() == OBSERVED {
+            self.observed.pop_front();
+        }
+        self.observed.push_back((time_ns, position_m));
+        let (aabb, obb) = self.boxes(config, &state);
+        Track {
+            id: self.id,
+            position_m,
+            velocity_mps,
+            covariance: state.P,
+            heading_rad: self.heading_rad,
+            height_m: self.height.mean_m(),
+            points: self.points,
+            confirmed: self.confirmed,
+            aabb,
+            obb,
+            observed: self.observed.clone(),
+        }
+    }
+
+    /// Learns what a detection says of the body's shape.
+    fn see(&mut self, detection: &Detection, view: &View, step_s: f64, config: &TrackConfig) {
+        self.points = detection.points;
+        self.height.see(detection.top_m, view.beams_per_m_at_top);
+        self.aabb = detection.aabb.moved_by(-detection.position_m);
+        self.obb = detection.obb.moved_by(-detection.position_m, 0.0);
+        let new = 1.0 - (-step_s / config.box_average_s).exp();
+        self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
+    }
+
+    fn boxes(&self, config: &TrackConfig, state: &State) -> (Aabb, Obb) {
+        let position_m = state.position_m();
+        match config.boxes {
+            Boxes::Detection => (self.aabb.moved_by(position_m), self.obb.moved_by(position_m, 0.0)),
+            Boxes::Averaged => {
+                let half_m = (0.5 * self.extent_m).extend(0.5 * self.height.mean_m());
+                let center_m = position_m.extend(half_m.z);
+                let aabb = Aabb { min_m: center_m - half_m, max_m: center_m + half_m };
+                let site_from_box = DMat3::from_rotation_z(self.heading_rad);
+                // Shoulders are twice as wide as a trunk is deep; the plan area is what was seen.
+                let depth_m = (0.5 * half_m.x * half_m.y).sqrt();
+                let half_m = DVec3::new(depth_m, 2.0 * depth_m, half_m.z);
+                (aabb, Obb { center_m, half_m, site_from_box })
+            }
+        }
+    }
+}
+
+/// Covariance of a detection's position: part of its error falls with the number of points.
+pub(super) fn noise(config: &TrackConfig, points: u32) -> Mat2 {
+    let variance = config.noise_floor_m.powi(2) + config.noise_per_point_m.powi(2) / f64::from(points.max(1));
+    [[variance, 0.0], [0.0, variance]]
+}
+
+/// One standard deviation along the longer axis of an ellipse.
+fn largest_sigma(spread: Mat2) -> f64 {
+    let (mean, half) = (0.5 * (spread[0][0] + spread[1][1]), 0.5 * (spread[0][0] - spread[1][1]));
+    (mean + half.hypot(spread[0][1])).max(0.0).sqrt()
+}

@@ -1,0 +1,255 @@
+//! The tracker on made-up detections: noise, misses, false ones, crossings, pairs.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
+use umbracast::config::TrackConfig;
+use umbracast::detect::Detection;
+use umbracast::geometry::{Aabb, DVec2, DVec3, Obb, Pose};
+use umbracast::lidar::{Cloud, Frame, Scan};
+use umbracast::track::{Track, Tracker};
+use umbracast::{Config, Mode, Site};
+
+/// People who walk straight on: where from, and how fast.
+type Walkers = [(DVec2, DVec2)];
+
+/// A frame of one sensor high above the middle, whose beams are not known: everybody is in sight.
+fn frame(index: u64) -> Frame {
+    let mut site_from_sensor = Pose::IDENTITY;
+    site_from_sensor.translation_m = DVec3::new(0.0, 0.0, 30.0);
+    let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(Vec::new()) };
+    Frame { index, time_ns: (index as i64 + 1) * 100_000_000, scans: vec![scan] }
+}
+
+fn detection(position_m: DVec2, time_ns: i64) -> Detection {
+    let aabb = Aabb {
+        min_m: (position_m - DVec2::splat(0.25)).extend(0.1),
+        max_m: (position_m + DVec2::splat(0.25)).extend(1.7),
+    };
+    let obb = Obb::from_aabb(&aabb);
+    Detection { position_m, z_m: 0.9, time_ns, points: 30, top_m: 1.7, aabb, obb }
+}
+
+/// The site without anything that could hide somebody.
+fn open_site() -> Site {
+    let mut site = Config::for_mode(Mode::Default).site;
+    (site.pillars, site.furniture) = (Vec::new(), Vec::new());
+    site
+}
+
+/// What the sensors give: positions at times within the frame, with noise, misses and false detections.
+struct World<'a> {
+    walkers: &'a Walkers,
+    noise_m: f64,
+    miss: f64,
+    false_per_frame: usize,
+    rng: Pcg64,
+}
+
+impl World<'_> {
+    fn at(&self, person: usize, time_ns: i64) -> DVec2 {
+        let (start, velocity) = self.walkers[person];
+        start + velocity * (time_ns as f64 * 1e-9)
+    }
+
+    fn detections(&mut self, frame: &Frame) -> Vec<Detection> {
+        let noise = Normal::new(0.0, self.noise_m).unwrap();
+        let mut all = Vec::new();
+        for person in 0..self.walkers.len() {
+            if !self.rng.random_bool(self.miss) {
+                let time_ns = frame.time_ns - self.rng.random_range(0..100_000_000);
+                let error = DVec2::new(noise.sample(&mut self.rng), noise.sample(&mut self.rng));
+                all.push(detection(self.at(person, time_ns) + error, time_ns));
+            }
+        }
+        for _ in 0..self.false_per_frame {
+            let place = DVec2::new(self.rng.random_range(-9.0..9.0), self.rng.random_range(-9.0..9.0));
+            all.push(detection(place, frame.time_ns - 50_000_000));
+        }
+        all
+    }
+}
+
+fn world(walkers: &Walkers, seed: u64) -> World<'_> {
+    World { walkers, noise_m: 0.05, miss: 0.0, false_per_frame: 0, rng: Pcg64::seed_from_u64(seed) }
+}
+
+/// The confirmed track nearest to each person in each frame.
+fn follow(config: &TrackConfig, mut world: World<'_>, frames: u64) -> Vec<Vec<Track>> {
+    let mut tracker = Tracker::new(config, &open_site());
+    let mut tracks = Vec::new();
+    (0..frames)
+        .map(|index| {
+            let frame = frame(index);
+            tracker.update(&frame, &world.detections(&frame), &mut tracks);
+            tracks.iter().filter(|t| t.confirmed).cloned().collect()
+        })
+        .collect()
+}
+
+fn nearest(tracks: &[Track], position_m: DVec2) -> &Track {
+    let distance = |t: &&Track| t.position_m.distance(position_m);
+    tracks.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+}
+
+const CROSSING: [(DVec2, DVec2); 2] =
+    [(DVec2::new(-5.0, -0.3), DVec2::new(1.0, 0.06)), (DVec2::new(5.0, 0.3), DVec2::new(-1.0, -0.06))];
+const PAIR: [(DVec2, DVec2); 2] =
+    [(DVec2::new(-5.0, 0.0), DVec2::new(1.2, 0.0)), (DVec2::new(-5.0, 0.5), DVec2::new(1.2, 0.0))];
+
+#[test]
+fn one_walker_keeps_one_track_through_noise_misses_and_false_detections() {
+    let config = Config::for_mode(Mode::Default).track;
+    let walkers = [(DVec2::new(-6.0, 2.0), DVec2::new(1.2, -0.3))];
+    let world = World { miss: 0.1, false_per_frame: 1, ..world(&walkers, 1) };
+    let all = follow(&config, world, 100);
+    let mut ids = Vec::new();
+    for (index, tracks) in all.iter().enumerate().skip(3) {
+        let truth = walkers[0].0 + walkers[0].1 * (0.1 * (index + 1) as f64);
+        let track = nearest(tracks, truth);
+        assert!(track.position_m.distance(truth) < 0.3, "frame {index}: {}", track.position_m);
+        ids.push(track.id);
+    }
+    ids.dedup();
+    assert_eq!(ids.len(), 1, "identities in turn: {ids:?}");
+    let false_tracks: usize = all.iter().map(|tracks| tracks.len().saturating_sub(1)).sum();
+    assert!(false_tracks <= 5, "{false_tracks} frames with a track of nobody");
+}
+
+#[test]
+fn people_who_pass_each_other_keep_their_tracks() {
+    for mode in [Mode::Paper, Mode::Default] {
+        let config = Config::for_mode(mode).track;
+        for seed in 0..10 {
+            let all = follow(&config, world(&CROSSING, seed), 100);
+            let (first, last) = (&all[20], &all[99]);
+            for (start, velocity) in CROSSING {
+                let before = nearest(first, start + velocity * 2.1).id;
+                let after = nearest(last, start + velocity * 10.0).id;
+                assert_eq!(before, after, "{} seed {seed}", mode.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pair_half_a_metre_apart_is_two_tracks_in_default_and_one_in_hdl() {
+    for (mode, expected) in [(Mode::Default, 2), (Mode::Hdl, 1)] {
+        let config = Config::for_mode(mode).track;
+        for seed in 0..10 {
+            let all = follow(&config, world(&PAIR, seed), 50);
+            assert_eq!(all[49].len(), expected, "{} seed {seed}", mode.name());
+        }
+    }
+}
+
+#[test]
+fn somebody_who_leaves_is_forgotten_within_half_a_second() {
+    let config = Config::for_mode(Mode::Default).track;
+    let mut tracker = Tracker::new(&config, &open_site());
+    let mut tracks = Vec::new();
+    for index in 0..20 {
+        let frame = frame(index);
+        tracker.update(&frame, &[detection(DVec2::X, frame.time_ns)], &mut tracks);
+    }
+    assert_eq!(tracks.len(), 1);
+    for index in 20..25 {
+        tracker.update(&frame(index), &[], &mut tracks);
+    }
+    assert!(tracks.is_empty(), "{tracks:?}");
+}
+
+#[test]
+fn somebody_whom_no_sensor_sees_is_kept_for_three_seconds() {
+    let config = Config::for_mode(Mode::Default).track;
+    let mut tracker = Tracker::new(&config, &open_site());
+    let mut tracks = Vec::new();
+    for index in 0..20 {
+        let frame = frame(index);
+        tracker.update(&frame, &[detection(DVec2::X, frame.time_ns)], &mut tracks);
+    }
+    let blind = |index| Frame { scans: Vec::new(), ..frame(index) };
+    for index in 20..50 {
+        tracker.update(&blind(index), &[], &mut tracks);
+        assert_eq!(tracks.len(), 1, "frame {index}");
+    }
+    for index in 50..52 {
+        tracker.update(&blind(index), &[], &mut tracks);
+    }
+    assert!(tracks.is_empty());
+}
+
+#[test]
+fn frames_repeated_or_late_change_nothing() {
+    let config = Config::for_mode(Mode::Default).track;
+    let mut tracker = Tracker::new(&config, &open_site());
+    let mut tracks = Vec::new();
+    for index in 0..10 {
+        let frame = frame(index);
+        tracker.update(&frame, &[detection(DVec2::X, frame.time_ns)], &mut tracks);
+    }
+    let before = tracks.clone();
+    for index in [9, 3] {
+        let frame = frame(index);
+        tracker.update(&frame, &[detection(DVec2::Y, frame.time_ns)], &mut tracks);
+        assert_eq!(tracks, before);
+    }
+}
+
+#[test]
+fn the_order_of_detections_does_not_matter() {
+    let walkers: Vec<(DVec2, DVec2)> =
+        (0..12).map(|i| (DVec2::from_angle(f64::from(i)) * 4.0, -DVec2::from_angle(f64::from(i)))).collect();
+    for mode in Mode::ALL {
+        let config = Config::for_mode(mode).track;
+        let (mut one, mut other) = (Tracker::new(&config, &open_site()), Tracker::new(&config, &open_site()));
+        let (mut tracks, mut others) = (Vec::new(), Vec::new());
+        let mut world = World { miss: 0.1, false_per_frame: 3, ..world(&walkers, 7) };
+        for index in 0..80 {
+            let frame = frame(index);
+            let mut detections = world.detections(&frame);
+            one.update(&frame, &detections, &mut tracks);
+            detections.reverse();
+            detections.rotate_left(index as usize % 5);
+            other.update(&frame, &detections, &mut others);
+            assert_eq!(tracks, others, "{} frame {index}", mode.name());
+        }
+    }
+}
+
+/// The normalised squared error of (x, y, vx, vy) has mean 4 if the covariance is honest.
+#[test]
+fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
+    let mut config = Config::for_mode(Mode::Default).track;
+    (config.noise_floor_m, config.noise_per_point_m) = (0.05, 0.0);
+    // One model and a walker who keeps to it: nothing but the filter's own account is tested.
+    (config.acceleration_m2ps3, config.model_share) = (vec![1e-6], vec![1.0]);
+    let walkers = [(DVec2::new(-6.0, 2.0), DVec2::new(1.2, -0.3))];
+    let (mut sum, mut n) = (0.0, 0);
+    for seed in 0..200 {
+        let all = follow(&config, world(&walkers, seed), 30);
+        let track = nearest(&all[29], DVec2::ZERO);
+        let truth = walkers[0].0 + walkers[0].1 * 3.0;
+        let (p, v) = (track.position_m - truth, track.velocity_mps - walkers[0].1);
+        sum += squared_mahalanobis(&track.covariance, [p.x, p.y, v.x, v.y]);
+        n += 1;
+    }
+    // Chi-square with 4 n degrees of freedom: its mean over n is 4 with a spread of sqrt(8 / n).
+    let (mean, spread) = (sum / f64::from(n), (8.0 / f64::from(n)).sqrt());
+    assert!((mean - 4.0).abs() < 1.96 * spread, "mean {mean}, band 4 +- {}", 1.96 * spread);
+}
+
+/// e' P^-1 e by elimination.
+fn squared_mahalanobis(covariance: &[[f64; 4]; 4], error: [f64; 4]) -> f64 {
+    let (mut a, mut e) = (*covariance, error);
+    for i in 0..4 {
+        for j in i + 1..4 {
+            let factor = a[j][i] / a[i][i];
+            for k in i..4 {
+                a[j][k] -= factor * a[i][k];
+            }
+            e[j] -= factor * e[i];
+        }
+    }
+    (0..4).map(|i| e[i] * e[i] / a[i][i]).sum()
+}
