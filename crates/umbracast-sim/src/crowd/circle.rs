@@ -1,7 +1,7 @@
 //! The paper's scene: people start on a circle and walk to the opposite point, driven by ORCA.
 
 use glam::Vec2;
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use umbracast::geometry::DVec2;
 
 use super::orca::{Agent, Orca, Parameters};
@@ -39,7 +39,8 @@ pub fn circle_crossing(preset: Preset, people: usize, radius_m: f64, seed: u64) 
     let mut attempt = 0;
     loop {
         let mut rng = stream(seed, "circle starts", attempt);
-        let starts = starts(people, radius_m as f32, spacing_m, &mut rng);
+        let mut starts = Vec::new();
+        scatter(&mut starts, people, radius_m as f32, |_, _| spacing_m, &mut rng);
         let crowd = walk(parameters, &starts);
         attempt += 1;
         if acceptable(&crowd) || attempt == MOST_ATTEMPTS {
@@ -67,28 +68,33 @@ pub(super) fn parameters(
     }
 }
 
-/// Points on a noisy circle, each at least `spacing_m` from the others.
-fn starts(people: usize, radius_m: f32, mut spacing_m: f32, rng: &mut impl rand::Rng) -> Vec<Vec2> {
-    let mut starts: Vec<Vec2> = Vec::with_capacity(people);
-    let mut refused = 0;
-    while starts.len() < people {
+/// Adds points on a noisy circle until there are `count`; `spacing_m(i, j)` is the least distance of two.
+pub(super) fn scatter(
+    points: &mut Vec<Vec2>,
+    count: usize,
+    radius_m: f32,
+    spacing_m: impl Fn(usize, usize) -> f32,
+    rng: &mut impl Rng,
+) {
+    let (mut shrink, mut refused) = (1.0, 0);
+    while points.len() < count {
         let angle = rng.random_range(0.0..std::f32::consts::TAU);
         let noise = Vec2::new(
             rng.random_range(-START_NOISE_M..START_NOISE_M),
             rng.random_range(-START_NOISE_M..START_NOISE_M),
         );
-        let start = Vec2::from_angle(angle) * radius_m + noise;
-        if starts.iter().all(|other| other.distance(start) >= spacing_m) {
-            starts.push(start);
-        } else {
-            refused += 1;
-            // No place left.
-            if refused % 1000 == 0 {
-                spacing_m *= 0.9;
-            }
+        let point = Vec2::from_angle(angle) * radius_m + noise;
+        let this = points.len();
+        if points.iter().enumerate().all(|(i, other)| other.distance(point) >= shrink * spacing_m(i, this)) {
+            points.push(point);
+            continue;
+        }
+        refused += 1;
+        // No place left.
+        if refused % 1000 == 0 {
+            shrink *= 0.9;
         }
     }
-    starts
 }
 
 /// Everybody walks to minus the start until all have arrived.
@@ -121,22 +127,7 @@ fn walk(parameters: Parameters, starts: &[Vec2]) -> Crowd {
             way.push(agent.position_m.as_dvec2());
         }
     }
-    Crowd {
-        trajectories: positions
-            .into_iter()
-            .zip(arrived)
-            .enumerate()
-            .map(|(person, (positions_m, arrived_ns))| Trajectory {
-                person: person as u32,
-                start_ns: 0,
-                step_ns: STEP_NS,
-                positions_m,
-                arrived_ns,
-                height_m: None,
-            })
-            .collect(),
-        duration_ns: steps as i64 * STEP_NS,
-    }
+    Crowd { trajectories: Trajectory::from_steps(positions, arrived), duration_ns: steps as i64 * STEP_NS }
 }
 
 /// Everybody arrived, and nobody turned by 90 deg or more within three samples at 10 Hz before that.

@@ -10,6 +10,7 @@ use umbracast::Error;
 use umbracast::geometry::DVec2;
 
 pub use circle::circle_crossing;
+pub use mixed::pairs;
 
 /// One person's way, sampled evenly.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,6 +75,23 @@ impl FromStr for Preset {
 }
 
 impl Trajectory {
+    /// Ways from time 0 in steps of 10 ms, with the time of arrival of each.
+    fn from_steps(
+        positions_m: Vec<Vec<DVec2>>,
+        arrived_ns: impl IntoIterator<Item = Option<i64>>,
+    ) -> Vec<Self> {
+        let ways = positions_m.into_iter().zip(arrived_ns).enumerate();
+        ways.map(|(person, (positions_m, arrived_ns))| Self {
+            person: person as u32,
+            start_ns: 0,
+            step_ns: circle::STEP_NS,
+            positions_m,
+            arrived_ns,
+            height_m: None,
+        })
+        .collect()
+    }
+
     /// Position and velocity at a time, by cubic (Hermite) interpolation; `None` before the first and after the
     /// last sample. A person is in the scene exactly while this is `Some`.
     pub fn at(&self, time_ns: i64) -> Option<(DVec2, DVec2)> {
