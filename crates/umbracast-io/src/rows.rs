@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use umbracast::{Outcome, STEPS};
 
 /// Truth: one body in one frame. Arrived ones too.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct PeopleRow {
     pub scene: u32,
     pub frame: u64,
@@ -23,7 +23,7 @@ pub struct PeopleRow {
 }
 
 /// Truth: one link in one frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PeopleLinkRow {
     pub scene: u32,
     pub frame: u64,
@@ -40,7 +40,7 @@ pub struct PeopleLinkRow {
 }
 
 /// Our answer: one track in one frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TrackRow {
     pub scene: u32,
     pub frame: u64,
@@ -65,7 +65,7 @@ pub struct TrackRow {
 }
 
 /// Our answer: one link in one frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LinkRow {
     pub scene: u32,
     pub frame: u64,

@@ -1,0 +1,174 @@
+//! Each row type as a list of named cells: the one place that knows the columns.
+
+use std::fmt;
+
+use umbracast::STEPS;
+
+use crate::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
+
+/// A row of a table.
+pub trait Row: Copy + Default {
+    /// The table's name, and so its file's.
+    const TABLE: &'static str;
+
+    /// Shows every cell with its column's name, always the same ones in the same order.
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell));
+}
+
+/// A column's name: what stands before and after the number of a step or window, where there is one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Name(&'static str, Option<usize>, &'static str);
+
+/// One value of a row, to be read or set.
+#[derive(Debug)]
+pub enum Cell<'a> {
+    /// A small count or a number of something.
+    U32(&'a mut u32),
+    /// A frame or a track.
+    U64(&'a mut u64),
+    /// A time.
+    I64(&'a mut i64),
+    /// A measure.
+    F64(&'a mut f64),
+    /// Yes or no.
+    Bool(&'a mut bool),
+    /// Yes, no or null.
+    MaybeBool(&'a mut Option<bool>),
+    /// Index of an access point; its name in the file.
+    AccessPoint(&'a mut u32),
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.1 {
+            Some(number) => write!(f, "{}{number}{}", self.0, self.2),
+            None => f.write_str(self.0),
+        }
+    }
+}
+
+fn plain(name: &'static str) -> Name {
+    Name(name, None, "")
+}
+
+impl Row for PeopleRow {
+    const TABLE: &'static str = "people";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("person"), Cell::U32(&mut self.person));
+        see(plain("x_m"), Cell::F64(&mut self.x_m));
+        see(plain("y_m"), Cell::F64(&mut self.y_m));
+        see(plain("vx_mps"), Cell::F64(&mut self.vx_mps));
+        see(plain("vy_mps"), Cell::F64(&mut self.vy_mps));
+        see(plain("heading_rad"), Cell::F64(&mut self.heading_rad));
+        see(plain("height_m"), Cell::F64(&mut self.height_m));
+        see(plain("arrived"), Cell::Bool(&mut self.arrived));
+        see(plain("returns"), Cell::U32(&mut self.returns));
+    }
+}
+
+impl Row for PeopleLinkRow {
+    const TABLE: &'static str = "people_links";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("access_point"), Cell::AccessPoint(&mut self.access_point));
+        see(plain("person"), Cell::U32(&mut self.person));
+        see(plain("blocked"), Cell::Bool(&mut self.blocked));
+        see(plain("static_blocked"), Cell::Bool(&mut self.static_blocked));
+        see(plain("self_blocked"), Cell::MaybeBool(&mut self.self_blocked));
+    }
+}
+
+const COVARIANCE: [&str; 10] = [
+    "cov_xx_m2",
+    "cov_xy_m2",
+    "cov_xvx_m2ps",
+    "cov_xvy_m2ps",
+    "cov_yy_m2",
+    "cov_yvx_m2ps",
+    "cov_yvy_m2ps",
+    "cov_vxvx_m2ps2",
+    "cov_vxvy_m2ps2",
+    "cov_vyvy_m2ps2",
+];
+const AABB: [&str; 6] =
+    ["aabb_min_x_m", "aabb_min_y_m", "aabb_min_z_m", "aabb_max_x_m", "aabb_max_y_m", "aabb_max_z_m"];
+/// Axis i is column i of the rotation from the box's frame to the site's.
+const OBB: [&str; 15] = [
+    "obb_center_x_m",
+    "obb_center_y_m",
+    "obb_center_z_m",
+    "obb_half_1_m",
+    "obb_half_2_m",
+    "obb_half_3_m",
+    "obb_axis_1_x",
+    "obb_axis_1_y",
+    "obb_axis_1_z",
+    "obb_axis_2_x",
+    "obb_axis_2_y",
+    "obb_axis_2_z",
+    "obb_axis_3_x",
+    "obb_axis_3_y",
+    "obb_axis_3_z",
+];
+const STEP: [(&str, &str); 5] =
+    [("x_s", "_m"), ("y_s", "_m"), ("cov_xx_s", "_m2"), ("cov_xy_s", "_m2"), ("cov_yy_s", "_m2")];
+
+impl Row for TrackRow {
+    const TABLE: &'static str = "tracks";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("track"), Cell::U64(&mut self.track));
+        see(plain("x_m"), Cell::F64(&mut self.x_m));
+        see(plain("y_m"), Cell::F64(&mut self.y_m));
+        see(plain("vx_mps"), Cell::F64(&mut self.vx_mps));
+        see(plain("vy_mps"), Cell::F64(&mut self.vy_mps));
+        for (name, value) in COVARIANCE.into_iter().zip(&mut self.covariance) {
+            see(plain(name), Cell::F64(value));
+        }
+        see(plain("heading_rad"), Cell::F64(&mut self.heading_rad));
+        see(plain("height_m"), Cell::F64(&mut self.height_m));
+        see(plain("points"), Cell::U32(&mut self.points));
+        see(plain("confirmed"), Cell::Bool(&mut self.confirmed));
+        for (name, value) in AABB.into_iter().zip(&mut self.aabb_m) {
+            see(plain(name), Cell::F64(value));
+        }
+        for (name, value) in OBB.into_iter().zip(&mut self.obb) {
+            see(plain(name), Cell::F64(value));
+        }
+        for (h, step) in (1..).zip(&mut self.steps) {
+            for ((before, after), value) in STEP.into_iter().zip(step) {
+                see(Name(before, Some(h), after), Cell::F64(value));
+            }
+        }
+    }
+}
+
+impl Row for LinkRow {
+    const TABLE: &'static str = "links";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("access_point"), Cell::AccessPoint(&mut self.access_point));
+        see(plain("track"), Cell::U64(&mut self.track));
+        see(plain("blocked_now"), Cell::Bool(&mut self.blocked_now));
+        for w in 1..=STEPS {
+            see(Name("blocked_w", Some(w), ""), Cell::Bool(&mut self.blocked[w - 1]));
+        }
+        see(plain("p_now"), Cell::F64(&mut self.p_now));
+        for w in 1..=STEPS {
+            see(Name("p_w", Some(w), ""), Cell::F64(&mut self.p[w - 1]));
+        }
+    }
+}

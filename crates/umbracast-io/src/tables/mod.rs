@@ -1,0 +1,256 @@
+//! The tables of a run as files: Parquet, and CSV beside it where asked for. One row type, one table; a column
+//! is a field, its unit in its name. Files are written in pieces of bounded size, so a run may go on for ever.
+//!
+//! Columns are found by name, so a table that another program wrote, with columns in another order or with more
+//! of them, reads as well. Same rows, same bytes.
+
+mod cells;
+mod parquet_file;
+mod csv_file;
+
+use std::path::{Path, PathBuf};
+
+use umbracast::Error;
+
+pub use cells::{Cell, Name, Row};
+use csv_file::CsvFile;
+use parquet_file::ParquetFile;
+
+/// Rows held back until they are written together.
+const ROW_GROUP: usize = 65_536;
+
+/// Writes one table.
+#[derive(Debug)]
+pub struct TableWriter<R: Row> {
+    parquet: ParquetFile,
+    csv: Option<CsvFile>,
+    waiting: Vec<R>,
+}
+
+/// The path of a table in a run's directory.
+pub fn path_in<R: Row>(directory: &Path) -> PathBuf {
+    directory.join(R::TABLE).with_extension("parquet")
+}
+
+impl<R: Row> TableWriter<R> {
+    /// Starts `directory/TABLE.parquet`, and `directory/TABLE.csv` where asked for, over whatever is there.
+    /// `access_points` are the site's names, by index.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn create(directory: &Path, access_points: &[String], csv: bool) -> Result<Self, Error> {
+        let path = path_in::<R>(directory);
+        let csv =
+            csv.then(|| CsvFile::create::<R>(&path.with_extension("csv"), access_points)).transpose()?;
+        Ok(Self { parquet: ParquetFile::create::<R>(&path, access_points)?, csv, waiting: Vec::new() })
+    }
+
+    /// Adds rows in their order.
+    ///
+    /// # Errors
+    /// A disk that is full or gone, or an access point that the site does not have.
+    pub fn write(&mut self, rows: &[R]) -> Result<(), Error> {
+        for &row in rows {
+            self.waiting.push(row);
+            if self.waiting.len() == ROW_GROUP {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what waits and the end of the file; without it the file cannot be read.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn finish(mut self) -> Result<(), Error> {
+        self.flush()?;
+        self.parquet.finish()
+    }
+
+    fn flush(&mut self) -> Result<(), Error> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        self.parquet.write(&mut self.waiting)?;
+        if let Some(csv) = &mut self.csv {
+            csv.write(&mut self.waiting)?;
+        }
+        self.waiting.clear();
+        Ok(())
+    }
+}
+
+/// Writes a whole table at once.
+///
+/// # Errors
+/// As [`TableWriter`].
+pub fn write<R: Row>(directory: &Path, access_points: &[String], csv: bool, rows: &[R]) -> Result<(), Error> {
+    let mut writer = TableWriter::create(directory, access_points, csv)?;
+    writer.write(rows)?;
+    writer.finish()
+}
+
+/// Reads `directory/TABLE.parquet`.
+///
+/// # Errors
+/// A file that is not there, is cut off, lacks a column, has one of another kind, or names an access point that
+/// the site does not have: with file, column, expected and found.
+pub fn read<R: Row>(directory: &Path, access_points: &[String]) -> Result<Vec<R>, Error> {
+    let mut all = Vec::new();
+    read_each(directory, access_points, |rows| all.extend_from_slice(rows))?;
+    Ok(all)
+}
+
+/// Reads the same in pieces, for tables larger than memory: `sink` gets the rows in their order.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_each<R: Row>(
+    directory: &Path,
+    access_points: &[String],
+    sink: impl FnMut(&[R]),
+) -> Result<(), Error> {
+    let path = path_in::<R>(directory);
+    parquet_file::read(&path, access_points, sink).map_err(|error| error.within(path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
+    use umbracast::STEPS;
+
+    fn access_points() -> Vec<String> {
+        vec!["side".into(), "centre, north".into()]
+    }
+
+    fn columns<R: Row>() -> Vec<String> {
+        let mut names = Vec::new();
+        R::default().visit(&mut |name, _| names.push(name.to_string()));
+        names
+    }
+
+    /// Rows in which every cell differs from its neighbours.
+    fn rows<R: Row>(count: usize) -> Vec<R> {
+        let mut counter = 0_u32;
+        let mut fill = |_: Name, cell: Cell| {
+            counter += 1;
+            match cell {
+                Cell::U32(v) => *v = u32::MAX - counter,
+                Cell::U64(v) => *v = u64::MAX - u64::from(counter),
+                Cell::I64(v) => *v = -i64::from(counter),
+                Cell::F64(v) => *v = f64::from(counter) / 3.0,
+                Cell::Bool(v) => *v = counter.is_multiple_of(3),
+                Cell::MaybeBool(v) => *v = [None, Some(false), Some(true)][counter as usize % 3],
+                Cell::AccessPoint(v) => *v = counter % 2,
+            }
+        };
+        let mut rows = vec![R::default(); count];
+        rows.iter_mut().for_each(|row| row.visit(&mut fill));
+        rows
+    }
+
+    fn survives<R: Row + PartialEq + std::fmt::Debug>(count: usize) {
+        let directory = tempfile::tempdir().unwrap();
+        let written = rows::<R>(count);
+        write(directory.path(), &access_points(), false, &written).unwrap();
+        assert_eq!(read::<R>(directory.path(), &access_points()).unwrap(), written);
+    }
+
+    #[test]
+    fn every_table_survives_a_round_trip() {
+        survives::<PeopleRow>(50);
+        survives::<PeopleLinkRow>(50);
+        survives::<TrackRow>(50);
+        survives::<LinkRow>(50);
+    }
+
+    #[test]
+    fn a_table_of_several_row_groups_and_an_empty_one_survive() {
+        survives::<PeopleLinkRow>(ROW_GROUP + 7);
+        survives::<PeopleRow>(0);
+    }
+
+    #[test]
+    fn columns_are_those_of_the_conventions() {
+        let keys = ["scene", "frame", "time_ns"];
+        for names in [columns::<PeopleRow>(), columns::<PeopleLinkRow>(), columns::<TrackRow>()] {
+            assert_eq!(names[..3], keys);
+        }
+        let links = columns::<LinkRow>();
+        assert_eq!(links.len(), 3 + 2 + 2 * (1 + STEPS));
+        assert!(
+            ["blocked_now", "blocked_w1", "blocked_w9", "p_now", "p_w9"]
+                .iter()
+                .all(|c| links.contains(&(*c).into()))
+        );
+        let tracks = columns::<TrackRow>();
+        assert!(
+            ["x_s1_m", "cov_xx_s1_m2", "y_s9_m", "cov_yy_s9_m2"]
+                .iter()
+                .all(|c| tracks.contains(&(*c).into()))
+        );
+    }
+
+    #[test]
+    fn same_rows_give_the_same_bytes() {
+        let bytes = [0, 1].map(|_| {
+            let directory = tempfile::tempdir().unwrap();
+            write(directory.path(), &access_points(), true, &rows::<TrackRow>(300)).unwrap();
+            ["tracks.parquet", "tracks.csv"].map(|name| std::fs::read(directory.path().join(name)).unwrap())
+        });
+        assert_eq!(bytes[0], bytes[1]);
+    }
+
+    #[test]
+    fn csv_has_a_header_null_as_nothing_and_names_with_commas_in_quotes() {
+        let directory = tempfile::tempdir().unwrap();
+        let row =
+            PeopleLinkRow { frame: 4, time_ns: 500, access_point: 1, blocked: true, ..Default::default() };
+        write(directory.path(), &access_points(), true, &[row]).unwrap();
+        let text = std::fs::read_to_string(directory.path().join("people_links.csv")).unwrap();
+        let expected = "scene,frame,time_ns,access_point,person,blocked,static_blocked,self_blocked\n\
+                        0,4,500,\"centre, north\",0,true,false,\n";
+        assert_eq!(text, expected);
+    }
+
+    fn error_of<R: Row + std::fmt::Debug>(directory: &Path, access_points: &[String]) -> String {
+        read::<R>(directory, access_points).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn an_unknown_access_point_is_named_with_those_expected() {
+        let directory = tempfile::tempdir().unwrap();
+        write(directory.path(), &access_points(), false, &rows::<LinkRow>(3)).unwrap();
+        let message = error_of::<LinkRow>(directory.path(), &["side".into()]);
+        assert!(message.contains("links.parquet: column access_point: expected one of side"), "{message}");
+        assert!(message.contains("found \"centre, north\""), "{message}");
+    }
+
+    #[test]
+    fn a_missing_file_and_a_cut_one_are_named() {
+        let directory = tempfile::tempdir().unwrap();
+        let message = error_of::<LinkRow>(directory.path(), &access_points());
+        assert!(message.contains("links.parquet: cannot be opened"), "{message}");
+        write(directory.path(), &access_points(), false, &rows::<LinkRow>(30)).unwrap();
+        let path = path_in::<LinkRow>(directory.path());
+        let whole = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+        let message = error_of::<LinkRow>(directory.path(), &access_points());
+        assert!(message.contains("links.parquet: expected a whole Parquet file"), "{message}");
+    }
+
+    #[test]
+    fn a_missing_column_is_named_with_what_it_should_hold() {
+        let directory = tempfile::tempdir().unwrap();
+        write(directory.path(), &access_points(), false, &rows::<PeopleRow>(3)).unwrap();
+        std::fs::rename(path_in::<PeopleRow>(directory.path()), path_in::<LinkRow>(directory.path()))
+            .unwrap();
+        let message = error_of::<LinkRow>(directory.path(), &access_points());
+        assert!(
+            message.contains("column access_point: expected names of access points, found no such"),
+            "{message}"
+        );
+    }
+}
