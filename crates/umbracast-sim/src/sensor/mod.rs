@@ -1,26 +1,196 @@
 //! Simulated LiDARs that give true sensor packets.
+//!
+//! The hall stands still and is traced once ([`hall`]); a frame looks it up and draws only the people into it
+//! ([`raster`]), each column at the instant it fires ([`head`]). Then come noise, drop-outs and limits, and the
+//! packet codec, so that a simulated sensor and a real one enter the pipeline by the same door.
 
-use umbracast::lidar::Packet;
+mod head;
+mod hall;
+mod view;
+mod raster;
+mod noise;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use umbracast::geometry::DVec3;
+use umbracast::lidar::{Model, Packet, packet};
+use umbracast::site::Sensor;
 use umbracast::{Error, Site};
 
+use self::hall::HallImage;
+use self::head::Head;
+use self::noise::Noise;
+use self::raster::Painter;
+use self::view::{NOBODY, View};
 use crate::body::Walker;
 
-/// All sensors of a site in its hall.
-#[derive(Debug)]
-pub struct Sensors {}
+/// All sensors of a site in its hall. A clone shares the traced hall.
+#[derive(Debug, Clone)]
+pub struct Sensors {
+    sensors: Vec<Simulated>,
+}
+
+#[derive(Debug, Clone)]
+struct Simulated {
+    head: Head,
+    hall: Arc<HallImage>,
+    painter: Painter,
+    noise: Noise,
+    /// Packets that are not wholly within are not sent.
+    powered_ns: Range<i64>,
+    open: OpenPacket,
+}
+
+/// The packet whose columns have not all fired yet.
+#[derive(Debug, Clone, Default)]
+struct OpenPacket {
+    number: u64,
+    /// One a column and beam; without return until fired.
+    range_m: Vec<f32>,
+    reflectivity: Vec<u8>,
+}
 
 impl Sensors {
     /// Traces the empty hall once for each sensor.
     ///
     /// # Errors
-    /// A sensor model that cannot be simulated.
-    pub fn new(_site: &Site, _seed: u64) -> Result<Self, Error> {
-        Ok(Self {})
+    /// A sensor model that cannot be simulated, a sensor that does not turn or hangs outside the hall.
+    pub fn new(site: &Site, seed: u64) -> Result<Self, Error> {
+        let simulate = |(number, sensor): (usize, &Sensor)| {
+            Simulated::new(site, sensor, Noise::new(sensor, seed, number as u64))
+                .map_err(|error| error.within(format_args!("site.sensors.{}", sensor.name)))
+        };
+        let sensors = site.sensors.iter().enumerate().map(simulate).collect::<Result<_, _>>()?;
+        Ok(Self { sensors })
+    }
+
+    /// Begins another scene in the same hall: as [`Sensors::new`] with this seed, without tracing the hall again.
+    pub fn restart(&mut self, seed: u64) {
+        for sensor in &mut self.sensors {
+            sensor.noise.reseed(seed);
+            sensor.powered_ns = 0..i64::MAX;
+            sensor.open = OpenPacket::default();
+        }
+    }
+
+    /// Lets one sensor work only during a span of time: a sensor that is lost, one that starts within a
+    /// revolution. Packets that do not lie wholly within the span are not sent.
+    pub fn power(&mut self, sensor: usize, span_ns: Range<i64>) {
+        self.sensors[sensor].powered_ns = span_ns;
     }
 
     /// The packets of frame `index` (one list a sensor) and, for each walker, how many returns came from its
     /// body, all sensors together. Frames must be asked for in order.
-    pub fn frame(&mut self, _index: u64, walkers: &[Walker]) -> (Vec<Vec<Packet>>, Vec<u32>) {
-        (Vec::new(), vec![0; walkers.len()])
+    ///
+    /// A packet is sent when its last column fires, so that one which holds columns of two frames comes with the
+    /// later. The returns are those of the columns that fire in this frame, as the assembler cuts frames.
+    pub fn frame(&mut self, index: u64, walkers: &[Walker]) -> (Vec<Vec<Packet>>, Vec<u32>) {
+        let mut returns = vec![0; walkers.len()];
+        let packets = self.sensors.iter_mut().map(|s| s.frame(index, walkers, &mut returns)).collect();
+        (packets, returns)
+    }
+
+    /// At the end of a scene: the packets that wait for columns of the next frame, which are left without returns.
+    pub fn flush(&mut self) -> Vec<Vec<Packet>> {
+        self.sensors.iter_mut().map(|s| s.close().into_iter().collect()).collect()
     }
 }
+
+impl Simulated {
+    fn new(site: &Site, sensor: &Sensor, noise: Noise) -> Result<Self, Error> {
+        let model = Model::by_name(&sensor.model)?;
+        if !(sensor.rate_hz > 0.0 && sensor.rate_hz <= 50.0) {
+            let found = sensor.rate_hz;
+            return Err(Error::new(format!("rate_hz: expected more than 0 and at most 50, found {found}")));
+        }
+        let hall_m = DVec3::new(site.hall.length_m, site.hall.width_m, site.hall.height_m);
+        let [x, y, z] = sensor.position_m;
+        if !(2.0 * x.abs() < hall_m.x && 2.0 * y.abs() < hall_m.y && z > 0.0 && z < hall_m.z) {
+            let found = sensor.position_m;
+            return Err(Error::new(format!(
+                "position_m: expected a place within the hall of {hall_m} m, found {found:?}"
+            )));
+        }
+        let site_from_sensor = sensor.site_from_sensor();
+        let head =
+            Head { cut_cdeg: sensor.cut_deg * 100.0, rate_cdeg_per_ns: sensor.rate_hz * 36_000.0e-9, model };
+        Ok(Self {
+            hall: Arc::new(HallImage::trace(site, &head.model, &site_from_sensor)),
+            painter: Painter::new(&site_from_sensor, &head),
+            head,
+            noise,
+            powered_ns: 0..i64::MAX,
+            open: OpenPacket::default(),
+        })
+    }
+
+    fn frame(&mut self, index: u64, walkers: &[Walker], returns: &mut [u32]) -> Vec<Packet> {
+        let mut view = self.look(index, walkers);
+        self.noise.measure(index, &mut view.image);
+        self.send(&view, returns)
+    }
+
+    /// What is really there.
+    fn look(&mut self, index: u64, walkers: &[Walker]) -> View {
+        let mut view = View::of_hall(&self.hall, &self.head, index);
+        for (person, walker) in walkers.iter().enumerate() {
+            self.painter.draw(walker, person as u32, &mut view);
+        }
+        view
+    }
+
+    /// Puts the measured columns into packets and counts the returns of each body.
+    fn send(&mut self, view: &View, returns: &mut [u32]) -> Vec<Packet> {
+        let beams = view.image.beams.len();
+        let per_packet = self.head.packet_columns();
+        let mut packets = Vec::new();
+        for c in 0..view.image.columns.len() {
+            let column = view.first_column + c as u64;
+            let (number, within) = (column / per_packet, (column % per_packet) as usize);
+            self.open.start(number, per_packet as usize * beams);
+            let (from, to) = (c * beams..(c + 1) * beams, within * beams..(within + 1) * beams);
+            self.open.range_m[to.clone()].copy_from_slice(&view.image.range_m[from.clone()]);
+            self.open.reflectivity[to].copy_from_slice(&view.image.reflectivity[from.clone()]);
+            if self.is_powered(number) {
+                let seen = view.owner[from.clone()].iter().zip(&view.image.range_m[from]);
+                for (&owner, _) in seen.filter(|&(&owner, &range_m)| owner != NOBODY && range_m > 0.0) {
+                    returns[owner as usize] += 1;
+                }
+            }
+            if within + 1 == per_packet as usize {
+                packets.extend(self.close());
+            }
+        }
+        packets
+    }
+
+    fn is_powered(&self, packet: u64) -> bool {
+        let first = packet * self.head.packet_columns();
+        self.powered_ns.start <= self.head.time_ns(first)
+            && self.head.time_ns(first + self.head.packet_columns() - 1) < self.powered_ns.end
+    }
+
+    /// Sends the open packet, at the time its last column fires.
+    fn close(&mut self) -> Option<Packet> {
+        let OpenPacket { number, range_m, reflectivity } = std::mem::take(&mut self.open);
+        if range_m.is_empty() || !self.is_powered(number) {
+            return None;
+        }
+        let columns = self.head.turn(number);
+        let sent_ns = columns[columns.len() - 1].time_ns;
+        Some(packet::encode(&self.head.model, &columns, &range_m, &reflectivity, sent_ns))
+    }
+}
+
+impl OpenPacket {
+    /// Makes this the packet of that number, if it is not yet.
+    fn start(&mut self, number: u64, rays: usize) {
+        if self.number != number || self.range_m.is_empty() {
+            *self = Self { number, range_m: vec![0.0; rays], reflectivity: vec![0; rays] };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

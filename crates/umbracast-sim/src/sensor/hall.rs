@@ -1,0 +1,130 @@
+//! The empty hall as each sensor sees it: every beam at every azimuth that a packet can report, traced once.
+
+use std::f64::consts::TAU;
+
+use umbracast::Site;
+use umbracast::geometry::{DVec2, DVec3, Pose};
+use umbracast::lidar::Model;
+
+/// Azimuths that a packet tells apart: hundredths of a degree.
+pub const TURN_CDEG: usize = 36_000;
+
+/// Diffuse reflectivities in percent, as Velodyne calibrates them: painted concrete, dark floor, wood.
+const FLOOR: u8 = 25;
+const CEILING: u8 = 60;
+const WALL: u8 = 55;
+const PILLAR: u8 = 45;
+const FURNITURE: u8 = 35;
+
+/// Ranges of all beams at all azimuths.
+#[derive(Debug)]
+pub struct HallImage {
+    beams: usize,
+    /// At `azimuth_cdeg * beams + beam`, metres and percent.
+    pixels: Vec<(f32, u8)>,
+}
+
+impl HallImage {
+    /// Traces the hall from a sensor that hangs within it.
+    pub fn trace(site: &Site, model: &Model, site_from_sensor: &Pose) -> Self {
+        let hall = Solids::new(site);
+        let beams = model.beams.len();
+        let mut pixels = Vec::with_capacity(TURN_CDEG * beams);
+        for azimuth_cdeg in 0..TURN_CDEG {
+            let azimuth_rad = azimuth_cdeg as f64 * (TAU / TURN_CDEG as f64);
+            for beam in model.beams.iter() {
+                let origin_m = beam.point_m(azimuth_rad, 0.0);
+                let direction = beam.point_m(azimuth_rad, 1.0) - origin_m;
+                let (range_m, reflectivity) =
+                    hall.cast(site_from_sensor.point(origin_m), site_from_sensor.direction(direction));
+                pixels.push((range_m as f32, reflectivity));
+            }
+        }
+        Self { beams, pixels }
+    }
+
+    /// Range and reflectivity of one beam.
+    pub fn at(&self, azimuth_cdeg: u32, beam: usize) -> (f32, u8) {
+        self.pixels[azimuth_cdeg as usize * self.beams + beam]
+    }
+}
+
+/// The hall's surfaces, each met exactly: planes, boxes and true cylinders.
+struct Solids {
+    room_min_m: DVec3,
+    room_max_m: DVec3,
+    pillars: Vec<(DVec2, f64)>,
+    /// Pose of each box's middle and its half edges.
+    boxes: Vec<(Pose, DVec3)>,
+}
+
+impl Solids {
+    fn new(site: &Site) -> Self {
+        let half = DVec2::new(site.hall.length_m, site.hall.width_m) * 0.5;
+        let boxes = site.furniture.iter().map(|item| {
+            let size_m = DVec3::from_array(item.size_m);
+            let middle_m = DVec2::from_array(item.position_m).extend(size_m.z * 0.5);
+            (Pose::from_yaw_pitch_roll_deg(middle_m, item.yaw_deg, 0.0, 0.0).inverse(), size_m * 0.5)
+        });
+        Self {
+            room_min_m: (-half).extend(0.0),
+            room_max_m: half.extend(site.hall.height_m),
+            pillars: site.pillars.iter().map(|p| (DVec2::from_array(p.position_m), p.radius_m)).collect(),
+            boxes: boxes.collect(),
+        }
+    }
+
+    /// Range and reflectivity of what a ray from within the room meets first. `direction` has length 1.
+    fn cast(&self, origin_m: DVec3, direction: DVec3) -> (f64, u8) {
+        let mut nearest = self.room(origin_m, direction);
+        let mut meet = |range_m: Option<f64>, reflectivity| {
+            if let Some(range_m) = range_m.filter(|&r| r < nearest.0) {
+                nearest = (range_m, reflectivity);
+            }
+        };
+        for &(axis_m, radius_m) in &self.pillars {
+            meet(cylinder(origin_m.truncate() - axis_m, direction.truncate(), radius_m), PILLAR);
+        }
+        for (box_from_site, half_m) in &self.boxes {
+            meet(
+                cuboid(box_from_site.point(origin_m), box_from_site.direction(direction), *half_m),
+                FURNITURE,
+            );
+        }
+        nearest
+    }
+
+    fn room(&self, origin_m: DVec3, direction: DVec3) -> (f64, u8) {
+        let exit = |axis: usize| {
+            let wall_m = if direction[axis] < 0.0 { self.room_min_m[axis] } else { self.room_max_m[axis] };
+            // A ray along a wall pair never leaves through it: x / 0 is infinite.
+            (wall_m - origin_m[axis]) / direction[axis]
+        };
+        let (side, end) = (exit(0).min(exit(1)), exit(2));
+        if side < end { (side, WALL) } else { (end, if direction.z < 0.0 { FLOOR } else { CEILING }) }
+    }
+}
+
+/// Where a ray, given from the axis of an upright cylinder, enters it.
+fn cylinder(origin_m: DVec2, direction: DVec2, radius_m: f64) -> Option<f64> {
+    let a = direction.length_squared();
+    let b = origin_m.dot(direction);
+    let discriminant = b * b - a * (origin_m.length_squared() - radius_m * radius_m);
+    if b >= 0.0 || discriminant < 0.0 {
+        return None;
+    }
+    Some((-b - discriminant.sqrt()) / a).filter(|&range_m| range_m > 0.0)
+}
+
+/// Where a ray, given in the frame of a box's middle, enters it.
+fn cuboid(origin_m: DVec3, direction: DVec3, half_m: DVec3) -> Option<f64> {
+    let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+    for axis in 0..3 {
+        let inverse = direction[axis].recip();
+        let (a, b) = ((-half_m[axis] - origin_m[axis]) * inverse, (half_m[axis] - origin_m[axis]) * inverse);
+        // `max` and `min` pass over the NaN of a ray that runs within a face.
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    (enter > 0.0 && enter <= leave).then_some(enter)
+}

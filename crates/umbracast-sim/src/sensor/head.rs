@@ -1,0 +1,87 @@
+//! The turning head of a sensor: which column fires when, and where it looks.
+
+use std::ops::Range;
+
+use umbracast::lidar::{Column, Model, packet};
+use umbracast::{Health, STEP_NS};
+
+/// A sensor's clock and motor. Column 0 of a scene fires at time 0, at the cut.
+#[derive(Debug, Clone)]
+pub struct Head {
+    /// What turns.
+    pub model: Model,
+    /// Azimuth at time 0, hundredths of a degree.
+    pub cut_cdeg: f64,
+    /// How fast it turns.
+    pub rate_cdeg_per_ns: f64,
+}
+
+impl Head {
+    /// Columns in a packet.
+    pub fn packet_columns(&self) -> u64 {
+        packet::columns_per_packet(&self.model) as u64
+    }
+
+    /// Azimuth swept since azimuth 0, not wrapped. Clockwise from above.
+    pub fn turned_cdeg(&self, time_ns: i64) -> f64 {
+        self.cut_cdeg + self.rate_cdeg_per_ns * time_ns as f64
+    }
+
+    /// When a column fires. A packet tells the time of its first column in whole microseconds; the head fires at
+    /// the time that the packet tells, so that what is decoded is exact.
+    pub fn time_ns(&self, column: u64) -> i64 {
+        let in_packet = column % self.packet_columns();
+        let packet_ns = ((column - in_packet) as f64 * self.model.column_period_ns).floor() as i64;
+        packet_ns / 1000 * 1000 + (in_packet as f64 * self.model.column_period_ns).round() as i64
+    }
+
+    /// The columns that fire in frame `index`: from its start, before its end.
+    pub fn frame_columns(&self, index: u64) -> Range<u64> {
+        self.first_column_from(index as i64 * STEP_NS)..self.first_column_from((index as i64 + 1) * STEP_NS)
+    }
+
+    fn first_column_from(&self, time_ns: i64) -> u64 {
+        let mut column = (time_ns as f64 / self.model.column_period_ns) as u64;
+        while self.time_ns(column) < time_ns {
+            column += 1;
+        }
+        column
+    }
+
+    /// The columns of a packet as the head turns through them.
+    pub fn turn(&self, packet: u64) -> Vec<Column> {
+        let first = packet * self.packet_columns();
+        let column = |i| {
+            let time_ns = self.time_ns(first + i);
+            Column {
+                time_ns,
+                azimuth_cdeg: self.turned_cdeg(time_ns).rem_euclid(36_000.0) as f32,
+                azimuth_rate_cdeg_per_ns: self.rate_cdeg_per_ns as f32,
+            }
+        };
+        (0..self.packet_columns()).map(column).collect()
+    }
+
+    /// Columns as a decoder gives them. A packet holds rounded azimuths, and the decoder interpolates and rounds
+    /// again: the simulated beams are fired along exactly these directions, so that range and decoded direction
+    /// belong together. (A real head is up to 0.01 degrees beside what it reports.)
+    pub fn reported(&self, columns: Range<u64>) -> Vec<Column> {
+        let per_packet = self.packet_columns();
+        let rays = self.model.beams.len() * per_packet as usize;
+        let (ranges, reflectivities) = (vec![0.0; rays], vec![0; rays]);
+        let mut reported = Vec::with_capacity((columns.end - columns.start) as usize);
+        for packet in columns.start / per_packet..columns.end.div_ceil(per_packet) {
+            let turn = self.turn(packet);
+            let packet_ns = turn[0].time_ns;
+            let sent = packet::encode(&self.model, &turn, &ranges, &reflectivities, packet_ns);
+            let mut number = packet * per_packet;
+            packet::decode(&self.model, &sent, &mut Health::default(), |column, _, _| {
+                if columns.contains(&number) {
+                    reported.push(column);
+                }
+                number += 1;
+            });
+        }
+        reported
+    }
+}

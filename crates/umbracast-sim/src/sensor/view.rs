@@ -1,0 +1,75 @@
+//! What one sensor sees in one frame, free of noise.
+
+use umbracast::lidar::RangeImage;
+
+use super::hall::HallImage;
+use super::head::Head;
+
+/// Owner of a pixel that shows the hall.
+pub const NOBODY: u32 = u32::MAX;
+
+/// True ranges along the reported directions, and whose body each pixel shows.
+#[derive(Debug)]
+pub struct View {
+    /// Columns as a decoder gives them, with true ranges.
+    pub image: RangeImage,
+    /// Place in the list of walkers, or [`NOBODY`]; in the image's order.
+    pub owner: Vec<u32>,
+    /// Number of the first column since the scene began.
+    pub first_column: u64,
+    /// Azimuth of the first column, not wrapped.
+    pub first_cdeg: f64,
+    step_cdeg: f64,
+}
+
+impl View {
+    /// The empty hall in frame `index`.
+    pub fn of_hall(hall: &HallImage, head: &Head, index: u64) -> Self {
+        let columns = head.frame_columns(index);
+        let first_column = columns.start;
+        let beams = head.model.beams.clone();
+        let mut image = RangeImage {
+            beams,
+            columns: head.reported(columns),
+            range_m: Vec::new(),
+            reflectivity: Vec::new(),
+        };
+        let rays = image.columns.len() * image.beams.len();
+        image.range_m.reserve_exact(rays);
+        image.reflectivity.reserve_exact(rays);
+        for c in 0..image.columns.len() {
+            for b in 0..image.beams.len() {
+                let (range_m, reflectivity) = hall.at(image.azimuth_cdeg(c, b), b);
+                image.range_m.push(range_m);
+                image.reflectivity.push(reflectivity);
+            }
+        }
+        Self {
+            image,
+            owner: vec![NOBODY; rays],
+            first_column,
+            first_cdeg: head.turned_cdeg(head.time_ns(first_column)),
+            step_cdeg: head.rate_cdeg_per_ns * head.model.column_period_ns,
+        }
+    }
+
+    /// Which column's first beam looks along an azimuth that is not wrapped.
+    pub fn column_at(&self, azimuth_cdeg: f64) -> f64 {
+        (azimuth_cdeg - self.first_cdeg) / self.step_cdeg
+    }
+
+    /// The azimuth of a column's first beam, not wrapped.
+    pub fn azimuth_at(&self, column: f64) -> f64 {
+        self.first_cdeg + column * self.step_cdeg
+    }
+
+    /// A surface of a body at `range_m`: shown where nothing nearer is.
+    pub fn show(&mut self, column: usize, beam: usize, range_m: f32, reflectivity: u8, owner: u32) {
+        let pixel = column * self.image.beams.len() + beam;
+        if range_m < self.image.range_m[pixel] {
+            self.image.range_m[pixel] = range_m;
+            self.image.reflectivity[pixel] = reflectivity;
+            self.owner[pixel] = owner;
+        }
+    }
+}
