@@ -1,4 +1,7 @@
 //! Files and tables: pcap, PCD, MCAP recordings, trajectories, Parquet and CSV.
 
+mod lzf;
+pub mod pcap;
+pub mod pcd;
 pub mod rows;
 pub mod tables;
