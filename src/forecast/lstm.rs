@@ -1,17 +1,163 @@
 //! The paper's LSTM: embedding 64, hidden 512, a bivariate Gaussian a step (Eq. (1) to (3)).
+//!
+//! One network, run for each person alone. It reads nine displacements of the observation window, in metres a
+//! frame, and then goes on for eight steps more, each fed with the displacement foreseen by the step before.
 
-use crate::Error;
+use std::sync::Arc;
 
-/// The network's weights, packed once for the forward pass.
+use safetensors::{Dtype, SafeTensors};
+
+use super::Gaussian2;
+use super::lstm_cell::{self, GROUP, GroupState, LANES, PackedCell};
+use crate::geometry::DVec2;
+use crate::track::OBSERVED;
+use crate::{Error, STEPS};
+
+/// Displacements of the observation window.
+pub const OBSERVED_DISPLACEMENTS: usize = OBSERVED - 1;
+/// Numbers the head gives: mu_x, mu_y, sigma_x, sigma_y, rho, the last three before they are squashed.
+pub const HEAD: usize = 5;
+/// The smallest standard deviation of a displacement. Half of ORCA's windows are exactly straight: without a
+/// floor their likelihood has no bound.
+pub const SIGMA_FLOOR_M: f32 = 0.001;
+/// Displacements at 10 Hz are about this long, so that the head starts near the right spread.
+pub const SIGMA_SCALE_M: f32 = 0.1;
+/// Keeps the covariance invertible.
+pub const RHO_LIMIT: f32 = 0.95;
+
+/// The network's weights, packed once for the forward pass. A clone shares them.
 #[derive(Debug, Clone)]
-pub struct Weights {}
+pub struct Weights {
+    network: Arc<Network>,
+}
+
+#[derive(Debug)]
+struct Network {
+    /// Per unit of the embedding: weights of x and y, bias.
+    embedding: Vec<[f32; 3]>,
+    cell: PackedCell,
+    /// Per hidden unit: its weight in each output.
+    head: Vec<[f32; HEAD]>,
+    head_bias: [f32; HEAD],
+}
 
 impl Weights {
-    /// From the bytes of a safetensors file.
+    /// From the bytes of a safetensors file with PyTorch's tensors of f32: `emb.weight` [E, 2], `emb.bias` [E],
+    /// `enc.weight_ih` [4 H, E], `enc.weight_hh` [4 H, H], `enc.bias_ih` and `enc.bias_hh` [4 H], `dec.weight`
+    /// [5, H], `dec.bias` [5]; gates in the order i f g o. The paper has E = 64 and H = 512.
     ///
     /// # Errors
-    /// A tensor that is missing or has another shape, with both.
-    pub fn from_safetensors(_bytes: &[u8]) -> Result<Self, Error> {
-        Ok(Self {})
+    /// A tensor that is missing, has another shape or kind, or holds a number that is not finite.
+    pub fn from_safetensors(bytes: &[u8]) -> Result<Self, Error> {
+        let file = SafeTensors::deserialize(bytes).map_err(|e| Error::new(format!("weights: {e}")))?;
+        let rows_of = |name| file.tensor(name).ok().and_then(|t| t.shape().first().copied());
+        let columns_of = |name| file.tensor(name).ok().and_then(|t| t.shape().get(1).copied());
+        let embedded = rows_of("emb.weight").unwrap_or(64);
+        let units = columns_of("enc.weight_hh").unwrap_or(512);
+        if units == 0 || units % LANES != 0 {
+            return Err(Error::new(format!(
+                "weights: enc.weight_hh: expected a multiple of {LANES} hidden units, found {units}"
+            )));
+        }
+        let [emb_weight, emb_bias] =
+            [tensor(&file, "emb.weight", &[embedded, 2])?, tensor(&file, "emb.bias", &[embedded])?];
+        let weight_ih = tensor(&file, "enc.weight_ih", &[4 * units, embedded])?;
+        let weight_hh = tensor(&file, "enc.weight_hh", &[4 * units, units])?;
+        let bias_ih = tensor(&file, "enc.bias_ih", &[4 * units])?;
+        let bias_hh = tensor(&file, "enc.bias_hh", &[4 * units])?;
+        let [dec_weight, dec_bias] =
+            [tensor(&file, "dec.weight", &[HEAD, units])?, tensor(&file, "dec.bias", &[HEAD])?];
+
+        let bias: Vec<f32> = bias_ih.iter().zip(&bias_hh).map(|(ih, hh)| ih + hh).collect();
+        let network = Network {
+            embedding: emb_weight.chunks_exact(2).zip(&emb_bias).map(|(w, &b)| [w[0], w[1], b]).collect(),
+            cell: PackedCell::pack(embedded, units, &weight_ih, &weight_hh, &bias),
+            head: (0..units).map(|k| std::array::from_fn(|row| dec_weight[row * units + k])).collect(),
+            head_bias: std::array::from_fn(|row| dec_bias[row]),
+        };
+        Ok(Self { network: Arc::new(network) })
+    }
+
+    /// The Gaussian of each of the next displacements of every person. `observed_m` has the displacements of the
+    /// observation window, oldest first; `next` says for a person (by place in `observed_m`) and a Gaussian which
+    /// displacement the next step is fed with.
+    pub fn roll_out(
+        &self,
+        observed_m: &[[DVec2; OBSERVED_DISPLACEMENTS]],
+        mut next: impl FnMut(usize, &Gaussian2) -> DVec2,
+    ) -> Vec<[Gaussian2; STEPS]> {
+        let network = &*self.network;
+        let mut groups = vec![GroupState::zero(&network.cell); observed_m.len().div_ceil(GROUP)];
+        let mut foreseen = vec![[Gaussian2::default(); STEPS]; observed_m.len()];
+        let mut fed_m = vec![DVec2::ZERO; observed_m.len()];
+        for frame in 0..OBSERVED_DISPLACEMENTS + STEPS - 1 {
+            if frame < OBSERVED_DISPLACEMENTS {
+                fed_m.iter_mut().zip(observed_m).for_each(|(fed, observed)| *fed = observed[frame]);
+            }
+            network.step(&fed_m, &mut groups);
+            let Some(ahead) = (frame + 1).checked_sub(OBSERVED_DISPLACEMENTS) else { continue };
+            for (person, (steps, fed)) in foreseen.iter_mut().zip(&mut fed_m).enumerate() {
+                steps[ahead] = network.head(&groups[person / GROUP], person % GROUP);
+                *fed = next(person, &steps[ahead]);
+            }
+        }
+        foreseen
+    }
+}
+
+impl Network {
+    /// Eq. (1a): e = ReLU(W_emb dx), then Eq. (1b): h = LSTM(h, e; W_enc).
+    fn step(&self, displacements_m: &[DVec2], groups: &mut [GroupState]) {
+        for (group, displacements) in groups.iter_mut().zip(displacements_m.chunks(GROUP)) {
+            for (row, &[weight_x, weight_y, bias]) in group.rows.iter_mut().zip(&self.embedding) {
+                for (value, displacement) in row.iter_mut().zip(displacements) {
+                    let [x, y] = displacement.as_vec2().to_array();
+                    *value = (weight_x * x + weight_y * y + bias).max(0.0);
+                }
+            }
+        }
+        lstm_cell::step(&self.cell, groups);
+    }
+
+    /// Eq. (2): [mu, sigma, rho] = W_dec h, as a Gaussian of the next displacement. The paper does not say how
+    /// sigma is kept positive and rho within -1 and 1: sigma = floor + scale softplus(.), rho = limit tanh(.).
+    fn head(&self, group: &GroupState, person: usize) -> Gaussian2 {
+        let mut raw = self.head_bias;
+        for (weights, hidden) in self.head.iter().zip(&group.rows[self.cell.inputs..]) {
+            for (sum, weight) in raw.iter_mut().zip(weights) {
+                *sum += weight * hidden[person];
+            }
+        }
+        let [mu_x, mu_y, raw_x, raw_y, raw_rho] = raw.map(f64::from);
+        let (sigma_x, sigma_y) = (sigma_m(raw_x), sigma_m(raw_y));
+        let rho = f64::from(RHO_LIMIT) * raw_rho.tanh();
+        Gaussian2 {
+            mean_m: DVec2::new(mu_x, mu_y),
+            xx_m2: sigma_x * sigma_x,
+            xy_m2: rho * sigma_x * sigma_y,
+            yy_m2: sigma_y * sigma_y,
+        }
+    }
+}
+
+fn sigma_m(raw: f64) -> f64 {
+    // softplus(x) = ln(1 + e^x), written so that e^x cannot overflow.
+    let softplus = raw.max(0.0) + (-raw.abs()).exp().ln_1p();
+    f64::from(SIGMA_FLOOR_M) + f64::from(SIGMA_SCALE_M) * softplus
+}
+
+fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, Error> {
+    let wrong = |found: String| {
+        Error::new(format!("weights: {name}: expected f32 of shape {shape:?}, found {found}"))
+    };
+    let view = file.tensor(name).map_err(|_| wrong("no such tensor".to_owned()))?;
+    if view.dtype() != Dtype::F32 || view.shape() != shape {
+        return Err(wrong(format!("{:?} of shape {:?}", view.dtype(), view.shape())));
+    }
+    let values: Vec<f32> =
+        view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(at) => Err(wrong(format!("{} at place {at}", values[at]))),
+        None => Ok(values),
     }
 }

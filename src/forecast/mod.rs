@@ -2,6 +2,7 @@
 
 pub mod gaussian;
 pub mod constant_velocity;
+mod lstm_cell;
 pub mod lstm;
 pub mod forecaster;
 
@@ -24,7 +25,8 @@ pub struct Forecast {
 
 /// The joint distribution of the steps' errors. The error at time t after the frame is that of the position
 /// now, plus t times that of the velocity now, plus what an unforeseen acceleration adds (white, spectral
-/// density `acceleration_psd`). [`Gaussian2`] of each step is the marginal of the same.
+/// density `acceleration_psd`). [`Gaussian2`] of each step is the marginal of the same under constant velocity. The
+/// LSTM gives marginals only; with it this is the filter's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coupling {
     /// Covariance of (x, y, vx, vy) now.
