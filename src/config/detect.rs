@@ -32,10 +32,12 @@ pub enum BackgroundMethod {
 pub struct BackgroundConfig {
     /// Range image or voxels.
     pub method: BackgroundMethod,
-    /// Width of a pixel.
+    /// Width of a pixel of an organised scan.
     pub azimuth_bin_deg: f64,
-    /// Height of a pixel where the beams of a cloud are not known.
-    pub elevation_bin_deg: f64,
+    /// Width of a pixel of a cloud whose columns are not known.
+    pub cloud_azimuth_bin_deg: f64,
+    /// Height of a pixel of a cloud whose beams are not known.
+    pub cloud_elevation_bin_deg: f64,
     /// How much nearer than the background a return must be.
     pub margin_m: f64,
     /// Revolutions before an unlearned scene is believed to be known.

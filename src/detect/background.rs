@@ -26,6 +26,7 @@ struct SensorModel {
     range_min_m: f32,
     range_max_m: f32,
     ranges: RangeModel,
+    cloud_ranges: RangeModel,
     /// Row of each bin of elevation, for clouds whose beams are not known.
     row_of_elevation: Vec<Option<u16>>,
     elevation_bins_per_rad: f64,
@@ -50,7 +51,8 @@ impl Background {
         let config = config.background.clone();
         for (name, value) in [
             ("azimuth_bin_deg", config.azimuth_bin_deg),
-            ("elevation_bin_deg", config.elevation_bin_deg),
+            ("cloud_azimuth_bin_deg", config.cloud_azimuth_bin_deg),
+            ("cloud_elevation_bin_deg", config.cloud_elevation_bin_deg),
             ("voxel_m", config.voxel_m),
         ] {
             if !(value > 0.0 && value < 360.0) {
@@ -65,9 +67,10 @@ impl Background {
             .map(|sensor| SensorModel {
                 range_min_m: sensor.range_min_m as f32,
                 range_max_m: sensor.range_max_m as f32,
-                ranges: RangeModel::new(&config, 0),
-                row_of_elevation: vec![None; (180.0 / config.elevation_bin_deg) as usize + 3],
-                elevation_bins_per_rad: 1.0_f64.to_degrees() / config.elevation_bin_deg,
+                ranges: RangeModel::new(&config, config.azimuth_bin_deg),
+                cloud_ranges: RangeModel::new(&config, config.cloud_azimuth_bin_deg),
+                row_of_elevation: vec![None; (180.0 / config.cloud_elevation_bin_deg) as usize + 3],
+                elevation_bins_per_rad: 1.0_f64.to_degrees() / config.cloud_elevation_bin_deg,
                 returns: Vec::new(),
             })
             .collect();
@@ -123,6 +126,10 @@ impl Background {
                 self.learn_map(points);
                 let map = self.map.as_ref().expect("just learned");
                 points.retain(|p| map.is_new(p.position_m, self.config.voxel_points));
+                if self.config.thin_m == 0.0 {
+                    // DP-means depends on the order; a thinned cloud has one already, its voxels'.
+                    points.sort_unstable_by(in_space);
+                }
             }
         }
         let limit = self.config.points_limit;
@@ -184,7 +191,10 @@ impl Background {
             Cloud::Unorganised(cloud) => sensor.unorganised(scan, cloud, &clip, learn, health, points),
         }
         if learn.is_some() {
-            sensor.ranges.close_revolution(self.known);
+            match &scan.cloud {
+                Cloud::Organised(_) => sensor.ranges.close_revolution(self.known),
+                Cloud::Unorganised(_) => sensor.cloud_ranges.close_revolution(self.known),
+            }
         }
     }
 }
@@ -289,7 +299,7 @@ impl SensorModel {
             let limit_m = rows
                 .iter()
                 .flatten()
-                .map(|&row| self.ranges.limit_m(self.ranges.in_row(pixel, usize::from(row))))
+                .map(|&row| self.cloud_ranges.limit_m(self.cloud_ranges.in_row(pixel, usize::from(row))))
                 .fold(f32::INFINITY, f32::min);
             let mut frozen = false;
             if range_m < limit_m {
@@ -300,7 +310,7 @@ impl SensorModel {
                 }
             }
             if learn.is_some() && !frozen {
-                self.ranges.observe(pixel, range_m);
+                self.cloud_ranges.observe(pixel, range_m);
             }
         }
     }
@@ -321,11 +331,11 @@ impl SensorModel {
             let elevation_bin = (above_nadir_rad * self.elevation_bins_per_rad).round() as usize + 1;
             let elevation_bin = elevation_bin.min(self.row_of_elevation.len() - 2);
             let row = *self.row_of_elevation[elevation_bin].get_or_insert_with(|| {
-                self.ranges.grow(self.ranges.rows() + 1);
-                self.ranges.rows() as u16 - 1
+                self.cloud_ranges.grow(self.cloud_ranges.rows() + 1);
+                self.cloud_ranges.rows() as u16 - 1
             });
             let azimuth_cdeg = (-y).atan2(x).to_degrees() * 100.0;
-            let pixel = self.ranges.pixel(usize::from(row), azimuth_cdeg);
+            let pixel = self.cloud_ranges.pixel(usize::from(row), azimuth_cdeg);
             self.returns.push(Return { elevation_bin, pixel, range_m, point });
         }
         self.returns.sort_unstable_by(|a, b| {
@@ -334,6 +344,15 @@ impl SensorModel {
             key(a).cmp(&key(b)).then_with(|| place(a).cmp(&place(b)))
         });
     }
+}
+
+/// An order that does not depend on how the points came.
+fn in_space(a: &Point, b: &Point) -> std::cmp::Ordering {
+    let key = |p: &Point| (p.sensor, p.time_ns);
+    key(a).cmp(&key(b)).then_with(|| {
+        let pairs = a.position_m.to_array().into_iter().zip(b.position_m.to_array());
+        pairs.map(|(a, b)| a.total_cmp(&b)).fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+    })
 }
 
 fn organised_point(scan: &Scan, image: &RangeImage, c: usize, b: usize, range_m: f32) -> Point {

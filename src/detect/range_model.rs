@@ -14,8 +14,10 @@ struct Mode {
     range_m: f32,
     /// Mean absolute deviation, metres.
     spread_m: f32,
-    /// Revolutions; halved by forgetting.
+    /// Revolutions in which it came back; halved by forgetting.
     weight: f32,
+    /// The last of them.
+    seen: u32,
 }
 
 /// The pixels of one sensor, row after row.
@@ -31,6 +33,8 @@ pub struct RangeModel {
     limit_m: Vec<f32>,
     /// Revolutions learned; halved by forgetting.
     revolutions: f32,
+    /// The revolution that is being observed.
+    count: u32,
     margin_m: f32,
     share: f32,
     start: f32,
@@ -39,9 +43,9 @@ pub struct RangeModel {
 
 impl RangeModel {
     /// Knows nothing yet.
-    pub fn new(config: &BackgroundConfig, rows: usize) -> Self {
-        let bins = (360.0 / config.azimuth_bin_deg).round().clamp(1.0, 36_000.0) as usize;
-        let mut model = Self {
+    pub fn new(config: &BackgroundConfig, azimuth_bin_deg: f64) -> Self {
+        let bins = (360.0 / azimuth_bin_deg).round().clamp(1.0, 36_000.0) as usize;
+        Self {
             bins,
             bins_per_cdeg: bins as f32 / 36_000.0,
             rows: 0,
@@ -53,9 +57,8 @@ impl RangeModel {
             share: config.share as f32,
             start: config.start_revolutions as f32,
             memory: config.memory_revolutions as f32,
-        };
-        model.grow(rows);
-        model
+            count: 1,
+        }
     }
 
     /// How many rows there are.
@@ -103,7 +106,8 @@ impl RangeModel {
         for mode in modes.iter_mut() {
             let off_m = range_m - mode.range_m;
             if mode.weight > 0.0 && off_m.abs() < self.margin_m {
-                mode.weight += 1.0;
+                mode.weight += f32::from(mode.seen != self.count);
+                mode.seen = self.count;
                 let gain = (1.0 / mode.weight).max(GAIN_MIN);
                 mode.range_m += gain * off_m;
                 mode.spread_m += gain * (off_m.abs() - mode.spread_m);
@@ -114,7 +118,7 @@ impl RangeModel {
         let rarest = modes.iter_mut().min_by(|a, b| a.weight.total_cmp(&b.weight)).expect("there are modes");
         rarest.weight -= 1.0;
         if rarest.weight <= 0.0 {
-            *rarest = Mode { range_m, spread_m: 0.0, weight: 1.0 };
+            *rarest = Mode { range_m, spread_m: 0.0, weight: 1.0, seen: self.count };
         }
     }
 
@@ -122,6 +126,7 @@ impl RangeModel {
     /// open once `known` or once enough revolutions were seen.
     pub fn close_revolution(&mut self, known: bool) {
         self.revolutions += 1.0;
+        self.count = self.count.wrapping_add(1);
         if self.revolutions > self.memory {
             self.revolutions *= 0.5;
             self.modes.iter_mut().flatten().for_each(|mode| mode.weight *= 0.5);
@@ -131,11 +136,7 @@ impl RangeModel {
         let least =
             if known { self.share * self.revolutions } else { (self.share * self.revolutions).max(1.5) };
         for (nearest, modes) in self.nearest_m.iter_mut().zip(&self.modes) {
-            *nearest = modes
-                .iter()
-                .filter(|mode| mode.weight > 0.0 && mode.weight >= least)
-                .map(|mode| mode.range_m - 2.0 * mode.spread_m)
-                .fold(unseen_m, |a, b| if unseen_m == 0.0 { 0.0 } else { a.min(b) });
+            *nearest = nearest_m(modes, least).unwrap_or(unseen_m).min(unseen_m);
         }
         for (row, limit) in
             self.nearest_m.chunks_exact(self.bins).zip(self.limit_m.chunks_exact_mut(self.bins))
@@ -149,4 +150,17 @@ impl RangeModel {
             }
         }
     }
+}
+
+/// The nearest range that came back in at least `least` revolutions. Where none did although the pixel often
+/// returned something (a wall seen at a grazing angle, leaves), the nearest of all; nothing where it rarely did.
+fn nearest_m(modes: &[Mode; MODES], least: f32) -> Option<f32> {
+    let near = |mode: &Mode| mode.range_m - 2.0 * mode.spread_m;
+    let nearest = |weight: f32| {
+        modes.iter().filter(|m| m.weight > 0.0 && m.weight >= weight).map(near).reduce(f32::min)
+    };
+    nearest(least).or_else(|| {
+        let total: f32 = modes.iter().map(|m| m.weight).sum();
+        if total >= least { nearest(0.0) } else { None }
+    })
 }
