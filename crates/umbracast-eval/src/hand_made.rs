@@ -1,7 +1,7 @@
 //! Small scenes with known answers, for the tests of the scores.
 
-use umbracast::STEP_NS;
-use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
+use umbracast::{STEP_NS, STEPS};
+use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow};
 
 use crate::scene::SceneTruth;
 
@@ -39,4 +39,10 @@ pub fn truth_of(people: u32, frames: u64, blocked: impl Fn(u32, u64) -> bool) ->
         }
     }
     truth
+}
+
+/// What a run says of a track at a frame, the same for every window.
+pub fn link_row(frame: u64, track: u64, blocked: bool) -> LinkRow {
+    let p = if blocked { 1.0 } else { 0.0 };
+    LinkRow { frame, track, blocked: [blocked; STEPS], p: [p; STEPS], ..LinkRow::default() }
 }

@@ -10,4 +10,6 @@ mod hand_made;
 pub mod instances;
 pub mod tally;
 pub mod displacement;
+pub mod links;
+pub mod casts;
 pub mod bootstrap;

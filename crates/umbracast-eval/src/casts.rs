@@ -1,0 +1,254 @@
+//! Casts that no run makes, from the rows of truth and run: the constant-velocity baseline, and the error budget,
+//! in which each stage in turn is replaced by the truth and the rest stays as in the mode.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use umbracast::blockage::Caster;
+use umbracast::forecast::{Coupling, Forecast, Forecaster, Gaussian2, Weights, constant_velocity};
+use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+use umbracast::track::{OBSERVED, Track};
+use umbracast::{Config, Error, STEP_S, STEPS};
+use umbracast_io::rows::{PeopleRow, TrackRow};
+
+use crate::links::Said;
+use crate::scene::{Matching, SceneRun, TruthIndex};
+
+/// Front to back and side to side of the box given to a person whom no track has measured (PAPER's ladder).
+const PERSON_BOX_M: [f64; 2] = [0.28, 0.46];
+
+/// Constant velocity on true positions: everybody's true state carried on and cast by the mode's stage 3, with
+/// a box of the same size for all.
+pub fn constant_velocity_of_truth(truth: &TruthIndex, config: &Config) -> Said {
+    let mut caster = Caster::new(&config.blockage, &config.site);
+    let (mut said, mut blockages) = (Said::default(), Vec::new());
+    for &frame in &truth.frames {
+        let tracks: Vec<Track> =
+            truth.people_of(frame).map(|row| true_track(truth, row, person_box(row))).collect();
+        let forecasts: Vec<Forecast> = tracks
+            .iter()
+            .map(|track| constant_velocity::forecast(track, config.forecast.acceleration_psd_m2ps3))
+            .collect();
+        caster.cast(&tracks, &forecasts, &mut blockages);
+        said.add(frame, &blockages);
+    }
+    said
+}
+
+/// Positions and velocities replaced: everybody's true state into the mode's forecast and cast. Who has a track
+/// keeps its box, moved to the true position.
+///
+/// # Errors
+/// The mode's forecast needs weights and there are none.
+pub fn true_state(
+    truth: &TruthIndex,
+    run: &SceneRun,
+    matching: &Matching,
+    config: &Config,
+    weights: Option<&Weights>,
+) -> Result<Said, Error> {
+    let mut forecaster = Forecaster::new(&config.forecast, weights)?;
+    let mut caster = Caster::new(&config.blockage, &config.site);
+    let rows: BTreeMap<(u64, u64), &TrackRow> = run.tracks.iter().map(|r| ((r.frame, r.track), r)).collect();
+    let (mut said, mut forecasts, mut blockages) = (Said::default(), Vec::new(), Vec::new());
+    for &frame in &truth.frames {
+        let boxes = |row: &PeopleRow| {
+            let own = matching.get(&(frame, row.person)).and_then(|track| rows.get(&(frame, *track)));
+            own.map_or_else(|| person_box(row), |own| box_moved_to(own, row))
+        };
+        let tracks: Vec<Track> =
+            truth.people_of(frame).map(|row| true_track(truth, row, boxes(row))).collect();
+        forecaster.forecast(&tracks, &mut forecasts);
+        caster.cast(&tracks, &forecasts, &mut blockages);
+        said.add(frame, &blockages);
+    }
+    Ok(said)
+}
+
+/// The future replaced: the run's tracks as they are, at the steps where their persons will truly be. A track
+/// of nobody keeps its own forecast.
+pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, config: &Config) -> Said {
+    let mut caster = Caster::new(&config.blockage, &config.site);
+    let person_of: BTreeMap<(u64, u64), u32> =
+        matching.iter().map(|(&(frame, person), &track)| ((frame, track), person)).collect();
+    let mut by_frame: BTreeMap<u64, Vec<&TrackRow>> = BTreeMap::new();
+    for row in run.tracks.iter().filter(|row| row.confirmed) {
+        by_frame.entry(row.frame).or_default().push(row);
+    }
+    let (mut said, mut blockages) = (Said::default(), Vec::new());
+    for (&frame, rows) in &by_frame {
+        let forecast = |row: &TrackRow| {
+            let mut steps = forecast_of(row);
+            if let Some(&person) = person_of.get(&(frame, row.track)) {
+                for (h, step) in (1..).zip(&mut steps) {
+                    if let Some(there) = truth.person(frame + h, person) {
+                        *step =
+                            Gaussian2 { mean_m: DVec2::new(there.x_m, there.y_m), ..Gaussian2::default() };
+                    }
+                }
+            }
+            Forecast { track: row.track, steps, coupling: CERTAIN }
+        };
+        let tracks: Vec<Track> = rows.iter().map(|row| track_of(row)).collect();
+        let forecasts: Vec<Forecast> = rows.iter().map(|row| forecast(row)).collect();
+        caster.cast(&tracks, &forecasts, &mut blockages);
+        said.add(frame, &blockages);
+    }
+    said
+}
+
+/// Constant velocity from the true state, for comparison with stage 2.
+pub fn constant_velocity_steps(row: &PeopleRow, acceleration_psd_m2ps3: f64) -> [Gaussian2; STEPS] {
+    let at = |i| {
+        let (p, v) = (DVec2::new(row.x_m, row.y_m), DVec2::new(row.vx_mps, row.vy_mps));
+        let coupling = Coupling { acceleration_psd: acceleration_psd_m2ps3, ..CERTAIN };
+        constant_velocity::position_at(p, v, &coupling, (i + 1) as f64 * STEP_S)
+    };
+    std::array::from_fn(at)
+}
+
+/// The steps of a track's row.
+pub fn forecast_of(row: &TrackRow) -> [Gaussian2; STEPS] {
+    row.steps.map(|[x, y, xx_m2, xy_m2, yy_m2]| Gaussian2 { mean_m: DVec2::new(x, y), xx_m2, xy_m2, yy_m2 })
+}
+
+/// What is known has no spread.
+const CERTAIN: Coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd: 0.0 };
+
+/// A person of the truth as the tracker would see him if it made no error.
+fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb)) -> Track {
+    let first = row.frame.saturating_sub(OBSERVED as u64 - 1);
+    let observed: VecDeque<(i64, DVec2)> = (first..=row.frame)
+        .filter_map(|frame| truth.person(frame, row.person))
+        .map(|then| (then.time_ns, DVec2::new(then.x_m, then.y_m)))
+        .collect();
+    Track {
+        id: u64::from(row.person),
+        position_m: DVec2::new(row.x_m, row.y_m),
+        velocity_mps: DVec2::new(row.vx_mps, row.vy_mps),
+        covariance: CERTAIN.state,
+        heading_rad: row.heading_rad,
+        height_m: row.height_m,
+        points: row.returns,
+        confirmed: true,
+        aabb,
+        obb,
+        observed,
+    }
+}
+
+/// The boxes of a person of usual size.
+fn person_box(row: &PeopleRow) -> (Aabb, Obb) {
+    let half_m = DVec3::new(PERSON_BOX_M[0] / 2.0, PERSON_BOX_M[1] / 2.0, row.height_m / 2.0);
+    let center_m = DVec3::new(row.x_m, row.y_m, half_m.z);
+    let site_from_box = DMat3::from_rotation_z(row.heading_rad);
+    let reach_m = site_from_box.x_axis.abs() * half_m.x + site_from_box.y_axis.abs() * half_m.y;
+    let reach_m = DVec3::new(reach_m.x, reach_m.y, half_m.z);
+    let aabb = Aabb { min_m: center_m - reach_m, max_m: center_m + reach_m };
+    (aabb, Obb { center_m, half_m, site_from_box })
+}
+
+/// The boxes of a track, moved with its position to the true one.
+fn box_moved_to(track: &TrackRow, row: &PeopleRow) -> (Aabb, Obb) {
+    let offset_m = DVec2::new(row.x_m - track.x_m, row.y_m - track.y_m);
+    let (aabb, obb) = boxes_of(track);
+    (aabb.moved_by(offset_m), obb.moved_by(offset_m, 0.0))
+}
+
+fn boxes_of(row: &TrackRow) -> (Aabb, Obb) {
+    let at = |values: &[f64]| DVec3::new(values[0], values[1], values[2]);
+    let (b, o) = (&row.aabb_m, &row.obb);
+    let site_from_box = DMat3::from_cols(at(&o[6..9]), at(&o[9..12]), at(&o[12..15]));
+    (
+        Aabb { min_m: at(&b[0..3]), max_m: at(&b[3..6]) },
+        Obb { center_m: at(&o[0..3]), half_m: at(&o[3..6]), site_from_box },
+    )
+}
+
+/// A track as its row tells it. The row does not hold the observed positions, which stage 3 does not use.
+fn track_of(row: &TrackRow) -> Track {
+    let (aabb, obb) = boxes_of(row);
+    let mut covariance = [[0.0; 4]; 4];
+    let upper = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
+    for ((i, j), &value) in upper.zip(&row.covariance) {
+        (covariance[i][j], covariance[j][i]) = (value, value);
+    }
+    Track {
+        id: row.track,
+        position_m: DVec2::new(row.x_m, row.y_m),
+        velocity_mps: DVec2::new(row.vx_mps, row.vy_mps),
+        covariance,
+        heading_rad: row.heading_rad,
+        height_m: row.height_m,
+        points: row.points,
+        confirmed: row.confirmed,
+        aabb,
+        obb,
+        observed: VecDeque::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made::truth_of;
+    use crate::instances::instances;
+    use crate::scene::SceneTruth;
+    use umbracast::Mode;
+
+    /// The access point hangs beside person 0, 3 m up at x = -4; person 1 walks by in front of person 0 within
+    /// 0.4 s and is the only one in the way.
+    fn crossing() -> (SceneTruth, Config) {
+        let mut truth = truth_of(2, 19, |_, _| false);
+        for row in truth.people.iter_mut().filter(|row| row.person == 1) {
+            row.vy_mps = 1.0;
+            (row.x_m, row.y_m) = (-1.0, -0.4 + 0.1 * (row.frame as f64 - 9.0));
+        }
+        let mut config = Config::for_mode(Mode::Default);
+        config.site.access_points.truncate(1);
+        config.site.access_points[0].position_m = [-4.0, 0.0, 1.5];
+        (truth, config)
+    }
+
+    fn said_of_person_0(said: &Said, truth: &SceneTruth) -> Vec<bool> {
+        let instances = instances(&TruthIndex::new(truth));
+        said.of_persons(&instances)[0].blocked.to_vec()
+    }
+
+    #[test]
+    fn constant_velocity_sees_the_crossing_a_few_steps_ahead() {
+        let (truth, config) = crossing();
+        let said = constant_velocity_of_truth(&TruthIndex::new(&truth), &config);
+        let blocked = said_of_person_0(&said, &truth);
+        assert!(!blocked[0] && blocked[3] && blocked[8], "{blocked:?}");
+    }
+
+    #[test]
+    fn the_true_state_needs_no_track() {
+        let (truth, config) = crossing();
+        let index = TruthIndex::new(&truth);
+        let (run, matching) = (SceneRun::default(), Matching::new());
+        let said = true_state(&index, &run, &matching, &config, None).unwrap();
+        assert!(said_of_person_0(&said, &truth)[3]);
+    }
+
+    #[test]
+    fn rows_of_a_track_give_back_its_boxes_and_covariance() {
+        let mut row = TrackRow { aabb_m: [1.0, 2.0, 0.0, 1.4, 2.6, 1.8], ..TrackRow::default() };
+        row.covariance = std::array::from_fn(|i| i as f64);
+        row.obb[6..15].copy_from_slice(&DMat3::from_rotation_z(0.3).to_cols_array());
+        let track = track_of(&row);
+        assert_eq!(track.covariance[0], [0.0, 1.0, 2.0, 3.0]);
+        assert_eq!((track.covariance[3][1], track.covariance[2][2]), (6.0, 7.0));
+        assert_eq!(track.obb.site_from_box, DMat3::from_rotation_z(0.3));
+        assert_eq!(track.aabb.max_m, DVec3::new(1.4, 2.6, 1.8));
+    }
+
+    #[test]
+    fn a_person_turned_by_90_degrees_is_wide_along_x() {
+        let row =
+            PeopleRow { heading_rad: std::f64::consts::FRAC_PI_2, height_m: 1.8, ..PeopleRow::default() };
+        let (aabb, obb) = person_box(&row);
+        assert!((aabb.size_m() - DVec3::new(0.46, 0.28, 1.8)).length() < 1e-12, "{:?}", aabb.size_m());
+        assert_eq!(obb.half_m, DVec3::new(0.14, 0.23, 0.9));
+    }
+}
