@@ -1,1 +1,171 @@
 //! A whole scene: crowd, bodies, sensors and truth, frame by frame.
+
+use rand::Rng;
+use umbracast::lidar::Packet;
+use umbracast::{Error, STEP_NS, Site};
+
+use crate::body::{PersonState, Walker};
+use crate::crowd::Crowd;
+use crate::random::stream;
+use crate::sensor::Sensors;
+use crate::truth::{LinkTruth, Truth};
+
+/// One frame: what the sensors sent during it, and the truth at its end.
+#[derive(Debug, Clone)]
+pub struct SceneFrame {
+    /// Counts from 0.
+    pub index: u64,
+    /// The frame's end: (index + 1) x 100 ms.
+    pub time_ns: i64,
+    /// The packets of each sensor of the site; empty without sensors.
+    pub packets: Vec<Vec<Packet>>,
+    /// Everybody in the scene, arrived ones too.
+    pub people: Vec<PersonTruth>,
+    /// Every link, access points first.
+    pub links: Vec<LinkTruth>,
+}
+
+/// One person at the end of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PersonTruth {
+    /// Whose.
+    pub person: u32,
+    /// Place, speed, heading and height.
+    pub state: PersonState,
+    /// Came within 1 m of the goal; the body stays.
+    pub arrived: bool,
+    /// Points on this body during the frame, all sensors; 0 without sensors.
+    pub returns: u32,
+}
+
+/// Simulates a scene. The same crowd, site and seed give the same frames, byte for byte.
+#[derive(Debug)]
+pub struct Scene {
+    site: Site,
+    walkers: Vec<Walker>,
+    sensors: Option<Sensors>,
+    truth: Truth,
+    frames: u64,
+    next: u64,
+}
+
+impl Scene {
+    /// A crowd with bodies in a hall with sensors.
+    ///
+    /// # Errors
+    /// A sensor that cannot be simulated.
+    pub fn new(crowd: Crowd, site: &Site, seed: u64) -> Result<Self, Error> {
+        let sensors = Sensors::new(site, stream(seed, "sensors", 0).next_u64())?;
+        Ok(Self { sensors: Some(sensors), ..Self::truth_only(crowd, site, seed) })
+    }
+
+    /// The same people without sensors: no packets and no returns, for training and the ladder of oracles.
+    pub fn truth_only(crowd: Crowd, site: &Site, seed: u64) -> Self {
+        let frames = (crowd.duration_ns / STEP_NS).max(0) as u64;
+        let body = |way: crate::crowd::Trajectory| {
+            let own_seed = stream(seed, "body", u64::from(way.person)).next_u64();
+            Walker::new(way, own_seed)
+        };
+        Self {
+            site: site.clone(),
+            walkers: crowd.trajectories.into_iter().map(body).collect(),
+            sensors: None,
+            truth: Truth::default(),
+            frames,
+            next: 0,
+        }
+    }
+
+    /// The packets of `frames` revolutions in the hall without people: one list a frame, in it one a sensor.
+    ///
+    /// # Errors
+    /// A sensor that cannot be simulated.
+    pub fn empty(site: &Site, seed: u64, frames: u64) -> Result<Vec<Vec<Vec<Packet>>>, Error> {
+        let mut sensors = Sensors::new(site, stream(seed, "sensors", 0).next_u64())?;
+        Ok((0..frames).map(|index| sensors.frame(index, &[]).0).collect())
+    }
+
+    /// The bodies, in order of person.
+    pub fn walkers(&self) -> &[Walker] {
+        &self.walkers
+    }
+
+    /// How many frames the scene has.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// The next frame, or `None` after the last.
+    pub fn next_frame(&mut self) -> Option<SceneFrame> {
+        let index = self.next;
+        if index >= self.frames {
+            return None;
+        }
+        self.next += 1;
+        let time_ns = (index as i64 + 1) * STEP_NS;
+        let (packets, returns) = match &mut self.sensors {
+            Some(sensors) => sensors.frame(index, &self.walkers),
+            None => (Vec::new(), vec![0; self.walkers.len()]),
+        };
+        let person = |(walker, returns): (&Walker, u32)| {
+            Some(PersonTruth {
+                person: walker.trajectory.person,
+                state: walker.state_at(time_ns)?,
+                arrived: walker.trajectory.arrived_ns.is_some_and(|arrived| arrived <= time_ns),
+                returns,
+            })
+        };
+        let people = self.walkers.iter().zip(returns).filter_map(person).collect();
+        let links = self.truth.links(&self.site, &self.walkers, time_ns);
+        Some(SceneFrame { index, time_ns, packets, people, links })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::crowd::Trajectory;
+    use umbracast::Config;
+    use umbracast::geometry::DVec2;
+
+    /// Two people who cross, one of whom arrives after a second.
+    fn crowd() -> Crowd {
+        let way = |person: u32, from: DVec2, step: DVec2| Trajectory {
+            person,
+            start_ns: 0,
+            step_ns: 10_000_000,
+            positions_m: (0..=200).map(|i| from + step * f64::from(i)).collect(),
+            arrived_ns: (person == 1).then_some(1_000_000_000),
+            height_m: None,
+        };
+        let people = [
+            way(0, DVec2::new(-1.0, 0.0), DVec2::new(0.01, 0.0)),
+            way(1, DVec2::new(0.0, -1.0), DVec2::new(0.0, 0.01)),
+        ];
+        Crowd { trajectories: people.to_vec(), duration_ns: 2_000_000_000 }
+    }
+
+    #[test]
+    fn frames_close_every_hundred_milliseconds_with_truth_at_their_end() {
+        let site = Config::default().site;
+        let mut scene = Scene::truth_only(crowd(), &site, 7);
+        let frames: Vec<SceneFrame> = std::iter::from_fn(|| scene.next_frame()).collect();
+        assert_eq!(frames.len(), 20);
+        assert_eq!((frames[4].index, frames[4].time_ns), (4, 500_000_000));
+        assert!((frames[4].people[0].state.position_m - DVec2::new(-0.5, 0.0)).length() < 1e-9);
+        assert_eq!(frames[4].links.len(), 2 * site.access_points.len());
+        let arrived = |k: usize| frames[k].people[1].arrived;
+        assert!(!arrived(8) && arrived(9) && frames[19].people.len() == 2);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_truth_and_another_seed_other_bodies() {
+        let site = Config::default().site;
+        let run = |seed: u64| {
+            let mut scene = Scene::truth_only(crowd(), &site, seed);
+            std::iter::from_fn(|| scene.next_frame()).map(|f| (f.people, f.links)).collect::<Vec<_>>()
+        };
+        assert_eq!(run(7), run(7));
+        assert_ne!(run(7), run(8));
+    }
+}

@@ -1,8 +1,25 @@
 //! Walking bodies: articulated meshes of published proportions with a gait that follows the speed.
 
+pub mod build;
+mod loft;
+pub mod gait;
+mod skeleton;
+mod shape;
+mod feet;
+mod walk;
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};
 
 use crate::crowd::Trajectory;
+use crate::random::stream;
+use build::Build;
+use shape::Shape;
+use skeleton::{PelvisPose, Pose};
+use walk::Walk;
 
 /// Corner indices of a body's triangles: the same for every pose of every body.
 pub type Triangles = Vec<[u32; 3]>;
@@ -25,45 +42,76 @@ pub struct PersonState {
 pub struct Walker {
     /// Whose.
     pub trajectory: Trajectory,
+    /// Its measures.
+    pub build: Build,
+    shape: Shape,
+    walk: Walk,
+    /// Standing upright at the origin, looking along x.
+    upright: Pose,
 }
 
 impl Walker {
     /// Draws a body (sex, height, build, proportions) from `seed` and lets it walk along the trajectory.
-    pub fn new(trajectory: Trajectory, _seed: u64) -> Self {
-        Self { trajectory }
+    pub fn new(trajectory: Trajectory, seed: u64) -> Self {
+        let build = Build::draw(seed, trajectory.height_m);
+        let first_phase: f64 = stream(seed, "phase", 0).random();
+        let walk = Walk::plan(&trajectory, &build, first_phase);
+        let still = gait::upper_body(0.0, 0.0);
+        let pelvis = PelvisPose::new(DVec2::ZERO, 0.0, &still, build.hip_height_m() - 0.006);
+        let upright = Pose::new(&build, 0.0, &still, &pelvis, &feet::at_rest(&build));
+        Self { shape: Shape::new(&build), trajectory, build, walk, upright }
     }
 
     /// The person's state, or `None` while not in the scene.
-    pub fn state_at(&self, _time_ns: i64) -> Option<PersonState> {
-        None
+    pub fn state_at(&self, time_ns: i64) -> Option<PersonState> {
+        let (position_m, velocity_mps) = self.trajectory.at(time_ns)?;
+        let heading_rad = (self.walk.at(time_ns).heading_rad + PI).rem_euclid(TAU) - PI;
+        Some(PersonState { position_m, velocity_mps, heading_rad, height_m: self.build.height_m() })
     }
 
     /// Writes the vertices of the walking body in the site frame; false (and nothing written) while the person
     /// is not in the scene.
-    pub fn mesh_at(&self, _time_ns: i64, vertices: &mut Vec<DVec3>) -> bool {
+    pub fn mesh_at(&self, time_ns: i64, vertices: &mut Vec<DVec3>) -> bool {
         vertices.clear();
-        false
+        let Some((pose, _)) = self.pose_at(time_ns) else { return false };
+        self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+        true
     }
 
     /// The same body standing upright, arms hanging, at any place: what the ladder of oracles casts.
-    pub fn upright_mesh(&self, _position_m: DVec2, _heading_rad: f64, vertices: &mut Vec<DVec3>) {
-        vertices.clear();
+    pub fn upright_mesh(&self, position_m: DVec2, heading_rad: f64, vertices: &mut Vec<DVec3>) {
+        let pose = self.upright.moved(DVec2::ZERO, heading_rad, position_m);
+        self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
     }
 
-    /// The walking mesh of `time_ns` moved so that its axis stands at `position_m` with `heading_rad`.
-    pub fn mesh_moved(
-        &self,
-        _time_ns: i64,
-        _position_m: DVec2,
-        _heading_rad: f64,
-        vertices: &mut Vec<DVec3>,
-    ) {
+    /// The walking mesh of `time_ns` moved so that its axis stands at `position_m` with `heading_rad`. Nothing
+    /// is written while the person is not in the scene.
+    pub fn mesh_moved(&self, time_ns: i64, position_m: DVec2, heading_rad: f64, vertices: &mut Vec<DVec3>) {
         vertices.clear();
+        let Some((pose, state)) = self.pose_at(time_ns) else { return };
+        let pose = pose.moved(state.position_m, heading_rad - state.heading_rad, position_m);
+        self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
     }
 
-    /// The triangles of every mesh this walker makes.
+    /// The triangles of every mesh this walker makes, counter-clockwise from outside.
     pub fn triangles(&self) -> &Triangles {
-        static NONE: Triangles = Triangles::new();
-        &NONE
+        shape::triangles()
+    }
+
+    fn pose_at(&self, time_ns: i64) -> Option<(Pose, PersonState)> {
+        let state = self.state_at(time_ns)?;
+        let instant = self.walk.at(time_ns);
+        let upper = walk::upper_body(&instant, &self.build);
+        let pelvis = PelvisPose::new(state.position_m, instant.heading_rad, &upper, instant.hip_height_m);
+        let feet = feet::poses(&self.walk, &instant, &self.build);
+        Some((Pose::new(&self.build, instant.heading_rad, &upper, &pelvis, &feet), state))
     }
 }
+
+/// The closed parts that every mesh is made of (trunk, neck, head, limbs), as ranges of vertices and triangles.
+pub fn parts() -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+    shape::vertex_ranges().iter().cloned().zip(shape::triangle_ranges().iter().cloned())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,129 @@
+//! Feet: where they are put, how they roll from heel to toes on their print, and how they swing to the next.
+
+use std::f64::consts::{PI, TAU};
+
+use umbracast::geometry::{DVec2, DVec3};
+
+use super::build::Build;
+use super::gait;
+use super::shape::{ANKLE_SHARE, BALL_SHARE};
+use super::skeleton::FootPose;
+use super::walk::{Instant, Walk, roll};
+
+/// Where a foot stands flat, from contact to toe-off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Footprint {
+    /// The back end of the sole.
+    pub heel_m: DVec2,
+    /// Where its toes point.
+    pub yaw_rad: f64,
+    /// Phase of the contact.
+    pub contact: f64,
+    /// Share of a stride that it stays.
+    pub stance_share: f64,
+}
+
+/// Toes point outward by this angle.
+const TOE_OUT_RAD: f64 = 0.1;
+/// Lowest point of a swinging sole above the floor, mid-swing.
+const CLEARANCE_M: f64 = 0.015;
+
+/// The print of a contact (even: right foot) under a pelvis that passes over the heel at `position_m`.
+/// Walking, feet come closer together and the heel lies under the body axis; standing, the ankle does.
+pub fn print(
+    build: &Build,
+    contact: usize,
+    position_m: DVec2,
+    heading_rad: f64,
+    speed_mps: f64,
+) -> Footprint {
+    let side = if contact.is_multiple_of(2) { -1.0 } else { 1.0 };
+    let walking = smoothstep(speed_mps / 0.5);
+    // Step widths of 8 to 13.5 cm (men) and 6 to 12 cm (women); standing, feet are under the hips.
+    let apart_m = if build.male { 0.053 } else { 0.046 };
+    let left_m = build.hip_offset_m() + walking * (apart_m - build.hip_offset_m());
+    let forward_m = (walking - 1.0) * (ANKLE_SHARE * build.sole_m() + 0.02);
+    let offset = DVec2::from_angle(heading_rad).rotate(DVec2::new(forward_m, side * left_m));
+    Footprint {
+        heel_m: position_m + offset,
+        yaw_rad: heading_rad + side * TOE_OUT_RAD,
+        contact: contact as f64 / 2.0,
+        stance_share: gait::stance_share(speed_mps / (0.53 * build.stature_m)),
+    }
+}
+
+/// Both feet at an instant, left and right.
+pub fn poses(walk: &Walk, instant: &Instant, build: &Build) -> [FootPose; 2] {
+    [true, false].map(|left| {
+        let [current, next] = walk.prints_of(left, instant.phase);
+        let stood = instant.phase - current.contact;
+        let amount = roll(instant, build);
+        if stood <= current.stance_share {
+            standing_on(&current, stood / current.stance_share, amount, build)
+        } else {
+            let air = (next.contact - current.contact - current.stance_share).max(1e-6);
+            let progress = ((stood - current.stance_share) / air).min(1.0);
+            swinging(&current, &next, progress, amount, build)
+        }
+    })
+}
+
+/// Both feet of a body that stands at rest at the origin, looking along x.
+pub fn at_rest(build: &Build) -> [FootPose; 2] {
+    [1, 0].map(|contact| standing_on(&print(build, contact, DVec2::ZERO, 0.0, 0.0), 0.2, 0.0, build))
+}
+
+/// A foot on its print: it lands on the heel, lies flat, then rises about the ball with the toes on the floor.
+fn standing_on(print: &Footprint, progress: f64, amount: f64, build: &Build) -> FootPose {
+    let pitch_rad = amount * gait::stance_pitch_rad(progress);
+    let sole = build.sole_m();
+    let pivot_m = if pitch_rad > 0.0 { 0.0 } else { BALL_SHARE * sole };
+    let ankle = turned(ANKLE_SHARE * sole - pivot_m, build.ankle_m(), pitch_rad);
+    let ground = print.heel_m + DVec2::from_angle(print.yaw_rad) * (pivot_m + ankle[0]);
+    FootPose {
+        ankle_m: ground.extend(ankle[1]),
+        yaw_rad: print.yaw_rad,
+        pitch_rad,
+        toe_pitch_rad: pitch_rad.max(0.0),
+    }
+}
+
+/// A foot in the air between two prints, its lowest point always above the floor.
+fn swinging(from: &Footprint, to: &Footprint, progress: f64, amount: f64, build: &Build) -> FootPose {
+    let (start, end) = (standing_on(from, 1.0, amount, build), standing_on(to, 0.0, amount, build));
+    let u = progress;
+    // The smoothest way from rest to rest (minimum jerk).
+    let way = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+    let ground = start.ankle_m.truncate().lerp(end.ankle_m.truncate(), way);
+    let turn = (to.yaw_rad - from.yaw_rad + PI).rem_euclid(TAU) - PI;
+    let pitch_rad = amount * gait::swing_pitch_rad(u);
+    // Toes leave the floor flat and straighten in the first part of the swing.
+    let toe_pitch_rad = if pitch_rad > 0.0 { pitch_rad } else { pitch_rad * smoothstep(u / 0.4) };
+    let rise = (PI * u).sin().powi(2) * (CLEARANCE_M + 0.01 * amount);
+    FootPose {
+        ankle_m: DVec3::new(ground.x, ground.y, rise - lowest_m(build, pitch_rad, toe_pitch_rad)),
+        yaw_rad: from.yaw_rad + way * turn,
+        pitch_rad,
+        toe_pitch_rad,
+    }
+}
+
+/// The lowest point of the sole, from the ankle.
+fn lowest_m(build: &Build, pitch_rad: f64, toe_pitch_rad: f64) -> f64 {
+    let (sole, ankle) = (build.sole_m(), build.ankle_m());
+    let heel = turned(-ANKLE_SHARE * sole, -ankle, pitch_rad)[1];
+    let ball = turned((BALL_SHARE - ANKLE_SHARE) * sole, -ankle, pitch_rad)[1];
+    let toe = ball + turned((1.0 - BALL_SHARE) * sole, 0.0, toe_pitch_rad)[1];
+    heel.min(ball).min(toe)
+}
+
+/// A point ahead and above, turned toes up.
+fn turned(ahead_m: f64, up_m: f64, pitch_rad: f64) -> [f64; 2] {
+    let (sin, cos) = pitch_rad.sin_cos();
+    [ahead_m * cos - up_m * sin, ahead_m * sin + up_m * cos]
+}
+
+fn smoothstep(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}

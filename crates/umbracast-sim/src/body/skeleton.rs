@@ -1,0 +1,212 @@
+//! Bones and how they stand: a rigid motion for each, and legs bent so that feet reach where they shall.
+
+use umbracast::geometry::{DMat3, DVec2, DVec3};
+
+use super::build::Build;
+use super::gait::UpperBody;
+
+/// What carries the surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Bone {
+    Pelvis,
+    Thorax,
+    Head,
+    UpperArmLeft,
+    UpperArmRight,
+    ForearmLeft,
+    ForearmRight,
+    ThighLeft,
+    ThighRight,
+    ShankLeft,
+    ShankRight,
+    FootLeft,
+    FootRight,
+    ToesLeft,
+    ToesRight,
+}
+
+/// How many bones.
+pub const BONES: usize = 15;
+
+/// The motion of one bone: takes its points at rest to the site.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    rotation: DMat3,
+    shift_m: DVec3,
+}
+
+impl Motion {
+    /// The motion that turns a bone and brings its joint from `rest_m` to `joint_m`.
+    fn about(rotation: DMat3, rest_m: DVec3, joint_m: DVec3) -> Self {
+        Self { rotation, shift_m: joint_m - rotation * rest_m }
+    }
+
+    /// Where a point of the bone comes to lie.
+    pub fn point(&self, rest_m: DVec3) -> DVec3 {
+        self.rotation * rest_m + self.shift_m
+    }
+
+    fn then(&self, turn: &DMat3, shift_m: DVec3) -> Self {
+        Self { rotation: *turn * self.rotation, shift_m: *turn * self.shift_m + shift_m }
+    }
+}
+
+/// How a foot stands: ankle joint, direction, and pitch of the foot and of its toes (toes up positive).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FootPose {
+    /// The ankle joint in the site.
+    pub ankle_m: DVec3,
+    /// Where the toes point.
+    pub yaw_rad: f64,
+    /// Of the foot.
+    pub pitch_rad: f64,
+    /// Of the toes.
+    pub toe_pitch_rad: f64,
+}
+
+/// How the pelvis stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PelvisPose {
+    /// The middle between the hip joints in the site.
+    pub hips_m: DVec3,
+    /// Its turn and roll.
+    pub rotation: DMat3,
+}
+
+impl PelvisPose {
+    /// The pelvis over the body axis, the hip joints `hip_height_m` above the floor.
+    pub fn new(position_m: DVec2, heading_rad: f64, upper: &UpperBody, hip_height_m: f64) -> Self {
+        let sway =
+            DVec2::from_angle(heading_rad).rotate(DVec2::new(upper.pelvis_forward_m, upper.pelvis_left_m));
+        Self {
+            hips_m: (position_m + sway).extend(hip_height_m),
+            rotation: DMat3::from_rotation_z(heading_rad + upper.pelvis_yaw_rad)
+                * DMat3::from_rotation_x(upper.pelvis_list_rad),
+        }
+    }
+
+    /// The hip joint of a side, 1 left, -1 right.
+    pub fn hip_m(&self, build: &Build, side: f64) -> DVec3 {
+        self.hips_m + self.rotation * DVec3::new(0.0, side * build.hip_offset_m(), 0.0)
+    }
+}
+
+/// Every bone's motion at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    bones: [Motion; BONES],
+}
+
+impl Pose {
+    /// A body with the given pelvis and feet (left, right); trunk, arms and legs follow.
+    pub fn new(
+        build: &Build,
+        heading_rad: f64,
+        upper: &UpperBody,
+        pelvis: &PelvisPose,
+        feet: &[FootPose; 2],
+    ) -> Self {
+        let hips_rest = DVec3::new(0.0, 0.0, build.hip_height_m());
+        let pelvis_motion = Motion::about(pelvis.rotation, hips_rest, pelvis.hips_m);
+
+        let facing = DMat3::from_rotation_z(heading_rad);
+        let thorax_turn =
+            facing * DMat3::from_rotation_z(upper.thorax_yaw_rad) * DMat3::from_rotation_y(upper.tilt_rad);
+        let waist_rest = DVec3::new(0.0, 0.0, build.level_m(0.60));
+        let thorax = Motion::about(thorax_turn, waist_rest, pelvis_motion.point(waist_rest));
+        let neck_rest = DVec3::new(-0.01, 0.0, build.level_m(0.85));
+        // The head looks ahead and stays upright.
+        let head = Motion::about(facing, neck_rest, thorax.point(neck_rest));
+
+        let mut bones = [pelvis_motion; BONES];
+        bones[Bone::Thorax as usize] = thorax;
+        bones[Bone::Head as usize] = head;
+        for (i, side) in [1.0, -1.0].into_iter().enumerate() {
+            let arm = arm(build, side, &thorax, upper.shoulder_rad[i], upper.elbow_rad[i]);
+            bones[Bone::UpperArmLeft as usize + i] = arm[0];
+            bones[Bone::ForearmLeft as usize + i] = arm[1];
+            let leg = leg(build, side, pelvis.hip_m(build, side), heading_rad, &feet[i]);
+            bones[Bone::ThighLeft as usize + i] = leg[0];
+            bones[Bone::ShankLeft as usize + i] = leg[1];
+            bones[Bone::FootLeft as usize + i] = leg[2];
+            bones[Bone::ToesLeft as usize + i] = leg[3];
+        }
+        Self { bones }
+    }
+
+    /// Where a point of a bone at rest comes to lie.
+    pub fn point(&self, bone: Bone, rest_m: DVec3) -> DVec3 {
+        self.bones[bone as usize].point(rest_m)
+    }
+
+    /// The same pose turned about the vertical at `from_m` and moved over the floor to `to_m`.
+    #[must_use]
+    pub fn moved(&self, from_m: DVec2, turn_rad: f64, to_m: DVec2) -> Self {
+        let turn = DMat3::from_rotation_z(turn_rad);
+        let shift = to_m.extend(0.0) - turn * from_m.extend(0.0);
+        Self { bones: self.bones.map(|bone| bone.then(&turn, shift)) }
+    }
+}
+
+/// Upper arm and forearm, swung forward in the thorax's frame. The upper arm is spread just enough for the
+/// forearm to hang clear of the hips.
+fn arm(build: &Build, side: f64, thorax: &Motion, shoulder_rad: f64, elbow_rad: f64) -> [Motion; 2] {
+    let (offset, level) = build.shoulder_m();
+    let shoulder_rest = DVec3::new(0.0, side * offset, level);
+    let elbow_rest = DVec3::new(0.0, side * offset, build.elbow_height_m());
+    let clear = (build.hip_m[0] / 2.0 + 0.02).max(build.waist_m[0] / 2.0 + build.forearm_radius_m) - offset;
+    let spread = (clear / (level - build.elbow_height_m())).clamp(0.07, 0.30).asin();
+    let upper_turn =
+        thorax.rotation * DMat3::from_rotation_x(side * spread) * DMat3::from_rotation_y(-shoulder_rad);
+    let upper = Motion::about(upper_turn, shoulder_rest, thorax.point(shoulder_rest));
+    let fore_turn = thorax.rotation
+        * DMat3::from_rotation_x(side * 0.2 * spread)
+        * DMat3::from_rotation_y(-shoulder_rad - elbow_rad);
+    [upper, Motion::about(fore_turn, elbow_rest, upper.point(elbow_rest))]
+}
+
+/// Thigh, shank, foot and toes: two bones bent at the knee so that the ankle lies where the foot wants it.
+fn leg(build: &Build, side: f64, hip: DVec3, heading_rad: f64, foot: &FootPose) -> [Motion; 4] {
+    let (thigh, shank, y) = (build.thigh_m(), build.shank_m(), side * build.hip_offset_m());
+    let hip_rest = DVec3::new(0.0, y, build.hip_height_m());
+    let knee_rest = hip_rest - DVec3::new(0.0, 0.0, thigh);
+    let ankle_rest = DVec3::new(0.0, y, build.ankle_m());
+
+    let span = foot.ankle_m - hip;
+    let reach = span.length().clamp((thigh - shank).abs() + 0.05, 0.9999 * (thigh + shank));
+    let down = span.normalize();
+    let ankle = hip + down * reach;
+    // The knee bends forward, between where the body and the foot look.
+    let ahead = DVec2::from_angle(heading_rad) + DVec2::from_angle(foot.yaw_rad);
+    let hinge = ahead.extend(0.0).cross(down).normalize();
+    let bend = down.cross(hinge);
+    let along = (reach * reach + thigh * thigh - shank * shank) / (2.0 * reach);
+    let out = (thigh * thigh - along * along).max(0.0).sqrt();
+    let knee = hip + down * along + bend * out;
+
+    let bone = |upper: DVec3, lower: DVec3| {
+        let up = (upper - lower).normalize();
+        let y_axis = (hinge - up * hinge.dot(up)).normalize();
+        DMat3::from_cols(y_axis.cross(up), y_axis, up)
+    };
+    let foot_yaw = DMat3::from_rotation_z(foot.yaw_rad);
+    let ball_rest = ball_rest(build, y);
+    let foot_motion = Motion::about(foot_yaw * DMat3::from_rotation_y(-foot.pitch_rad), ankle_rest, ankle);
+    let toes = Motion::about(
+        foot_yaw * DMat3::from_rotation_y(-foot.toe_pitch_rad),
+        ball_rest,
+        foot_motion.point(ball_rest),
+    );
+    [
+        Motion::about(bone(hip, knee), hip_rest, hip),
+        Motion::about(bone(knee, ankle), knee_rest, knee),
+        foot_motion,
+        toes,
+    ]
+}
+
+/// Where toes bend: the ball of the foot, on the floor.
+fn ball_rest(build: &Build, y_m: f64) -> DVec3 {
+    DVec3::new((super::shape::BALL_SHARE - super::shape::ANKLE_SHARE) * build.sole_m(), y_m, 0.0)
+}
