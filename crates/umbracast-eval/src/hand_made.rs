@@ -1,7 +1,7 @@
 //! Small scenes with known answers, for the tests of the scores.
 
 use umbracast::{STEP_NS, STEPS};
-use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow};
+use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
 
 use crate::scene::SceneTruth;
 
@@ -45,4 +45,9 @@ pub fn truth_of(people: u32, frames: u64, blocked: impl Fn(u32, u64) -> bool) ->
 pub fn link_row(frame: u64, track: u64, blocked: bool) -> LinkRow {
     let p = if blocked { 1.0 } else { 0.0 };
     LinkRow { frame, track, blocked: [blocked; STEPS], p: [p; STEPS], ..LinkRow::default() }
+}
+
+/// A confirmed track that stands still.
+pub fn track_row(frame: u64, track: u64, x_m: f64, y_m: f64) -> TrackRow {
+    TrackRow { frame, track, x_m, y_m, confirmed: true, ..TrackRow::default() }
 }

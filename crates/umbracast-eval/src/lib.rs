@@ -13,3 +13,6 @@ pub mod displacement;
 pub mod links;
 pub mod casts;
 pub mod bootstrap;
+pub mod matching;
+pub mod identity;
+pub mod stage1;
