@@ -4,6 +4,25 @@
 //! Data flows one way: packets, scan, frame, foreground, clusters, detections, tracks, forecasts, blockages.
 //! [`pipeline::Pipeline::step`] is that sentence as code. The modules below stand in the same order, and each
 //! uses only what stands above it.
+//!
+//! ```
+//! use umbracast::{Config, Mode, Pipeline, lidar::Assembler, Health};
+//!
+//! let config = Config::for_mode(Mode::Default);
+//! let mut assembler = Assembler::new(&config.site)?;
+//! let mut pipeline = Pipeline::new(&config, None)?;
+//! let mut health = Health::default();
+//! # let packets: Vec<(usize, umbracast::lidar::Packet)> = Vec::new();
+//! for (sensor, packet) in &packets {
+//!     assembler.push(*sensor, packet, &mut health);
+//!     while let Some(frame) = assembler.pop() {
+//!         for link in &pipeline.step(&frame).blockages {
+//!             println!("track {} blocked within 300 ms: {:.2}", link.track, link.p[2]);
+//!         }
+//!     }
+//! }
+//! # Ok::<(), umbracast::Error>(())
+//! ```
 
 pub mod error;
 pub mod geometry;
@@ -30,3 +49,8 @@ pub const STEPS: usize = 9;
 pub const STEP_NS: i64 = 100_000_000;
 /// The same in seconds.
 pub const STEP_S: f64 = 0.1;
+
+/// The README's examples are tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

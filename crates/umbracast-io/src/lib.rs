@@ -4,4 +4,7 @@ mod lzf;
 pub mod pcap;
 pub mod pcd;
 pub mod rows;
+pub mod cdr;
+pub mod messages;
+pub mod recording;
 pub mod tables;

@@ -1,0 +1,303 @@
+//! Recordings: MCAP with ROS 2 CDR messages. Raw sensor packets are the record; poses, truth and (where asked
+//! for) clouds stand beside them, so that ROS 2, Foxglove and Rerun open the file.
+//!
+//! | topic | type |
+//! |---|---|
+//! | `/umbracast/config` | `std_msgs/msg/String`: the configuration as TOML, the first message |
+//! | `/tf_static` | `tf2_msgs/msg/TFMessage`: the sensors in the frame `site` |
+//! | `/NAME/packets` | `velodyne_msgs/msg/VelodyneScan`, one a frame and sensor |
+//! | `/NAME/points` | `sensor_msgs/msg/PointCloud2` |
+//! | `/truth/people`, `/truth/links` | `umbracast_msgs/msg/People`, `umbracast_msgs/msg/Links` |
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, BufWriter};
+use std::path::{Path, PathBuf};
+
+use mcap::records::MessageHeader;
+use umbracast::lidar::{Frame, Packet};
+use umbracast::{Error, Site};
+
+use crate::messages::{self, Schema};
+use crate::rows::{PeopleLinkRow, PeopleRow};
+
+const CONFIG_TOPIC: &str = "/umbracast/config";
+
+/// Writes a recording, in chunks of a frame or two.
+pub struct RecordingWriter {
+    path: PathBuf,
+    mcap: mcap::Writer<BufWriter<File>>,
+    site: Site,
+    /// By sensor.
+    packets: Vec<u16>,
+    /// By sensor; none where no clouds are asked for.
+    points: Vec<u16>,
+    people: u16,
+    links: u16,
+    sequence: u32,
+}
+
+impl RecordingWriter {
+    /// Starts a recording over whatever is there.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn create(path: &Path, config_toml: &str, site: &Site, clouds: bool) -> Result<Self, Error> {
+        let fail = |e: &dyn std::fmt::Display| Error::new(e.to_string()).within(path.display());
+        let file = BufWriter::new(File::create(path).map_err(|e| fail(&e))?);
+        // Packets hardly compress (a sixth), and a reader then needs no codec.
+        let mut mcap = mcap::WriteOptions::new()
+            .compression(None)
+            .profile("ros2")
+            .library(concat!("umbracast ", env!("CARGO_PKG_VERSION")))
+            .create(file)
+            .map_err(|e| fail(&e))?;
+        let mut channel = |topic: &str, schema: &Schema| -> Result<u16, Error> {
+            let id = mcap
+                .add_schema(schema.name, "ros2msg", schema.definition.as_bytes())
+                .map_err(|e| fail(&e))?;
+            mcap.add_channel(id, topic, "cdr", &BTreeMap::new()).map_err(|e| fail(&e))
+        };
+        let config = channel(CONFIG_TOPIC, &messages::CONFIG)?;
+        let transforms = channel("/tf_static", &messages::TRANSFORMS)?;
+        let packets = site
+            .sensors
+            .iter()
+            .map(|sensor| channel(&format!("/{}/packets", sensor.name), &messages::SCAN))
+            .collect::<Result<_, _>>()?;
+        let points = site
+            .sensors
+            .iter()
+            .filter(|_| clouds)
+            .map(|sensor| channel(&format!("/{}/points", sensor.name), &messages::CLOUD))
+            .collect::<Result<_, _>>()?;
+        let people = channel("/truth/people", &messages::PEOPLE)?;
+        let links = channel("/truth/links", &messages::LINKS)?;
+        let path = path.to_owned();
+        let mut writer = Self { path, mcap, site: site.clone(), packets, points, people, links, sequence: 0 };
+        writer.put(config, 0, &messages::text(config_toml))?;
+        writer.put(transforms, 0, &messages::transforms(site))?;
+        Ok(writer)
+    }
+
+    /// Packets that were sent up to `time_ns`, one list a sensor.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_packets(&mut self, time_ns: i64, packets: &[Vec<Packet>]) -> Result<(), Error> {
+        for (sensor, packets) in packets.iter().enumerate() {
+            if !packets.is_empty() {
+                let message = messages::scan(time_ns, &self.site.sensors[sensor].name, packets);
+                self.put(self.packets[sensor], time_ns, &message)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The clouds of a frame, where [`Self::create`] was asked for them.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_clouds(&mut self, frame: &Frame) -> Result<(), Error> {
+        for scan in &frame.scans {
+            if let Some(&channel) = self.points.get(scan.sensor) {
+                let start_ns = frame.time_ns - umbracast::STEP_NS;
+                let message = messages::cloud(start_ns, &self.site.sensors[scan.sensor].name, scan);
+                self.put(channel, frame.time_ns, &message)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The truth of one frame.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_truth(
+        &mut self,
+        time_ns: i64,
+        frame: u64,
+        people: &[PeopleRow],
+        links: &[PeopleLinkRow],
+    ) -> Result<(), Error> {
+        self.put(self.people, time_ns, &messages::people(time_ns, frame, people))?;
+        self.put(self.links, time_ns, &messages::links(time_ns, frame, links, &self.site))
+    }
+
+    /// Writes the index and the end of the file.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn finish(mut self) -> Result<(), Error> {
+        self.mcap.finish().map_err(|e| Error::new(e.to_string()).within(self.path.display()))?;
+        Ok(())
+    }
+
+    fn put(&mut self, channel_id: u16, time_ns: i64, message: &[u8]) -> Result<(), Error> {
+        let time = time_ns.max(0) as u64;
+        let header =
+            MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
+        self.sequence += 1;
+        self.mcap
+            .write_to_known_channel(&header, message)
+            .map_err(|e| Error::new(e.to_string()).within(self.path.display()))
+    }
+}
+
+/// What a reader finds in a recording, in the order of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    /// The configuration that the recording was made with, as TOML.
+    Config(String),
+    /// Packets of the sensor of this name.
+    Packets(String, Vec<Packet>),
+    /// Anything else: topic, type, bytes.
+    Other(String, String, usize),
+}
+
+/// Reads a recording from its beginning, one message at a time.
+pub struct RecordingReader {
+    messages: mcap::io::MessageReader<BufReader<File>>,
+    path: PathBuf,
+    begun: bool,
+    lost: Option<String>,
+}
+
+impl RecordingReader {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// A file that is not there.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let file = File::open(path).map_err(|e| Error::new(e.to_string()).within(path.display()))?;
+        let messages = mcap::io::MessageReader::new(BufReader::new(file));
+        Ok(Self { messages, path: path.to_owned(), begun: false, lost: None })
+    }
+
+    /// The next message; `None` at the end, also at the end of what is whole in a damaged file: see
+    /// [`Self::lost`].
+    ///
+    /// # Errors
+    /// A file that is no recording at all.
+    pub fn next_entry(&mut self) -> Result<Option<Entry>, Error> {
+        match self.messages.next() {
+            None => Ok(None),
+            Some(Ok(message)) => {
+                self.begun = true;
+                Ok(Some(self.understand(&message)))
+            }
+            Some(Err(error)) if self.begun => {
+                self.lost = Some(format!("{}: {error}; everything before is used", self.path.display()));
+                Ok(None)
+            }
+            Some(Err(error)) => {
+                Err(Error::new(format!("expected an MCAP recording, found {}", plain(&error)))
+                    .within(self.path.display()))
+            }
+        }
+    }
+
+    /// What was lost at the end of a damaged file, if anything.
+    pub fn lost(&self) -> Option<&str> {
+        self.lost.as_deref()
+    }
+
+    fn understand(&mut self, message: &mcap::Message<'_>) -> Entry {
+        let topic = &message.channel.topic;
+        let kind = message.channel.schema.as_ref().map_or(String::new(), |schema| schema.name.clone());
+        if topic == CONFIG_TOPIC {
+            let text = crate::cdr::Decoder::new(&message.data).and_then(|mut d| d.string());
+            if let Some(text) = text {
+                return Entry::Config(text.to_owned());
+            }
+        }
+        if kind == messages::SCAN.name {
+            let sensor = topic.trim_matches('/').trim_end_matches("packets").trim_end_matches('/');
+            if let Some(packets) = messages::read_scan(&message.data) {
+                return Entry::Packets(sensor.to_owned(), packets);
+            }
+        }
+        Entry::Other(topic.clone(), kind, message.data.len())
+    }
+}
+
+fn plain(error: &mcap::McapError) -> String {
+    match error {
+        mcap::McapError::BadMagic => "other bytes at its beginning".to_owned(),
+        mcap::McapError::UnexpectedEof => "its end before the first message".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use umbracast::Config;
+
+    fn packet(k: u8) -> Packet {
+        Packet { time_ns: i64::from(k) * 1000, payload: vec![k; messages::PACKET_BYTES] }
+    }
+
+    fn record(path: &Path) {
+        let config = Config::default();
+        let mut writer =
+            RecordingWriter::create(path, &config.to_toml(), &config.site, false).expect("creates");
+        for k in 0..8 {
+            let time_ns = i64::from(k) * umbracast::STEP_NS;
+            writer.write_packets(time_ns, &[vec![packet(k); 400], vec![packet(k + 100)]]).expect("writes");
+            writer.write_truth(time_ns, k.into(), &[PeopleRow::default()], &[]).expect("writes");
+        }
+        writer.finish().expect("finishes");
+    }
+
+    fn read(path: &Path) -> Result<(Vec<Entry>, bool), Error> {
+        let mut reader = RecordingReader::open(path)?;
+        let mut entries = Vec::new();
+        while let Some(entry) = reader.next_entry()? {
+            entries.push(entry);
+        }
+        Ok((entries, reader.lost().is_some()))
+    }
+
+    #[test]
+    fn packets_and_configuration_survive() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.mcap");
+        record(&path);
+        let (entries, lost) = read(&path).unwrap();
+        assert!(!lost);
+        assert_eq!(entries[0], Entry::Config(Config::default().to_toml()));
+        let east: Vec<&Vec<Packet>> = entries
+            .iter()
+            .filter_map(|e| match e {
+                Entry::Packets(name, packets) if name == "lidar_east" => Some(packets),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(east.len(), 8);
+        assert_eq!(*east[3], vec![packet(3); 400]);
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_gives_what_stands_before_the_cut() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.mcap");
+        record(&path);
+        let bytes = std::fs::read(&path).unwrap();
+        let (whole, _) = read(&path).unwrap();
+        let mut before = 0;
+        for cut in (0..bytes.len()).step_by(bytes.len() / 61) {
+            let path = directory.path().join("cut.mcap");
+            std::fs::write(&path, &bytes[..cut]).unwrap();
+            match read(&path) {
+                Ok((entries, lost)) => {
+                    assert!(lost && entries.len() >= before, "cut at {cut}");
+                    assert_eq!(entries[..], whole[..entries.len()], "cut at {cut}");
+                    before = entries.len();
+                }
+                Err(error) => assert!(before == 0 && error.to_string().contains("expected"), "{error}"),
+            }
+        }
+        assert!(before > whole.len() / 2);
+    }
+}
