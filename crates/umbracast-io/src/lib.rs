@@ -8,3 +8,4 @@ pub mod cdr;
 pub mod messages;
 pub mod recording;
 pub mod tables;
+pub mod trajectories;

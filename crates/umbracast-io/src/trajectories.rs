@@ -1,0 +1,350 @@
+//! Files of recorded people: TrajNet++ ndjson, CSV, PeTrack text.
+//!
+//! The format is told by the content: lines that begin with `{`, a header with commas, or else numbers.
+//!
+//! | format | rows | time |
+//! |---|---|---|
+//! | TrajNet++ | `{"track": {"f", "p", "x", "y"}}` | `fps` of the scenes is the rate of a person's rows, whatever the frame numbers step by |
+//! | CSV | columns `t_s,id,x_m,y_m[,height_m]` in any order | `t_s` |
+//! | CSV of PedPy and Madras | columns `frame,id,x/m,y/m[,z/m]` (`t/s` is rounded and not read) | `fps` to be given |
+//! | PeTrack | `id frame x y [z]`, blanks or tabs, `#` comments | `# framerate:` or `fps` to be given |
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use umbracast::Error;
+
+/// Faster than people move: half of all steps faster than this is a wrong unit or rate.
+const MOST_MPS: f64 = 15.0;
+/// Values of z that can be somebody's height; others are not read as such.
+const HEIGHTS_M: std::ops::RangeInclusive<f64> = 1.0..=2.3;
+
+/// One recorded person.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedPerson {
+    /// As in the file.
+    pub id: i64,
+    /// Time in seconds, x and y in metres; at least one, and times increase.
+    pub samples: Vec<[f64; 3]>,
+    /// Standing height where the file tells it.
+    pub height_m: Option<f64>,
+}
+
+/// Unit of length of a PeTrack file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// Metres.
+    Metre,
+    /// Centimetres.
+    Centimetre,
+}
+
+/// What a file may leave open. What is given here goes before what the file says.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Options {
+    /// Frames per second of one frame number (TrajNet++: of a person's rows).
+    pub fps: Option<f64>,
+    /// Of x, y and z in PeTrack text; metres if nobody says.
+    pub unit: Option<Unit>,
+}
+
+/// One row, whatever the format.
+struct Row {
+    line: usize,
+    id: i64,
+    /// Seconds, or a frame number still to be divided by the rate.
+    time: f64,
+    x_m: f64,
+    y_m: f64,
+    height_m: Option<f64>,
+}
+
+impl Unit {
+    fn metres(self) -> f64 {
+        match self {
+            Self::Metre => 1.0,
+            Self::Centimetre => 0.01,
+        }
+    }
+}
+
+impl std::str::FromStr for Unit {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        match name {
+            "m" => Ok(Self::Metre),
+            "cm" => Ok(Self::Centimetre),
+            _ => Err(Error::new(format!("unit: expected m or cm, found {name:?}"))),
+        }
+    }
+}
+
+/// Reads a file of recorded people, in the order of their ids.
+///
+/// # Errors
+/// A file that cannot be read, or as [`parse`], with its path.
+pub fn read(path: &Path, options: Options) -> Result<Vec<RecordedPerson>, Error> {
+    let bytes = std::fs::read(path).map_err(|e| Error::new(format!("{}: {e}", path.display())))?;
+    // Headers may hold Latin-1, where each byte is its code point; everything that is read is ASCII.
+    let text: String = match String::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(e) => e.into_bytes().into_iter().map(char::from).collect(),
+    };
+    parse(&text, options, &path.display().to_string())
+}
+
+/// The same from text; `file` names it in errors.
+///
+/// # Errors
+/// With file and line: a row that does not parse, two rows of one person at one time, a rate that is neither in
+/// the file nor given; steps that no person makes (a wrong unit or rate).
+pub fn parse(text: &str, options: Options, file: &str) -> Result<Vec<RecordedPerson>, Error> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
+    let rows = match first {
+        None => return Err(Error::new(format!("{file}: expected rows of recorded people, found none"))),
+        Some(line) if line.starts_with('{') => trajnet_rows(text, options),
+        Some(line) if line.contains(',') => csv_rows(text, options),
+        Some(_) => petrack_rows(text, options),
+    };
+    let people = rows.and_then(people).map_err(|e| e.within(file))?;
+    plausible(&people).map_err(|e| e.within(file))?;
+    Ok(people)
+}
+
+fn at_line(line: usize, story: impl std::fmt::Display) -> Error {
+    Error::new(format!("line {line}: {story}"))
+}
+
+/// A finite number.
+fn number(text: &str, what: &str, line: usize) -> Result<f64, Error> {
+    let value = text.trim().parse().ok().filter(|v: &f64| v.is_finite());
+    value.ok_or_else(|| at_line(line, format!("{what}: expected a number, found {text:?}")))
+}
+
+/// A whole number, which some programs write with a decimal point.
+fn whole(text: &str, what: &str, line: usize) -> Result<i64, Error> {
+    let value = number(text, what, line)?;
+    // Beyond 2^53 neighbours are no longer told apart.
+    if value.fract() != 0.0 || value.abs() > 9.0e15 {
+        return Err(at_line(line, format!("{what}: expected a whole number, found {text:?}")));
+    }
+    Ok(value as i64)
+}
+
+/// A rate that can divide.
+fn rate(fps: f64, place: &str) -> Result<f64, Error> {
+    if fps.is_finite() && fps > 0.0 {
+        return Ok(fps);
+    }
+    Err(Error::new(format!("{place}: expected frames per second above 0, found {fps}")))
+}
+
+fn missing_rate(found: &str) -> Error {
+    Error::new(format!("expected frames per second, found {found}: give them (--fps)"))
+}
+
+fn seconds(mut rows: Vec<Row>, fps: f64) -> Vec<Row> {
+    rows.iter_mut().for_each(|row| row.time /= fps);
+    rows
+}
+
+#[derive(Deserialize)]
+struct TrajnetLine {
+    track: Option<TrajnetTrack>,
+    scene: Option<TrajnetScene>,
+}
+
+#[derive(Deserialize)]
+struct TrajnetTrack {
+    f: i64,
+    p: i64,
+    x: f64,
+    y: f64,
+}
+
+#[derive(Deserialize)]
+struct TrajnetScene {
+    fps: Option<f64>,
+}
+
+fn trajnet_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
+    let mut rows = Vec::new();
+    let mut stated: Option<f64> = None;
+    for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let parsed: TrajnetLine = serde_json::from_str(line).map_err(|e| {
+            at_line(i + 1, format!("expected a TrajNet++ scene or track, found {}: {e}", shorten(line)))
+        })?;
+        if let Some(track) = parsed.track {
+            let (x_m, y_m) = (track.x, track.y);
+            rows.push(Row { line: i + 1, id: track.p, time: track.f as f64, x_m, y_m, height_m: None });
+        }
+        let Some(fps) = parsed.scene.and_then(|scene| scene.fps) else { continue };
+        if stated.is_some_and(|before| before != fps) {
+            let story = format!("expected the rate of the scenes before, {stated:?}, found {fps}");
+            return Err(at_line(i + 1, story));
+        }
+        stated = Some(fps);
+    }
+    let fps = options.fps.or(stated).ok_or_else(|| missing_rate("no scene with fps"))?;
+    let step = frame_step(&rows).unwrap_or(1.0);
+    Ok(seconds(rows, rate(fps, "fps")? * step))
+}
+
+/// By how much the frame number grows from row to row of a person: the commonest value.
+fn frame_step(rows: &[Row]) -> Option<f64> {
+    let mut frames: BTreeMap<i64, Vec<i64>> = BTreeMap::new();
+    for row in rows {
+        frames.entry(row.id).or_default().push(row.time as i64);
+    }
+    let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    for of_person in frames.values_mut() {
+        of_person.sort_unstable();
+        for pair in of_person.windows(2).filter(|pair| pair[1] > pair[0]) {
+            *counts.entry(pair[1] - pair[0]).or_default() += 1;
+        }
+    }
+    let commonest = counts.into_iter().max_by_key(|&(step, count)| (count, std::cmp::Reverse(step)))?;
+    Some(commonest.0 as f64)
+}
+
+fn csv_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .map(|(i, line)| (i + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let Some((header_line, header)) = lines.next() else { return Ok(Vec::new()) };
+    let columns: Vec<&str> = header.split(',').map(str::trim).collect();
+    let column = |names: &[&str]| columns.iter().position(|column| names.contains(column));
+    let needed = |names: &[&str]| {
+        let story = || format!("expected the columns t_s,id,x_m,y_m[,height_m], found {header:?}");
+        column(names).ok_or_else(|| at_line(header_line, story()))
+    };
+    let (id, x, y) = (needed(&["id"])?, needed(&["x_m", "x/m"])?, needed(&["y_m", "y/m"])?);
+    let height = column(&["height_m", "z/m"]);
+    let (time, fps) = match (column(&["t_s"]), column(&["frame"]), options.fps) {
+        (Some(time), _, _) => (time, 1.0),
+        (None, Some(frame), Some(fps)) => (frame, rate(fps, "fps")?),
+        (None, Some(_), None) => return Err(missing_rate("a column of frame numbers")),
+        (None, None, _) => (needed(&["t_s"])?, 1.0),
+    };
+
+    let mut rows = Vec::new();
+    for (line, text) in lines {
+        let cells: Vec<&str> = text.split(',').map(str::trim).collect();
+        if cells.len() != columns.len() {
+            let story =
+                format!("expected {} values, found {}: {}", columns.len(), cells.len(), shorten(text));
+            return Err(at_line(line, story));
+        }
+        let height_m = match height.map(|column| cells[column]).filter(|cell| !cell.is_empty()) {
+            Some(cell) => Some(number(cell, "height", line)?),
+            None => None,
+        };
+        rows.push(Row {
+            line,
+            id: whole(cells[id], "id", line)?,
+            time: number(cells[time], columns[time], line)?,
+            x_m: number(cells[x], "x", line)?,
+            y_m: number(cells[y], "y", line)?,
+            height_m,
+        });
+    }
+    Ok(seconds(rows, fps))
+}
+
+fn petrack_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
+    let (mut fps, mut unit) = (options.fps, options.unit);
+    let mut rows = Vec::new();
+    for (line, text) in text.lines().enumerate().map(|(i, text)| (i + 1, text.trim())) {
+        if let Some(comment) = text.strip_prefix('#').map(str::trim) {
+            if let Some(stated) = comment.strip_prefix("framerate:") {
+                let value = stated.trim().trim_end_matches("fps");
+                fps = fps.or(Some(number(value, "framerate", line)?));
+            }
+            let units = [("x/cm", Unit::Centimetre), ("x/m", Unit::Metre)];
+            let stated = units.iter().find(|(name, _)| comment.split_whitespace().any(|word| word == *name));
+            unit = unit.or(stated.map(|&(_, unit)| unit));
+            continue;
+        }
+        if text.is_empty() {
+            continue;
+        }
+        let cells: Vec<&str> = text.split_whitespace().collect();
+        if !(4..=5).contains(&cells.len()) {
+            return Err(at_line(line, format!("expected `id frame x y [z]`, found {}", shorten(text))));
+        }
+        let height_m = match cells.get(4) {
+            Some(cell) => Some(number(cell, "z", line)?),
+            None => None,
+        };
+        rows.push(Row {
+            line,
+            id: whole(cells[0], "id", line)?,
+            time: whole(cells[1], "frame", line)? as f64,
+            x_m: number(cells[2], "x", line)?,
+            y_m: number(cells[3], "y", line)?,
+            height_m,
+        });
+    }
+    // The unit may stand after rows have begun.
+    let scale = unit.unwrap_or(Unit::Metre).metres();
+    for row in &mut rows {
+        row.x_m *= scale;
+        row.y_m *= scale;
+        row.height_m = row.height_m.map(|z| z * scale);
+    }
+    let fps = fps.ok_or_else(|| missing_rate("no `# framerate:` line"))?;
+    Ok(seconds(rows, rate(fps, "framerate")?))
+}
+
+/// Sorts rows by person and time.
+fn people(mut rows: Vec<Row>) -> Result<Vec<RecordedPerson>, Error> {
+    rows.sort_by(|a, b| (a.id, a.time).partial_cmp(&(b.id, b.time)).unwrap_or(std::cmp::Ordering::Equal));
+    // The same row twice says nothing new: scenes of TrajNet++ overlap.
+    rows.dedup_by(|b, a| (a.id, a.time, a.x_m, a.y_m) == (b.id, b.time, b.x_m, b.y_m));
+    let mut people = Vec::new();
+    for of_person in rows.chunk_by(|a, b| a.id == b.id) {
+        if let Some(pair) = of_person.windows(2).find(|pair| pair[0].time == pair[1].time) {
+            let (id, time, first) = (pair[0].id, pair[0].time, pair[0].line);
+            let story =
+                format!("expected one place of person {id} at {time} s, found another in line {first}");
+            return Err(at_line(pair[1].line, story));
+        }
+        let mut heights: Vec<f64> = of_person.iter().filter_map(|row| row.height_m).collect();
+        heights.sort_by(f64::total_cmp);
+        // A head's z sways with the steps; its middle is the person's.
+        let middle = heights.get(heights.len() / 2).copied();
+        people.push(RecordedPerson {
+            id: of_person[0].id,
+            samples: of_person.iter().map(|row| [row.time, row.x_m, row.y_m]).collect(),
+            height_m: middle.filter(|height| HEIGHTS_M.contains(height)),
+        });
+    }
+    Ok(people)
+}
+
+/// A wrong unit or rate shows in the speeds.
+fn plausible(people: &[RecordedPerson]) -> Result<(), Error> {
+    let mut speeds: Vec<f64> = people
+        .iter()
+        .flat_map(|person| person.samples.windows(2))
+        .map(|s| (s[1][1] - s[0][1]).hypot(s[1][2] - s[0][2]) / (s[1][0] - s[0][0]))
+        .collect();
+    speeds.sort_by(f64::total_cmp);
+    match speeds.get(speeds.len() / 2) {
+        Some(&median) if median > MOST_MPS => Err(Error::new(format!(
+            "expected people on foot, found a median speed of {median:.0} m/s: \
+             give the unit (--unit cm) or the rate (--fps)"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The beginning of a line, for an error.
+fn shorten(line: &str) -> String {
+    format!("{:?}", line.chars().take(60).collect::<String>())
+}

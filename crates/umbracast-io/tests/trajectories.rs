@@ -1,0 +1,177 @@
+//! Files of recorded people: small samples of each format, and the real ones where `UMBRACAST_DATA` tells where
+//! they are.
+
+use std::path::PathBuf;
+
+use umbracast_io::trajectories::{Options, RecordedPerson, Unit, parse, read};
+use umbracast_sim::crowd::{Recorded, replay};
+
+/// A folder or file of the real data; prints that the test skips where there is none.
+fn data(path: &str) -> Option<PathBuf> {
+    let found = std::env::var_os("UMBRACAST_DATA").map(|root| PathBuf::from(root).join(path));
+    if found.is_none() {
+        println!("skipped: UMBRACAST_DATA is not set, {path} not read");
+    }
+    found
+}
+
+fn parse_plain(text: &str) -> Result<Vec<RecordedPerson>, String> {
+    parse(text, Options::default(), "file").map_err(|e| e.to_string())
+}
+
+fn refused(text: &str) -> String {
+    parse_plain(text).unwrap_err()
+}
+
+#[test]
+fn trajnet_rows_take_their_time_from_the_rate_of_rows() {
+    // Frame numbers step by 10, rows come at 2.5 Hz; the second person misses a row.
+    let text = r#"{"scene": {"id": 0, "p": 1, "s": 10, "e": 30, "fps": 2.5, "tag": [3, [2]]}}
+{"track": {"f": 10, "p": 1, "x": 1.5, "y": 0.0}}
+{"track": {"f": 10, "p": 2, "x": 0.0, "y": 0.0}}
+{"track": {"f": 20, "p": 1, "x": 1.0, "y": 0.25}}
+{"track": {"f": 30, "p": 1, "x": 0.5, "y": 0.5}}
+{"track": {"f": 30, "p": 2, "x": 0.0, "y": 1.0}}
+{"track": {"f": 30, "p": 2, "x": 0.0, "y": 1.0}}
+{"track": {"f": 30, "p": 3, "x": 9.0, "y": 9.0}}
+"#;
+    let people = parse_plain(text).unwrap();
+    assert_eq!(people.iter().map(|p| p.id).collect::<Vec<_>>(), [1, 2, 3]);
+    assert_eq!(people[0].samples, [[0.4, 1.5, 0.0], [0.8, 1.0, 0.25], [1.2, 0.5, 0.5]]);
+    assert_eq!(people[1].samples, [[0.4, 0.0, 0.0], [1.2, 0.0, 1.0]]);
+    assert_eq!(people[2].samples, [[1.2, 9.0, 9.0]]);
+}
+
+#[test]
+fn csv_columns_are_found_by_name() {
+    let text =
+        "\u{feff}id,t_s,x_m,y_m,height_m\r\n7,0.0,1,2,1.82\r\n7,0.1,1.1,2,\r\n3,0.0,5,5,\r\n3,0.1,5,5,\r\n";
+    let people = parse_plain(text).unwrap();
+    let samples = vec![[0.0, 5.0, 5.0], [0.1, 5.0, 5.0]];
+    assert_eq!(people[0], RecordedPerson { id: 3, samples, height_m: None });
+    assert_eq!(people[1].height_m, Some(1.82));
+    assert!(parse_plain("t_s,id,x_m,y_m\n0,1,0,0\n1,1,1,0\n").is_ok(), "height is optional");
+
+    let madras = "frame,t/s,id,x/m,y/m,z/m\n2,0.1,5,-2.172,5.102,1.8\n3,0.1,5,-2.201,5.107,1.8\n";
+    assert!(refused(madras).contains("frames per second"));
+    let people = parse(madras, Options { fps: Some(10.0), unit: None }, "file").unwrap();
+    assert_eq!(people[0].samples[1], [0.3, -2.201, 5.107]);
+}
+
+#[test]
+fn petrack_headers_tell_rate_and_unit_and_options_go_before_them() {
+    let text =
+        "# framerate: 25 fps\n# id frame x/cm y/cm z/cm\n1 50 -206.5 100 180\n1\t51\t-205.0\t100\t180\n";
+    let people = parse_plain(text).unwrap();
+    assert_eq!(people[0].samples, [[2.0, -2.065, 1.0], [2.04, -2.05, 1.0]]);
+    assert_eq!(people[0].height_m, Some(1.8));
+
+    let bare = "1 50 -2.5 1\n1 51 -2.25 1\n";
+    assert!(refused(bare).contains("--fps"));
+    let people = parse(bare, Options { fps: Some(10.0), unit: None }, "file").unwrap();
+    assert_eq!((people[0].samples[0], people[0].height_m), ([5.0, -2.5, 1.0], None));
+
+    let options = Options { fps: Some(50.0), unit: Some(Unit::Metre) };
+    let people = parse("# framerate: 25\n# x/cm\n1 50 1 1 1.7\n1 51 1.1 1 1.7\n", options, "file").unwrap();
+    assert_eq!(people[0].samples[0], [1.0, 1.0, 1.0]);
+}
+
+#[test]
+fn headers_in_latin_1_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("people.txt");
+    std::fs::write(&path, b"# framerate: 25\n# J\xfclich\n1 0 0 0\n1 1 0.05 0\n").unwrap();
+    assert_eq!(read(&path, Options::default()).unwrap().len(), 1);
+}
+
+#[test]
+fn what_is_wrong_is_told_with_file_line_expected_and_found() {
+    for (text, story) in [
+        ("", "file: expected rows of recorded people, found none"),
+        (
+            "t_s,id,x_m\n0,1,2\n",
+            "file: line 1: expected the columns t_s,id,x_m,y_m[,height_m], found \"t_s,id,x_m\"",
+        ),
+        ("t_s,id,x_m,y_m\n0,1,2\n", "file: line 2: expected 4 values, found 3"),
+        ("t_s,id,x_m,y_m\n0,1,2,3\n1,1,zwei,3\n", "file: line 3: x: expected a number, found \"zwei\""),
+        ("t_s,id,x_m,y_m\n0,1,2,inf\n", "file: line 2: y: expected a number, found \"inf\""),
+        ("t_s,id,x_m,y_m\n0,1.5,2,3\n", "file: line 2: id: expected a whole number, found \"1.5\""),
+        (
+            "t_s,id,x_m,y_m\n0,1,2,3\n0,1,2,4\n",
+            "file: line 3: expected one place of person 1 at 0 s, found another in line 2",
+        ),
+        (
+            "# framerate: 0\n1 1 0 0\n1 2 0 0\n",
+            "file: framerate: expected frames per second above 0, found 0",
+        ),
+        ("# framerate: 25\n1 1 0\n", "file: line 2: expected `id frame x y [z]`, found \"1 1 0\""),
+        ("{\"track\": {\"f\": 1}}\n", "file: line 1: expected a TrajNet++ scene or track"),
+        (
+            "{\"track\": {\"f\":1,\"p\":1,\"x\":0,\"y\":0}}\n",
+            "file: expected frames per second, found no scene with fps",
+        ),
+        (
+            "# framerate: 25\n1 1 0 0\n1 2 5 0\n",
+            "file: expected people on foot, found a median speed of 125 m/s",
+        ),
+    ] {
+        let found = refused(text);
+        assert!(found.starts_with(story), "{found}");
+    }
+    let missing = read("no/such/file".as_ref(), Options::default()).unwrap_err().to_string();
+    assert!(missing.starts_with("no/such/file: "), "{missing}");
+}
+
+#[test]
+fn real_files_hold_the_people_their_readmes_count() {
+    let Some(root) = data("") else { return };
+    let fps = |fps| Options { fps: Some(fps), unit: None };
+    let without = Options::default();
+    let centimetres = Options { fps: Some(25.0), unit: Some(Unit::Centimetre) };
+    // File, options, people, seconds from the first to the last sample.
+    for (file, options, people, span_s) in [
+        ("circle_antipode/circle-10m-16-1.txt", without, 16, Some(12.8)),
+        ("circle_antipode/circle-10m-64-1xx.txt", centimetres, 64, Some(16.96)),
+        ("pedpy/traj_UNI_CORR_500_01.txt", without, 148, Some(75.52)),
+        ("pedpy/030_c_56_h0.txt", without, 75, Some(64.76)),
+        ("madras/Topview_1A.csv", fps(10.0), 85, Some(29.6)),
+        ("trajnetpp/biwi_hotel.ndjson", without, 263, None),
+        ("trajnetpp/lcas.ndjson", without, 304, None),
+    ] {
+        let found = read(&root.join(file), options).unwrap();
+        assert_eq!(found.len(), people, "{file}");
+        let times = || found.iter().flat_map(|person| person.samples.iter().map(|s| s[0]));
+        let span = times().fold(f64::MIN, f64::max) - times().fold(f64::MAX, f64::min);
+        assert!(span_s.is_none_or(|expected| (span - expected).abs() < 0.001), "{file}: {span} s");
+    }
+    let wrong_unit = read(&root.join("circle_antipode/circle-10m-64-1xx.txt"), fps(25.0)).unwrap_err();
+    assert!(wrong_unit.to_string().contains("--unit cm"), "{wrong_unit}");
+}
+
+#[test]
+fn real_people_walk_again() {
+    let Some(file) = data("circle_antipode/circle-10m-16-1.txt") else { return };
+    let people = read(&file, Options::default()).unwrap();
+    let recorded: Vec<Recorded> =
+        people.iter().map(|p| Recorded { samples: &p.samples, height_m: p.height_m }).collect();
+    let crowd = replay(&recorded, 0.12).unwrap();
+    assert_eq!(crowd.trajectories.len(), 16);
+    assert_eq!(crowd.duration_ns, 12_800_000_000);
+
+    let (mut squares, mut samples, mut fastest) = (0.0, 0, 0.0_f64);
+    for (way, person) in crowd.trajectories.iter().zip(&people) {
+        assert!((9.0..11.0).contains(&way.positions_m[0].length()), "starts on the circle of 10 m");
+        assert!(way.height_m.is_some_and(|height| (1.6..=1.8).contains(&height)));
+        for [time_s, x, y] in &person.samples {
+            let time_ns = ((time_s - people[0].samples[0][0]) * 1e9).round() as i64;
+            let (position, velocity) = way.at(time_ns).unwrap();
+            squares += (position.x - x).powi(2) + (position.y - y).powi(2);
+            samples += 1;
+            fastest = fastest.max(velocity.length());
+        }
+    }
+    // The tracker's own noise is 3.4 cm; its jumps of 0.4 m in a frame would be 10 m/s. Some people run.
+    let rms_m = (squares / f64::from(samples)).sqrt();
+    assert!(rms_m < 0.035, "{rms_m} m");
+    assert!(fastest < 5.0, "{fastest} m/s");
+}
