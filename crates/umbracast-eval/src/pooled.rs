@@ -1,0 +1,268 @@
+//! The scores: sums of all scenes pooled, by preset and together, with intervals by bootstrap over scenes.
+
+use serde::Serialize;
+use umbracast::{Health, Mode, STEPS};
+
+use crate::bootstrap::{Bootstrap, Pooled};
+use crate::displacement::Displacement;
+use crate::score::{Predictor, SceneScore};
+use crate::stage1::Stage1;
+use crate::tally::{Bin, Counts, LinkTally};
+
+/// The group of all scenes, where there are several presets.
+pub const ALL: &str = "all";
+
+/// A score and where it lies in 95 % of resamples of the scenes. Null where it is not defined.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Of all scenes pooled.
+    pub value: Option<f64>,
+    /// Lower and upper end; null with a single scene.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// Everything that tables, figures and the report show.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Scores {
+    /// One a preset, in the order of the scenes, then [`ALL`] where there are several.
+    pub groups: Vec<Group>,
+}
+
+/// Scenes that are pooled.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Group {
+    /// The preset, the file replayed, or [`ALL`].
+    pub name: String,
+    /// How many scenes.
+    pub scenes: usize,
+    /// Frames of all of them.
+    pub frames: u64,
+    /// Stage 3: one a predictor and access point.
+    pub links: Vec<LinkScores>,
+    /// Stages 1 and 2: one a mode.
+    pub modes: Vec<ModeScores>,
+    /// Mean displacement of constant velocity from the true state, by step, metres.
+    pub constant_velocity_m: Vec<Option<f64>>,
+}
+
+/// Stage 3 of one predictor at one access point.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LinkScores {
+    /// Null for baselines that need no mode.
+    pub mode: Option<Mode>,
+    /// Who.
+    pub predictor: &'static str,
+    /// The access point's name.
+    pub access_point: String,
+    /// Windows 1..=9.
+    pub windows: Vec<WindowScores>,
+}
+
+/// Stage 3 for one window.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WindowScores {
+    /// How many steps.
+    pub w: usize,
+    /// True and false, positive and negative.
+    pub counts: Counts,
+    /// The same of the instances in sight at `t_e`.
+    pub onset_counts: Counts,
+    /// Share of instances blocked.
+    pub base_rate: Estimate,
+    /// Share said rightly.
+    pub accuracy: Estimate,
+    /// Of those said blocked, the share that was.
+    pub precision: Estimate,
+    /// Of those blocked, the share that was said.
+    pub recall: Estimate,
+    /// Harmonic mean of the two.
+    pub f1: Estimate,
+    /// The same over instances in sight at `t_e`.
+    pub onset_f1: Estimate,
+    /// Average precision.
+    pub auprc: Option<f64>,
+    /// Mean squared error of the probability.
+    pub brier: Option<f64>,
+    /// Expected calibration error, 15 bins.
+    pub ece: Option<f64>,
+    /// Of onsets warned of: median time from the start of the unbroken warning to the onset.
+    pub lead_median_s: Option<f64>,
+    /// Share of onsets warned of.
+    pub lead_warned: Option<f64>,
+    /// For the reliability diagram.
+    pub bins: Vec<Bin>,
+}
+
+/// Stages 1 and 2 of one mode.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ModeScores {
+    /// Whose.
+    pub mode: Mode,
+    /// Share of persons in frames with a confirmed track within the gate.
+    pub recall: Estimate,
+    /// Share of confirmed tracks in frames with a person.
+    pub precision: Estimate,
+    /// CLEAR.
+    pub mota: Estimate,
+    /// Identity.
+    pub idf1: Estimate,
+    /// Higher-order tracking accuracy, similarity 1 - d / 1 m.
+    pub hota: Estimate,
+    /// Persons whose track changed, a scene.
+    pub switches_per_scene: Estimate,
+    /// Of the 2-D position error of matches.
+    pub position_rmse_m: Estimate,
+    /// Of the 2-D velocity error of matches.
+    pub velocity_rmse_mps: Estimate,
+    /// Recall of persons with no, 1 to 5, 6 and more returns.
+    pub recall_by_returns: [Option<f64>; 3],
+    /// Share of stage-3 instances' persons with a confirmed track.
+    pub tracked_share: Estimate,
+    /// Share of them whose displacement is scored: tracked, and unarrived through the last step.
+    pub scored_share: Option<f64>,
+    /// Mean displacement by step, metres (Table I).
+    pub displacement_m: Vec<Estimate>,
+    /// Mean over the steps.
+    pub displacement_mean_m: Estimate,
+    /// Mean negative log-likelihood by step, nats.
+    pub nll: Vec<Option<f64>>,
+    /// Shares within the 50 and the 90 % region by step.
+    pub coverage: Vec<Option<[f64; 2]>>,
+    /// What was skipped, all scenes.
+    pub health: Health,
+}
+
+/// Pools scenes. `access_points` are the site's names.
+pub fn pool(scenes: &[&SceneScore], access_points: &[String]) -> Scores {
+    let mut names: Vec<&str> = Vec::new();
+    for scene in scenes {
+        if !names.contains(&scene.group.as_str()) {
+            names.push(&scene.group);
+        }
+    }
+    let of = |name: &&str| {
+        let members: Vec<_> = scenes.iter().copied().filter(|scene| scene.group == **name).collect();
+        group(name, &members, access_points)
+    };
+    let mut groups: Vec<Group> = names.iter().map(of).collect();
+    if names.len() > 1 {
+        groups.push(group(ALL, scenes, access_points));
+    }
+    Scores { groups }
+}
+
+impl Scores {
+    /// The scenes that headline figures are of: all of them.
+    pub fn headline(&self) -> Option<&Group> {
+        self.groups.last()
+    }
+}
+
+impl Group {
+    /// The scores of a predictor at an access point.
+    pub fn link(&self, mode: Option<Mode>, predictor: Predictor, access_point: &str) -> Option<&LinkScores> {
+        self.links.iter().find(|links| {
+            links.mode == mode && links.predictor == predictor.name() && links.access_point == access_point
+        })
+    }
+
+    /// The names of the access points, in the site's order.
+    pub fn access_points(&self) -> Vec<&str> {
+        let mut names = Vec::new();
+        for links in &self.links {
+            if !names.contains(&links.access_point.as_str()) {
+                names.push(&links.access_point);
+            }
+        }
+        names
+    }
+}
+
+fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group {
+    let bootstrap = Bootstrap::new(scenes.len());
+    let mut links = Vec::new();
+    let mut modes = Vec::new();
+    let mut constant_velocity_m = Vec::new();
+    if let Some(first) = scenes.first() {
+        for (i, said) in first.said.iter().enumerate() {
+            for (a, access_point) in access_points.iter().enumerate() {
+                let of_scenes: Vec<&LinkTally> =
+                    scenes.iter().filter_map(|scene| scene.said.get(i)?.access_points.get(a)).collect();
+                links.push(LinkScores {
+                    mode: said.mode,
+                    predictor: said.predictor.name(),
+                    access_point: access_point.clone(),
+                    windows: windows(&bootstrap, &of_scenes),
+                });
+            }
+        }
+        modes = (0..first.modes.len()).map(|m| mode_scores(&bootstrap, scenes, m)).collect();
+        let pooled = sum(scenes.iter().map(|scene| &scene.constant_velocity));
+        constant_velocity_m = (1..=STEPS).map(|h| pooled.mean_m(h)).collect();
+    }
+    let frames = scenes.iter().map(|scene| scene.frames).sum();
+    Group { name: name.to_owned(), scenes: scenes.len(), frames, links, modes, constant_velocity_m }
+}
+
+fn windows(bootstrap: &Bootstrap, scenes: &[&LinkTally]) -> Vec<WindowScores> {
+    let pooled = LinkTally::pooled(scenes);
+    let of = |i: usize| {
+        let (tally, leads) = (&pooled.windows[i], &pooled.leads[i]);
+        let all: Vec<Counts> = scenes.iter().map(|scene| scene.windows[i].all).collect();
+        let onset: Vec<Counts> = scenes.iter().map(|scene| scene.windows[i].onset).collect();
+        WindowScores {
+            w: i + 1,
+            counts: tally.all,
+            onset_counts: tally.onset,
+            base_rate: estimate(bootstrap, &all, Counts::base_rate),
+            accuracy: estimate(bootstrap, &all, Counts::accuracy),
+            precision: estimate(bootstrap, &all, Counts::precision),
+            recall: estimate(bootstrap, &all, Counts::recall),
+            f1: estimate(bootstrap, &all, Counts::f1),
+            onset_f1: estimate(bootstrap, &onset, Counts::f1),
+            auprc: tally.auprc(),
+            brier: tally.brier(),
+            ece: tally.ece(),
+            lead_median_s: leads.median_s(),
+            lead_warned: leads.warned_share(),
+            bins: tally.bins.to_vec(),
+        }
+    };
+    (0..STEPS).map(of).collect()
+}
+
+fn mode_scores(bootstrap: &Bootstrap, scenes: &[&SceneScore], m: usize) -> ModeScores {
+    let stage1: Vec<Stage1> = scenes.iter().map(|scene| scene.modes[m].stage1).collect();
+    let displacement: Vec<Displacement> = scenes.iter().map(|scene| scene.modes[m].displacement).collect();
+    let (tracks, forecasts) = (sum(&stage1), sum(&displacement));
+    let of_tracks = |score: fn(&Stage1) -> Option<f64>| estimate(bootstrap, &stage1, score);
+    let mut health = Health::default();
+    scenes.iter().for_each(|scene| health.add(&scene.modes[m].health));
+    ModeScores {
+        mode: scenes[0].modes[m].mode,
+        recall: of_tracks(Stage1::recall),
+        precision: of_tracks(Stage1::precision),
+        mota: of_tracks(Stage1::mota),
+        idf1: of_tracks(Stage1::idf1),
+        hota: of_tracks(Stage1::hota),
+        switches_per_scene: of_tracks(Stage1::switches_per_scene),
+        position_rmse_m: of_tracks(Stage1::position_rmse_m),
+        velocity_rmse_mps: of_tracks(Stage1::velocity_rmse_mps),
+        recall_by_returns: tracks.recall_by_returns(),
+        tracked_share: estimate(bootstrap, &displacement, Displacement::tracked_share),
+        scored_share: forecasts.scored_share(),
+        displacement_m: (1..=STEPS).map(|h| estimate(bootstrap, &displacement, |d| d.mean_m(h))).collect(),
+        displacement_mean_m: estimate(bootstrap, &displacement, Displacement::average_m),
+        nll: (1..=STEPS).map(|h| forecasts.nll(h)).collect(),
+        coverage: (1..=STEPS).map(|h| forecasts.coverage(h)).collect(),
+        health,
+    }
+}
+
+fn estimate<T: Pooled>(bootstrap: &Bootstrap, sums: &[T], score: impl Fn(&T) -> Option<f64>) -> Estimate {
+    Estimate { value: score(&sum(sums)), interval: bootstrap.interval(sums, &score) }
+}
+
+fn sum<'a, T: Pooled + 'a>(sums: impl IntoIterator<Item = &'a T>) -> T {
+    sums.into_iter().fold(T::default(), |all, one| all.plus(one, 1))
+}

@@ -1,0 +1,173 @@
+//! One scene scored: all predictors over the same instances, and the sums of stages 1 and 2.
+
+use std::collections::BTreeMap;
+
+use umbracast::forecast::Weights;
+use umbracast::{Config, Error, Health, Mode};
+use umbracast_io::rows::TrackRow;
+use umbracast_sim::body::Walker;
+
+use crate::casts;
+use crate::displacement::Displacement;
+use crate::instances::instances;
+use crate::links::{Said, never, persistence_of_truth};
+use crate::matching::match_scene;
+use crate::scene::{SceneRun, SceneTruth, TruthIndex};
+use crate::stage1::Stage1;
+use crate::tally::{LinkTally, Prediction};
+use crate::true_bodies::true_bodies;
+
+/// Who predicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Predictor {
+    /// The mode itself.
+    Run,
+    /// Baseline: nobody is ever blocked.
+    Never,
+    /// Baseline: as now, the present being the truth's.
+    PersistenceOfTruth,
+    /// Baseline: as now, as the mode's own tracks see it.
+    PersistenceOfTracks,
+    /// Baseline: true positions carried on, cast by the mode's stage 3.
+    ConstantVelocityOfTruth,
+    /// Error budget: true positions and velocities into the mode's forecast and cast.
+    TrueState,
+    /// Error budget: the true future into the mode's cast.
+    TrueFuture,
+    /// Error budget: the true walking mesh at the mode's forecast.
+    TrueBody,
+}
+
+impl Predictor {
+    /// As tables and files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Run => "run",
+            Self::Never => "never",
+            Self::PersistenceOfTruth => "persistence of truth",
+            Self::PersistenceOfTracks => "persistence of tracks",
+            Self::ConstantVelocityOfTruth => "constant velocity of truth",
+            Self::TrueState => "true positions and velocities",
+            Self::TrueFuture => "true future",
+            Self::TrueBody => "true body",
+        }
+    }
+}
+
+/// What a predictor said in one scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictorTally {
+    /// `None` for baselines that need no mode.
+    pub mode: Option<Mode>,
+    /// Who.
+    pub predictor: Predictor,
+    /// One an access point of the site.
+    pub access_points: Vec<LinkTally>,
+}
+
+/// Stages 1 and 2 of a mode in one scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeSums {
+    /// Whose.
+    pub mode: Mode,
+    /// Detection and tracking.
+    pub stage1: Stage1,
+    /// Forecasts.
+    pub displacement: Displacement,
+    /// What was skipped.
+    pub health: Health,
+}
+
+/// Everything that is kept of a scene for the scores of all.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneScore {
+    /// Which of the scenes.
+    pub scene: u32,
+    /// What it is pooled with: the preset, or the file it was replayed from.
+    pub group: String,
+    /// How many frames it has.
+    pub frames: u64,
+    /// Constant velocity from the true state, for comparison with stage 2.
+    pub constant_velocity: Displacement,
+    /// In the order of the tables.
+    pub said: Vec<PredictorTally>,
+    /// In the order of the modes.
+    pub modes: Vec<ModeSums>,
+}
+
+/// What a mode made of a scene.
+#[derive(Debug)]
+pub struct ModeRun<'a> {
+    /// How it was set.
+    pub config: &'a Config,
+    /// Its tables.
+    pub rows: &'a SceneRun,
+    /// What it skipped.
+    pub health: Health,
+}
+
+/// Scores the runs of one or several modes on one scene. `walkers` are the scene's bodies where it was simulated
+/// here; without them the true body is left out.
+///
+/// # Errors
+/// A mode whose forecast needs weights when there are none.
+pub fn score_scene(
+    scene: u32,
+    group: &str,
+    truth: &SceneTruth,
+    runs: &[ModeRun],
+    weights: Option<&Weights>,
+    walkers: Option<&[Walker]>,
+) -> Result<SceneScore, Error> {
+    let index = TruthIndex::new(truth);
+    let instances = instances(&index);
+    let site_access_points = runs.first().map_or(0, |run| run.config.site.access_points.len()) as u32;
+    let mut said = Vec::new();
+    let mut add = |mode: Option<Mode>, predictor: Predictor, predictions: Vec<Prediction>| {
+        let access_points = LinkTally::each(&instances, &predictions, site_access_points);
+        said.push(PredictorTally { mode, predictor, access_points });
+    };
+    add(None, Predictor::Never, never(&instances));
+    add(None, Predictor::PersistenceOfTruth, persistence_of_truth(&instances));
+    let mut modes = Vec::new();
+    for ModeRun { config, rows, health } in runs {
+        let mode = Some(config.mode);
+        let matching = match_scene(&truth.people, &rows.tracks);
+        let own = Said::by_run(rows);
+        let of_tracks = |said: Said| said.of_tracks(&instances, &matching);
+        let of_persons = |said: Said| said.of_persons(&instances);
+        add(mode, Predictor::PersistenceOfTracks, own.persistence(&instances, &matching));
+        add(mode, Predictor::Run, of_tracks(own));
+        add(mode, Predictor::ConstantVelocityOfTruth, of_persons(casts::constant_velocity_of_truth(&index, config)));
+        let true_state = casts::true_state(&index, rows, &matching, config, weights)?;
+        add(mode, Predictor::TrueState, of_persons(true_state));
+        add(mode, Predictor::TrueFuture, of_tracks(casts::true_future(&index, rows, &matching, config)));
+        if let Some(walkers) = walkers {
+            add(mode, Predictor::TrueBody, of_tracks(true_bodies(rows, &matching, walkers, &config.site)));
+        }
+        let forecasts: BTreeMap<(u64, u64), &TrackRow> =
+            rows.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
+        let forecast = |frame, person| {
+            let track = matching.get(&(frame, person))?;
+            forecasts.get(&(frame, *track)).map(|row| casts::forecast_of(row))
+        };
+        modes.push(ModeSums {
+            mode: config.mode,
+            stage1: Stage1::of(&truth.people, &rows.tracks),
+            displacement: Displacement::of(&index, forecast),
+            health: *health,
+        });
+    }
+    let carried_on = |frame, person| {
+        let psd = runs.first()?.config.forecast.acceleration_psd_m2ps3;
+        Some(casts::constant_velocity_steps(index.person(frame, person)?, psd))
+    };
+    Ok(SceneScore {
+        scene,
+        group: group.to_owned(),
+        frames: index.frames.len() as u64,
+        constant_velocity: Displacement::of(&index, carried_on),
+        said,
+        modes,
+    })
+}
