@@ -193,7 +193,8 @@ fn crowd_of(spec: &SceneSpec) -> Crowd {
 
 /// As they would arrive: by time, sensors mixed.
 fn push(assembler: &mut Assembler, packets: &[Vec<Packet>], health: &mut Health) {
-    let of_sensor = |sensor: usize| (0..packets[sensor].len()).map(move |i| (packets[sensor][i].time_ns, sensor, i));
+    let of_sensor =
+        |sensor: usize| (0..packets[sensor].len()).map(move |i| (packets[sensor][i].time_ns, sensor, i));
     let mut order: Vec<(i64, usize, usize)> = (0..packets.len()).flat_map(of_sensor).collect();
     order.sort_unstable();
     for (_, sensor, i) in order {
@@ -228,4 +229,90 @@ pub fn note_truth(scene: u32, frame: &SceneFrame, truth: &mut SceneTruth) {
         static_blocked: link.static_blocked,
         self_blocked: link.self_blocked,
     }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use umbracast::geometry::DVec2;
+    use umbracast::{Mode, STEP_NS};
+    use umbracast_sim::crowd::Trajectory;
+
+    /// Three people who walk side by side for 2.5 s.
+    fn spec(scenes: u64) -> Spec {
+        let way = |person: u32| Trajectory {
+            person,
+            start_ns: 0,
+            step_ns: 10_000_000,
+            positions_m: (0..=250)
+                .map(|i| DVec2::new(0.01 * f64::from(i), 1.5 * f64::from(person)))
+                .collect(),
+            arrived_ns: None,
+            height_m: None,
+        };
+        let crowd = Crowd { trajectories: (0..3).map(way).collect(), duration_ns: 25 * STEP_NS };
+        let scene =
+            |seed| SceneSpec { group: "walk".to_owned(), seed, people: People::Replayed(crowd.clone()) };
+        Spec {
+            configs: vec![Config::for_mode(Mode::Default)],
+            weights: None,
+            scenes: (0..scenes).map(scene).collect(),
+            keep: Some(0),
+        }
+    }
+
+    fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+    }
+
+    #[test]
+    fn scores_do_not_depend_on_the_threads() {
+        let spec = spec(2);
+        let scores = [1, 2].map(|threads| with_threads(threads, || run(&spec, |_| {}).unwrap()));
+        assert_eq!(scores[0].len(), 2);
+        for (one, two) in scores[0].iter().zip(&scores[1]) {
+            assert_eq!(one.score, two.score);
+            assert_eq!(one.kept, two.kept);
+        }
+        assert_ne!(scores[0][0].score.modes, scores[0][1].score.modes, "seeds differ");
+    }
+
+    #[test]
+    fn three_people_in_the_open_are_followed_and_their_truth_is_kept() {
+        let told = AtomicU64::new(0);
+        let results = run(&spec(1), |_| {
+            told.fetch_add(1, Ordering::Relaxed);
+        })
+        .unwrap();
+        assert_eq!(told.into_inner(), 25);
+        let (truth, runs) = results[0].kept.as_ref().unwrap();
+        assert_eq!(truth.people.len(), 3 * 25);
+        assert_eq!(runs.len(), 1);
+        let mode = &results[0].score.modes[0];
+        assert_eq!(mode.displacement.instances, 3 * 7, "instants 9 to 15");
+        assert!(mode.displacement.tracked_share().unwrap() > 0.99);
+        assert!(mode.displacement.mean_m(1).unwrap() < 0.2, "{:?}", mode.displacement.mean_m(1));
+        assert!(mode.health.is_clean(), "{:?}", mode.health);
+    }
+
+    #[test]
+    fn modes_with_different_sites_are_refused() {
+        let mut spec = spec(1);
+        let mut other = spec.configs[0].clone();
+        other.site.name = "elsewhere".to_owned();
+        spec.configs.push(other);
+        let message = run(&spec, |_| {}).unwrap_err().to_string();
+        assert!(message.contains("elsewhere"), "{message}");
+    }
+
+    #[test]
+    fn scene_i_of_each_preset_has_the_first_seed_plus_i() {
+        let scenes = drawn_scenes(&[Preset::Orca03, Preset::Orca06], 2, 10, TEST_SEEDS);
+        let named: Vec<_> = scenes.iter().map(|s| (s.group.as_str(), s.seed)).collect();
+        assert_eq!(
+            named,
+            [("orca-03", 200_000), ("orca-03", 200_001), ("orca-06", 200_000), ("orca-06", 200_001)]
+        );
+    }
 }

@@ -7,12 +7,16 @@
 pub mod scene;
 #[cfg(test)]
 mod hand_made;
+pub mod bootstrap;
 pub mod instances;
 pub mod tally;
-pub mod displacement;
-pub mod links;
-pub mod casts;
-pub mod bootstrap;
 pub mod matching;
 pub mod identity;
 pub mod stage1;
+pub mod displacement;
+pub mod links;
+pub mod casts;
+pub mod true_bodies;
+pub mod score;
+pub mod pooled;
+pub mod chain;

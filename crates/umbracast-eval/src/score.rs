@@ -138,7 +138,11 @@ pub fn score_scene(
         let of_persons = |said: Said| said.of_persons(&instances);
         add(mode, Predictor::PersistenceOfTracks, own.persistence(&instances, &matching));
         add(mode, Predictor::Run, of_tracks(own));
-        add(mode, Predictor::ConstantVelocityOfTruth, of_persons(casts::constant_velocity_of_truth(&index, config)));
+        add(
+            mode,
+            Predictor::ConstantVelocityOfTruth,
+            of_persons(casts::constant_velocity_of_truth(&index, config)),
+        );
         let true_state = casts::true_state(&index, rows, &matching, config, weights)?;
         add(mode, Predictor::TrueState, of_persons(true_state));
         add(mode, Predictor::TrueFuture, of_tracks(casts::true_future(&index, rows, &matching, config)));

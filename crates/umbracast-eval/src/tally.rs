@@ -237,7 +237,7 @@ impl LeadTimes {
                 warned_since = Some(instances[i].time_ns);
             }
             let onset_ns = before.time_ns + STEP_NS;
-            leads.lead_s.extend(warned_since.map(|since_ns| (onset_ns - since_ns) as f64 * 1e-9));
+            leads.lead_s.extend(warned_since.map(|since_ns| (onset_ns - since_ns) as f64 / 1e9));
         }
         leads
     }

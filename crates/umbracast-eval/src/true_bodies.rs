@@ -122,7 +122,8 @@ mod tests {
         let walkers = [standing(0, 0.0), standing(1, 1.0)];
         let matching = Matching::from([((4, 0), 10), ((4, 1), 11)]);
         let said = |aside_m| {
-            let run = SceneRun { tracks: vec![track(10, 0.0, 0.0), track(11, 1.0, aside_m)], links: Vec::new() };
+            let run =
+                SceneRun { tracks: vec![track(10, 0.0, 0.0), track(11, 1.0, aside_m)], links: Vec::new() };
             true_bodies(&run, &matching, &walkers, &site)
         };
         let of_person_0 = |said: &Said| {
