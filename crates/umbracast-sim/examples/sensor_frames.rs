@@ -10,7 +10,8 @@ use umbracast_sim::sensor::Sensors;
 fn main() {
     let frames = std::env::args().nth(1).map_or(280, |n| n.parse().expect("a number of frames"));
     let mut sensors = Sensors::new(&Config::default().site, 1).expect("the default site");
-    let walkers: Vec<Walker> = (0..10).map(|person| Walker::new(crossing(person), u64::from(person))).collect();
+    let walkers: Vec<Walker> =
+        (0..10).map(|person| Walker::new(crossing(person), u64::from(person))).collect();
     let (mut packets, mut returns) = (0, 0);
     for frame in 0..frames {
         let (sent, seen) = sensors.frame(frame, &walkers);

@@ -16,36 +16,40 @@ const WALL: u8 = 55;
 const PILLAR: u8 = 45;
 const FURNITURE: u8 = 35;
 
-/// Ranges of all beams at all azimuths.
+/// Ranges and reflectivities of all beams at all azimuths, at `beam * TURN_CDEG + azimuth_cdeg`: a frame reads
+/// one beam after the other in even strides.
 #[derive(Debug)]
 pub struct HallImage {
-    beams: usize,
-    /// At `azimuth_cdeg * beams + beam`, metres and percent.
-    pixels: Vec<(f32, u8)>,
+    range_m: Vec<f32>,
+    /// Percent.
+    reflectivity: Vec<u8>,
 }
 
 impl HallImage {
     /// Traces the hall from a sensor that hangs within it.
     pub fn trace(site: &Site, model: &Model, site_from_sensor: &Pose) -> Self {
         let hall = Solids::new(site);
-        let beams = model.beams.len();
-        let mut pixels = Vec::with_capacity(TURN_CDEG * beams);
-        for azimuth_cdeg in 0..TURN_CDEG {
-            let azimuth_rad = azimuth_cdeg as f64 * (TAU / TURN_CDEG as f64);
-            for beam in model.beams.iter() {
-                let origin_m = beam.point_m(azimuth_rad, 0.0);
-                let direction = beam.point_m(azimuth_rad, 1.0) - origin_m;
-                let (range_m, reflectivity) =
-                    hall.cast(site_from_sensor.point(origin_m), site_from_sensor.direction(direction));
-                pixels.push((range_m as f32, reflectivity));
+        let rays = model.beams.len() * TURN_CDEG;
+        let (mut ranges_m, mut reflectivities) = (Vec::with_capacity(rays), Vec::with_capacity(rays));
+        let azimuths: Vec<(f64, f64)> =
+            (0..TURN_CDEG).map(|cdeg| (cdeg as f64 * (TAU / TURN_CDEG as f64)).sin_cos()).collect();
+        for beam in model.beams.iter() {
+            let origin_m = site_from_sensor.point(DVec3::Z * beam.z_offset_m);
+            let (rise, flat) = beam.elevation_rad.sin_cos();
+            for &(sin, cos) in &azimuths {
+                let direction = site_from_sensor.direction(DVec3::new(flat * cos, -flat * sin, rise));
+                let (range_m, reflectivity) = hall.cast(origin_m, direction);
+                ranges_m.push(range_m as f32);
+                reflectivities.push(reflectivity);
             }
         }
-        Self { beams, pixels }
+        Self { range_m: ranges_m, reflectivity: reflectivities }
     }
 
     /// Range and reflectivity of one beam.
     pub fn at(&self, azimuth_cdeg: u32, beam: usize) -> (f32, u8) {
-        self.pixels[azimuth_cdeg as usize * self.beams + beam]
+        let pixel = beam * TURN_CDEG + azimuth_cdeg as usize;
+        (self.range_m[pixel], self.reflectivity[pixel])
     }
 }
 

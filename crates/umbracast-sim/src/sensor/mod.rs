@@ -193,4 +193,6 @@ impl OpenPacket {
 }
 
 #[cfg(test)]
+mod oracle;
+#[cfg(test)]
 mod tests;

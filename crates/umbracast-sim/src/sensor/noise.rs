@@ -1,10 +1,11 @@
 //! From true ranges to measured ones: noise, drop-outs and the limits of the sensor.
 
-use rand::{Rng, SeedableRng};
+use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64Mcg;
 use umbracast::lidar::RangeImage;
 use umbracast::site::Sensor;
+
+use crate::random::stream;
 
 /// How one sensor errs. Every frame has generators of its own, and every ray takes one draw whether or not
 /// anything is there: what one ray meets changes the noise of no other.
@@ -37,8 +38,9 @@ impl Noise {
 
     /// Turns true ranges into measured ones; 0 where nothing comes back.
     pub fn measure(&self, frame: u64, image: &mut RangeImage) {
-        let mut range_draws = self.generator(b"range___", frame);
-        let mut loss_draws = self.generator(b"dropout_", frame);
+        let scene_and_sensor = stream(self.seed, "sensor", self.sensor).next_u64();
+        let mut range_draws = stream(scene_and_sensor, "range noise", frame);
+        let mut loss_draws = stream(scene_and_sensor, "drop-outs", frame);
         // The draw is below this for the given share of 64-bit numbers; the cast saturates.
         let lost_below = (self.dropout * 2.0_f64.powi(64)) as u64;
         for (range_m, reflectivity) in image.range_m.iter_mut().zip(&mut image.reflectivity) {
@@ -50,21 +52,4 @@ impl Noise {
             }
         }
     }
-
-    fn generator(&self, purpose: &[u8; 8], frame: u64) -> Pcg64Mcg {
-        let mut seed = [0; 16];
-        let key = [self.seed, u64::from_le_bytes(*purpose), self.sensor, frame];
-        let mixed = key.iter().fold(0, |hash, &part| split_mix(hash ^ part));
-        seed[..8].copy_from_slice(&mixed.to_le_bytes());
-        seed[8..].copy_from_slice(&split_mix(mixed).to_le_bytes());
-        Pcg64Mcg::from_seed(seed)
-    }
-}
-
-/// The finaliser of SplitMix64 (Steele, Lea and Flood 2014): neighbouring keys give unrelated states.
-fn split_mix(key: u64) -> u64 {
-    let mut z = key.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

@@ -1,89 +1,95 @@
 //! Sensors against an independent ray caster, and what they promise.
 
-use parry3d::math::{Pose, Vector};
-use parry3d::query::Ray;
-use parry3d::shape::{Cuboid, SharedShape, TriMesh};
+use std::f64::consts::PI;
+
+use umbracast::geometry::DVec2;
 use umbracast::lidar::{Column, packet};
-use umbracast::site::Pillar;
+use umbracast::site::Rotation;
 use umbracast::{Config, Health, STEP_NS};
 
+use super::oracle::Oracle;
 use super::*;
+use crate::crowd::Trajectory;
 
 fn site() -> Site {
     Config::default().site
 }
 
-/// The hall as shapes of `parry3d`: slabs round the room, boxes, cylinders.
-fn hall_shapes(site: &Site) -> Vec<(Pose, SharedShape)> {
-    let (x, y, z) = (site.hall.length_m as f32, site.hall.width_m as f32, site.hall.height_m as f32);
-    let mut shapes = Vec::new();
-    let mut cuboid = |middle: Vector, size: Vector, yaw_deg: f64| {
-        let pose = Pose::new(middle, Vector::Z * yaw_deg.to_radians() as f32);
-        shapes.push((pose, SharedShape::new(Cuboid::new(size * 0.5))));
-    };
-    for side in [-1.0, 1.0] {
-        cuboid(Vector::new(side * (x + 1.0) * 0.5, 0.0, z * 0.5), Vector::new(1.0, y + 2.0, z + 2.0), 0.0);
-        cuboid(Vector::new(0.0, side * (y + 1.0) * 0.5, z * 0.5), Vector::new(x + 2.0, 1.0, z + 2.0), 0.0);
-        cuboid(
-            Vector::new(0.0, 0.0, z * 0.5 + side * (z + 1.0) * 0.5),
-            Vector::new(x + 2.0, y + 2.0, 1.0),
-            0.0,
-        );
-    }
-    for item in &site.furniture {
-        let ([px, py], [sx, sy, sz]) = (item.position_m, item.size_m.map(|s| s as f32));
-        cuboid(Vector::new(px as f32, py as f32, sz * 0.5), Vector::new(sx, sy, sz), item.yaw_deg);
-    }
-    for pillar in &site.pillars {
-        shapes.push((Pose::IDENTITY, SharedShape::new(prism(pillar, z))));
-    }
-    shapes
-}
-
-/// A pillar as a prism of so many sides that it is 3 um from round.
-fn prism(pillar: &Pillar, height_m: f32) -> TriMesh {
-    const SIDES: u32 = 720;
-    let [x, y] = pillar.position_m;
-    let corner = |i: u32| {
-        let (sin, cos) = (f64::from(i / 2) * std::f64::consts::TAU / f64::from(SIDES)).sin_cos();
-        let z = if i.is_multiple_of(2) { 0.0 } else { height_m };
-        Vector::new((x + pillar.radius_m * cos) as f32, (y + pillar.radius_m * sin) as f32, z)
-    };
-    let triangles = (0..2 * SIDES).map(|i| [i, (i + 1) % (2 * SIDES), (i + 2) % (2 * SIDES)]);
-    TriMesh::new((0..2 * SIDES).map(corner).collect(), triangles.collect()).unwrap()
-}
-
-fn site_ray(sensor: &Sensor, view: &View, c: usize, b: usize) -> Ray {
-    let site_from_sensor = sensor.site_from_sensor();
-    let origin_m = site_from_sensor.point(view.image.point_m(c, b, 0.0));
-    let far_m = site_from_sensor.point(view.image.point_m(c, b, 1.0));
-    let vector = |v: DVec3| Vector::new(v.x as f32, v.y as f32, v.z as f32);
-    Ray::new(vector(origin_m), vector(far_m - origin_m))
-}
-
 #[test]
 fn the_hall_is_as_an_independent_caster_sees_it() {
     let site = site();
-    let shapes = hall_shapes(&site);
     let mut sensors = Sensors::new(&site, 0).unwrap();
-    for (simulated, sensor) in sensors.sensors.iter_mut().zip(&site.sensors) {
-        let view = simulated.look(3, &[]);
-        let (mut rays, mut apart) = (0, 0);
-        for c in 0..view.image.columns.len() {
-            for b in 0..view.image.beams.len() {
-                let ray = site_ray(sensor, &view, c, b);
-                let expected = shapes
-                    .iter()
-                    .filter_map(|(pose, shape)| shape.cast_ray(pose, &ray, 100.0, false))
-                    .fold(f32::INFINITY, f32::min);
-                let found = view.image.range_m[c * view.image.beams.len() + b];
-                rays += 1;
-                apart += usize::from((found - expected).abs() > 1e-3);
-            }
-        }
-        assert!(rays > 69_000);
-        assert!(apart <= rays / 10_000, "{apart} of {rays} rays differ by more than 1 mm");
+    assert_as_the_oracle_sees(&site, &mut sensors, 3, 1, &[]);
+}
+
+#[test]
+fn ten_people_are_as_an_independent_caster_sees_them() {
+    let site = site();
+    let mut sensors = Sensors::new(&site, 0).unwrap();
+    let walkers: Vec<Walker> =
+        (0..10).map(|i| walker(i, f64::from(i) * 0.63, 8.0 - f64::from(i) * 0.7)).collect();
+    let bodies = assert_as_the_oracle_sees(&site, &mut sensors, 7, 1, &walkers);
+    assert!(bodies > 300, "{bodies} rays on bodies");
+}
+
+#[test]
+fn people_across_the_cut_round_the_sensor_and_under_it_are_as_an_independent_caster_sees_them() {
+    let places = [("vlp-16", 1.2, 0.0, 6000), ("hdl-32e", 1.3, 8.0, 14_000), ("hdl-32e", 2.5, 0.0, 600)];
+    for (model, height_m, pitch, least) in places {
+        let mut site = site();
+        site.sensors.truncate(1);
+        let sensor = &mut site.sensors[0];
+        sensor.model = model.into();
+        sensor.position_m = [0.0, 0.0, height_m];
+        sensor.rotation_deg = Rotation { yaw: 30.0, pitch, roll: 0.0 };
+        let mut sensors = Sensors::new(&site, 0).unwrap();
+        // The cut looks along 210 degrees; the last one walks through the sensor.
+        let ways = [(210.0, 2.0), (209.0, 5.0), (30.0, 0.9), (120.0, 1.3), (300.0, -0.2)];
+        let walkers: Vec<Walker> =
+            ways.iter().zip(0..).map(|(&(bearing, d), i)| walker(i, f64::to_radians(bearing), d)).collect();
+        let bodies = assert_as_the_oracle_sees(&site, &mut sensors, 1, 7, &walkers);
+        assert!(bodies > least, "{bodies} rays on bodies");
     }
+}
+
+/// Someone who walks at 1.3 m/s towards the middle and is `distance_m` from it after 0.4 s.
+fn walker(person: u32, bearing_rad: f64, distance_m: f64) -> Walker {
+    let from = DVec2::from_angle(bearing_rad) * (distance_m + 0.52);
+    let step = DVec2::from_angle(bearing_rad + PI) * 0.013;
+    let positions_m = (0..200).map(|i| from + step * f64::from(i)).collect();
+    let way = Trajectory {
+        person,
+        start_ns: 0,
+        step_ns: 10_000_000,
+        positions_m,
+        arrived_ns: None,
+        height_m: None,
+    };
+    Walker::new(way, u64::from(person))
+}
+
+/// Compares the rays of every `stride`th column of a frame, before noise; gives how many rays show a body.
+fn assert_as_the_oracle_sees(
+    site: &Site,
+    sensors: &mut Sensors,
+    frame: u64,
+    stride: usize,
+    walkers: &[Walker],
+) -> usize {
+    let oracle = Oracle::new(site, walkers);
+    let (mut rays, mut bodies, mut differences) = (0, 0, Vec::new());
+    for (simulated, sensor) in sensors.sensors.iter_mut().zip(&site.sensors) {
+        let view = simulated.look(frame, walkers);
+        let (apart, compared) = oracle.compare(sensor, &view.image, stride);
+        differences.extend(apart);
+        rays += compared;
+        bodies += view.owner.iter().filter(|&&owner| owner != NOBODY).count();
+    }
+    let apart = differences.len();
+    assert!(apart <= rays / 10_000, "{apart} of {rays} rays differ by more than 1 mm");
+    differences.retain(|d| !d.at_silhouette());
+    assert!(differences.is_empty(), "away from silhouettes: {differences:?}");
+    bodies
 }
 
 /// Columns of all packets with their ranges, as a decoder gives them.
@@ -119,6 +125,75 @@ fn columns_come_out_of_the_decoder_when_and_where_they_were_fired() {
         // In phase with the cut behind the sensor: within a column of 180 degrees when a frame begins.
         assert!((fired[0].azimuth_cdeg - 18_000.0).abs() < 17.0);
     }
+}
+
+#[test]
+fn the_same_seed_sends_the_same_bytes_and_a_restart_is_a_new_beginning() {
+    let site = site();
+    let walkers = [walker(0, 0.3, 5.0), walker(1, 2.0, 7.0)];
+    let run = |sensors: &mut Sensors| -> Vec<_> { (0..3).map(|k| sensors.frame(k, &walkers)).collect() };
+    let mut sensors = Sensors::new(&site, 1).unwrap();
+    let first = run(&mut sensors);
+    assert!(first == run(&mut Sensors::new(&site, 1).unwrap()));
+    assert!(first != run(&mut Sensors::new(&site, 2).unwrap()));
+    sensors.power(0, 0..1);
+    sensors.restart(1);
+    assert!(first == run(&mut sensors));
+}
+
+#[test]
+fn a_person_changes_no_range_but_those_of_the_rays_that_meet_the_body() {
+    let mut sensors = Sensors::new(&site(), 1).unwrap();
+    let walkers = [walker(0, 0.3, 5.0)];
+    let with = sensors.frame(0, &walkers);
+    sensors.restart(1);
+    let without = sensors.frame(0, &[]);
+    let mut changed = 0;
+    for sensor in 0..2 {
+        let with = decoded(&sensors, sensor, &with.0[sensor]);
+        let without = decoded(&sensors, sensor, &without.0[sensor]);
+        let pairs = with.iter().zip(&without).flat_map(|(a, b)| a.1.iter().zip(&b.1));
+        changed += pairs.filter(|(a, b)| a != b).count();
+    }
+    // A shoe on the floor may be less than the 2 mm of a packet above it.
+    let returns = with.1[0] as usize;
+    assert!(changed <= returns && changed + 2 >= returns && returns > 20, "{changed} of {returns}");
+}
+
+#[test]
+fn points_lie_on_a_moving_body_at_the_time_they_carry() {
+    let mut site = site();
+    for sensor in &mut site.sensors {
+        (sensor.range_noise_m, sensor.dropout) = (0.0, 0.0);
+    }
+    let mut sensors = Sensors::new(&site, 1).unwrap();
+    let walkers = [walker(0, 0.3, 5.0)];
+    let empty: Vec<View> = sensors.sensors.iter_mut().map(|s| s.look(4, &[])).collect();
+    let packets = sensors.frame(4, &walkers).0;
+    let (mut points, mut late) = (0, 0);
+    for (sensor, view) in empty.iter().enumerate() {
+        let site_from_sensor = site.sensors[sensor].site_from_sensor();
+        for (column, range_m) in decoded(&sensors, sensor, &packets[sensor]) {
+            let Some(c) = view.image.columns.iter().position(|other| *other == column) else { continue };
+            for b in 0..range_m.len() {
+                let hall_m = view.image.range_m[c * range_m.len() + b];
+                if hall_m - range_m[b] < 0.01 {
+                    continue;
+                }
+                let point_m = site_from_sensor.point(view.image.point_m(c, b, f64::from(range_m[b])));
+                let off_m = |time_ns| oracle::distance_m(&walkers[0], time_ns, point_m);
+                let (then_m, at_end_m) = (off_m(view.image.time_ns(c, b)), off_m(500_000_000));
+                // The packet counts in 2 mm.
+                assert!(then_m < 1.5e-3, "{then_m} m from the body");
+                points += 1;
+                late += usize::from(at_end_m > 0.01);
+            }
+        }
+    }
+    assert!(
+        points > 30 && late > points / 2,
+        "{points} points, {late} of them off the body at the frame's end"
+    );
 }
 
 #[test]

@@ -28,20 +28,13 @@ impl View {
         let columns = head.frame_columns(index);
         let first_column = columns.start;
         let beams = head.model.beams.clone();
-        let mut image = RangeImage {
-            beams,
-            columns: head.reported(columns),
-            range_m: Vec::new(),
-            reflectivity: Vec::new(),
-        };
-        let rays = image.columns.len() * image.beams.len();
-        image.range_m.reserve_exact(rays);
-        image.reflectivity.reserve_exact(rays);
-        for c in 0..image.columns.len() {
-            for b in 0..image.beams.len() {
-                let (range_m, reflectivity) = hall.at(image.azimuth_cdeg(c, b), b);
-                image.range_m.push(range_m);
-                image.reflectivity.push(reflectivity);
+        let columns = head.reported(columns);
+        let rays = columns.len() * beams.len();
+        let mut image = RangeImage { beams, columns, range_m: vec![0.0; rays], reflectivity: vec![0; rays] };
+        for b in 0..image.beams.len() {
+            for c in 0..image.columns.len() {
+                let pixel = c * image.beams.len() + b;
+                (image.range_m[pixel], image.reflectivity[pixel]) = hall.at(image.azimuth_cdeg(c, b), b);
             }
         }
         Self {
