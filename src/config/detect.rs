@@ -120,6 +120,8 @@ pub enum PositionMethod {
     BoxCenter,
     /// Mean of the points, each moved away from its sensor.
     ShiftedMean,
+    /// The same, corrected by a linear model of what was seen.
+    Fitted,
 }
 
 /// Which way an oriented box may turn.
@@ -136,7 +138,7 @@ pub enum ObbAxes {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeasureConfig {
-    /// Box centre or shifted mean.
+    /// Box centre, shifted mean or fitted.
     pub position: PositionMethod,
     /// How far a point is moved along the horizontal line of sight.
     pub shift_m: f64,

@@ -1,9 +1,15 @@
 //! Position and boxes of one person.
 
+use super::bias::{View, away};
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
 use crate::config::{DetectConfig, MeasureConfig, ObbAxes, PositionMethod};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+
+/// A prior farther than this from a cluster does not tell where its person walks.
+const OWN_M: f64 = 0.5;
+/// Who walks slower may look anywhere.
+const WALKING_MPS: f64 = 0.3;
 
 /// Turns clusters into detections.
 #[derive(Debug)]
@@ -26,14 +32,14 @@ impl Measurer {
         &mut self,
         points: &[Point],
         clusters: &[Cluster],
-        _priors: &[Prior],
+        priors: &[Prior],
         detections: &mut Vec<Detection>,
     ) {
         detections.clear();
         for cluster in clusters {
             let aabb = Aabb::around(cluster.iter().map(|&i| points[i as usize].position_m));
             if self.has_size_of_person(cluster.len(), &aabb) {
-                detections.push(self.detection(points, cluster, aabb));
+                detections.push(self.detection(points, cluster, priors, aabb));
             }
         }
     }
@@ -51,7 +57,7 @@ impl Measurer {
             && aabb.max_m.z < c.top_max_m
     }
 
-    fn detection(&self, points: &[Point], cluster: &[u32], aabb: Aabb) -> Detection {
+    fn detection(&self, points: &[Point], cluster: &[u32], priors: &[Prior], aabb: Aabb) -> Detection {
         let n = cluster.len() as f64;
         let of = || cluster.iter().map(|&i| &points[i as usize]);
         let mean_m: DVec3 = of().map(|p| p.position_m).sum::<DVec3>() / n;
@@ -59,12 +65,8 @@ impl Measurer {
         let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
         let (position_m, z_m) = match self.config.position {
             PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z),
-            PositionMethod::ShiftedMean => {
-                // What is seen is the side toward the sensor: every point moves away from its own sensor.
-                let shift: DVec2 =
-                    of().map(|p| self.line_of_sight(p)).sum::<DVec2>() / n * self.config.shift_m;
-                (mean_m.truncate() + shift, mean_m.z)
-            }
+            PositionMethod::ShiftedMean => (self.view(points, cluster, &[]).base_m, mean_m.z),
+            PositionMethod::Fitted => (self.view(points, cluster, priors).position_m(), mean_m.z),
         };
         Detection {
             position_m,
@@ -77,11 +79,17 @@ impl Measurer {
         }
     }
 
-    /// Horizontal unit vector from the point's sensor to the point.
-    fn line_of_sight(&self, point: &Point) -> DVec2 {
-        self.sensors_m
-            .get(usize::from(point.sensor))
-            .map_or(DVec2::ZERO, |s| (point.position_m - s).truncate().normalize_or_zero())
+    /// A cluster as the bias model sees it; who walks there is the nearest of `priors`.
+    pub fn view(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> View {
+        let seen = cluster.iter().map(|&i| (&points[i as usize], away(&self.sensors_m, &points[i as usize])));
+        let mean_m =
+            seen.clone().map(|(p, _)| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
+        let off_m = |prior: &Prior| prior.position_m.distance(mean_m);
+        let who = priors.iter().filter(|p| p.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
+        let heading = who
+            .filter(|prior| off_m(prior) < OWN_M && prior.velocity_mps.length() > WALKING_MPS)
+            .map(|prior| prior.velocity_mps.normalize());
+        View::new(seen, self.config.shift_m, heading)
     }
 }
 

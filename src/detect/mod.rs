@@ -10,6 +10,7 @@ pub mod cluster;
 pub mod dp_means;
 pub mod evidence;
 pub mod split_merge;
+pub mod bias;
 pub mod measure;
 
 pub use background::Background;

@@ -84,13 +84,21 @@ fn main() {
                 if flag("--points") {
                     for p in &points {
                         let (q, ms) = (p.position_m, (p.time_ns - frame.time_ns) as f64 * 1e-6);
-                        writeln!(csv, "{seed},{},p,{:.4},{:.4},{:.4},{ms:.2},{}", frame.index, q.x, q.y, q.z, p.sensor)
-                            .expect("a string");
+                        writeln!(
+                            csv,
+                            "{seed},{},p,{:.4},{:.4},{:.4},{ms:.2},{}",
+                            frame.index, q.x, q.y, q.z, p.sensor
+                        )
+                        .expect("a string");
                     }
                     for p in &truth {
                         let (q, v) = (p.state.position_m, p.state.velocity_mps);
-                        writeln!(csv, "{seed},{},t,{:.4},{:.4},{:.4},{:.4},{:.4}", frame.index, q.x, q.y, v.x, v.y, p.state.heading_rad)
-                            .expect("a string");
+                        writeln!(
+                            csv,
+                            "{seed},{},t,{:.4},{:.4},{:.4},{:.4},{:.4}",
+                            frame.index, q.x, q.y, v.x, v.y, p.state.heading_rad
+                        )
+                        .expect("a string");
                     }
                 }
                 // Where a person was when the points were measured.
