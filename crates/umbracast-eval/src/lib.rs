@@ -20,3 +20,4 @@ pub mod true_bodies;
 pub mod score;
 pub mod pooled;
 pub mod chain;
+pub mod ladder;

@@ -92,8 +92,7 @@ fn standing_on(print: &Footprint, progress: f64, amount: f64, build: &Build) -> 
 fn swinging(from: &Footprint, to: &Footprint, progress: f64, amount: f64, build: &Build) -> FootPose {
     let (start, end) = (standing_on(from, 1.0, amount, build), standing_on(to, 0.0, amount, build));
     let u = progress;
-    // The smoothest way from rest to rest (minimum jerk).
-    let way = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+    let way = swing_way(u, amount);
     let ground = start.ankle_m.truncate().lerp(end.ankle_m.truncate(), way);
     let turn = (to.yaw_rad - from.yaw_rad + PI).rem_euclid(TAU) - PI;
     let pitch_rad = amount * gait::swing_pitch_rad(u);
@@ -106,6 +105,17 @@ fn swinging(from: &Footprint, to: &Footprint, progress: f64, amount: f64, build:
         pitch_rad,
         toe_pitch_rad,
     }
+}
+
+/// Share of the way from print to print: the smoothest one (minimum jerk) that leaves with the speed which the
+/// ankle has while the foot rolls over the ball, and still moves a little as the heel lands.
+fn swing_way(u: f64, amount: f64) -> f64 {
+    let (leave, land) = (0.5 * amount, 0.25 * amount);
+    let (u2, u3) = (u * u, u * u * u);
+    leave * u
+        + (10.0 - 6.0 * leave - 4.0 * land) * u3
+        + (8.0 * leave + 7.0 * land - 15.0) * u3 * u
+        + (6.0 - 3.0 * leave - 3.0 * land) * u3 * u2
 }
 
 /// The lowest point of the sole, from the ankle.

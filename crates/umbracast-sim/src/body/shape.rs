@@ -222,10 +222,10 @@ fn upper_arm(b: &Build, side: f64) -> Vec<Ring> {
     let deltoid = (b.bideltoid_m / 2.0 - y).clamp(0.9 * r, 1.6 * r);
     let elbow = 0.9 * b.forearm_radius_m;
     let keys = [
-        (0.0, [0.0, 0.0], [1.05 * r, 0.93 * deltoid]),
-        (0.18, [0.0, 0.0], [1.08 * r, deltoid]),
-        (0.45, [0.0, 0.0], [1.05 * r, r]),
-        (0.75, [0.0, 0.0], [0.95 * r, 0.9 * r]),
+        (0.0, [0.0, 0.0], [1.05 * r, 0.96 * deltoid]),
+        (0.2, [0.0, 0.0], [1.08 * r, deltoid]),
+        (0.45, [0.0, 0.0], [1.05 * r, 0.6 * r + 0.4 * deltoid]),
+        (0.75, [0.0, 0.0], [0.95 * r, 0.92 * r]),
         (1.0, [0.0, 0.0], [elbow, elbow]),
     ];
     with_round_ends(limb([shoulder, b.elbow_height_m()], [0.0, side * y], keys), 0.045, 0.8 * elbow)

@@ -68,7 +68,7 @@ fn a_foot_is_always_on_the_floor_and_what_touches_it_does_not_slide() {
         for (i, pair) in all.windows(2).enumerate() {
             let mut feet_down = 0;
             for foot in FEET {
-                let low = |v: &DVec3| v.z < 1e-6;
+                let low = |v: &DVec3| v.z < 1e-8;
                 feet_down += usize::from(part(foot).any(|v| low(&pair[0][v])));
                 for v in part(foot).filter(|&v| low(&pair[0][v]) && low(&pair[1][v])) {
                     let slip = pair[0][v].distance(pair[1][v]);
