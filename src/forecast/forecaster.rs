@@ -135,3 +135,126 @@ fn draw(displacement: &Gaussian2, generator: &mut Pcg64) -> DVec2 {
     let l_yy = (displacement.yy_m2 - l_xy * l_xy).max(0.0).sqrt();
     displacement.mean_m + DVec2::new(l_xx * a, l_xy * a + l_yy * b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+    use crate::forecast::lstm::tests::small_network;
+    use crate::geometry::{Aabb, DMat3, DVec3, Obb};
+
+    /// A track that has walked along `way_m` up to and with frame `frame`.
+    fn track(id: u64, way_m: &[DVec2], frame: usize) -> Track {
+        let observed = (frame.saturating_sub(OBSERVED - 1)..=frame)
+            .map(|k| ((k as i64 + 1) * STEP_NS, way_m[k]))
+            .collect::<VecDeque<_>>();
+        Track {
+            id,
+            position_m: way_m[frame],
+            velocity_mps: DVec2::new(1.0, 0.0),
+            covariance: [[0.01; 4]; 4],
+            heading_rad: 0.0,
+            height_m: 1.75,
+            points: 30,
+            confirmed: true,
+            aabb: Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE },
+            obb: Obb { center_m: DVec3::ZERO, half_m: DVec3::ONE, site_from_box: DMat3::IDENTITY },
+            observed,
+        }
+    }
+
+    fn way() -> Vec<DVec2> {
+        (0..30).map(|k| DVec2::new(0.1 * f64::from(k), (0.3 * f64::from(k)).sin() * 0.2)).collect()
+    }
+
+    fn forecaster(method: ForecastMethod, rollout: Rollout, seed: u64) -> Forecaster {
+        let config = ForecastConfig { method, rollout, seed, ..Config::default().forecast };
+        let weights = Weights::from_safetensors(&small_network()).unwrap();
+        Forecaster::new(&config, Some(&weights)).unwrap()
+    }
+
+    fn forecasts(forecaster: &mut Forecaster, tracks: &[Track]) -> Vec<Forecast> {
+        let mut forecasts = Vec::new();
+        forecaster.forecast(tracks, &mut forecasts);
+        forecasts
+    }
+
+    #[test]
+    fn a_draw_depends_on_seed_track_and_frame_alone() {
+        let way = way();
+        let mut one = forecaster(ForecastMethod::Lstm, Rollout::Draw, 1);
+        let alone = forecasts(&mut one, &[track(7, &way, 15)]);
+        forecasts(&mut one, &[track(7, &way, 16)]);
+        let among_others = forecasts(&mut one, &[track(3, &way, 15), track(7, &way, 15), track(9, &way, 15)]);
+        assert_eq!(alone[0], among_others[1]);
+        assert_ne!(among_others[0].steps, among_others[1].steps);
+        let later = Track { observed: track(7, &way, 15).observed, ..track(7, &way, 15) };
+        let shifted = later.observed.iter().map(|&(time_ns, p)| (time_ns + STEP_NS, p)).collect();
+        assert_ne!(alone[0].steps, forecasts(&mut one, &[Track { observed: shifted, ..later }])[0].steps);
+        let mut two = forecaster(ForecastMethod::Lstm, Rollout::Draw, 2);
+        assert_ne!(alone[0].steps, forecasts(&mut two, &[track(7, &way, 15)])[0].steps);
+    }
+
+    #[test]
+    fn the_mean_of_many_draws_is_the_mean_of_the_first_step() {
+        let way = way();
+        let mean = forecasts(&mut forecaster(ForecastMethod::Lstm, Rollout::Mean, 1), &[track(1, &way, 15)]);
+        let tracks: Vec<Track> = (0..4000).map(|id| track(id, &way, 15)).collect();
+        let draws = forecasts(&mut forecaster(ForecastMethod::Lstm, Rollout::Draw, 1), &tracks);
+        let (first, n) = (mean[0].steps[0], draws.len() as f64);
+        let (mut center, mut xy) = (DVec2::ZERO, 0.0);
+        for draw in &draws {
+            let d = draw.steps[0].mean_m - first.mean_m;
+            (center, xy) = (center + d / n, xy + d.x * d.y / n);
+        }
+        let error_m = (first.xx_m2 / n).sqrt();
+        assert!(center.length() < 5.0 * error_m, "{center} with a standard error of {error_m}");
+        let error_m2 = (first.xx_m2 * first.yy_m2 / n).sqrt();
+        assert!((xy - first.xy_m2).abs() < 5.0 * error_m2, "{xy} for {}", first.xy_m2);
+    }
+
+    #[test]
+    fn later_frames_change_no_forecast() {
+        const CHANGED_FROM: usize = 20;
+        let way = way();
+        let mut other_way = way.clone();
+        other_way[CHANGED_FROM..].iter_mut().for_each(|p| *p += DVec2::new(0.5, -0.5));
+        for method in [ForecastMethod::ConstantVelocity, ForecastMethod::Lstm] {
+            let (mut one, mut other) =
+                (forecaster(method, Rollout::Mean, 1), forecaster(method, Rollout::Mean, 1));
+            for frame in 0..way.len() {
+                let expected = forecasts(&mut one, &[track(1, &way, frame)]);
+                let found = forecasts(&mut other, &[track(1, &other_way, frame)]);
+                assert_eq!(expected == found, frame < CHANGED_FROM, "frame {frame}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_young_track_goes_on_at_constant_velocity() {
+        let way = way();
+        let mut lstm = forecaster(ForecastMethod::Lstm, Rollout::Mean, 1);
+        let mut straight = forecaster(ForecastMethod::ConstantVelocity, Rollout::Mean, 1);
+        let tracks = [track(1, &way, OBSERVED - 2), track(2, &way, OBSERVED - 1)];
+        let (found, expected) = (forecasts(&mut lstm, &tracks), forecasts(&mut straight, &tracks));
+        assert_eq!(found[0], expected[0]);
+        assert_ne!(found[1].steps, expected[1].steps);
+    }
+
+    #[test]
+    fn displacements_are_scaled_to_a_frame() {
+        let observed = |period_ns: i64| -> VecDeque<_> {
+            (0..OBSERVED as i64).map(|k| (k * period_ns, DVec2::new(k as f64, 0.0))).collect()
+        };
+        assert_eq!(displacements_m(&observed(STEP_NS)).unwrap()[4], DVec2::new(1.0, 0.0));
+        assert_eq!(displacements_m(&observed(2 * STEP_NS)).unwrap()[4], DVec2::new(0.5, 0.0));
+        assert_eq!(displacements_m(&observed(0)), None);
+    }
+
+    #[test]
+    fn lstm_without_weights_is_an_error() {
+        let config = ForecastConfig { method: ForecastMethod::Lstm, ..Config::default().forecast };
+        let message = Forecaster::new(&config, None).unwrap_err().to_string();
+        assert!(message.contains("expected its weights, found none"), "{message}");
+    }
+}

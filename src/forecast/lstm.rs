@@ -161,3 +161,76 @@ fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32
         None => Ok(values),
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use safetensors::serialize;
+    use safetensors::tensor::TensorView;
+
+    type Tensors = Vec<(&'static str, Vec<usize>, Vec<f32>)>;
+
+    /// Eight embedded, sixteen hidden, weights anyhow.
+    fn small_tensors() -> Tensors {
+        let shapes: [(&str, &[usize]); 8] = [
+            ("emb.weight", &[8, 2]),
+            ("emb.bias", &[8]),
+            ("enc.weight_ih", &[64, 8]),
+            ("enc.weight_hh", &[64, 16]),
+            ("enc.bias_ih", &[64]),
+            ("enc.bias_hh", &[64]),
+            ("dec.weight", &[5, 16]),
+            ("dec.bias", &[5]),
+        ];
+        let values = |count: usize| (0..count).map(|i| ((i * 37 % 101) as f32 - 50.0) * 0.006).collect();
+        shapes.map(|(name, shape)| (name, shape.to_vec(), values(shape.iter().product()))).to_vec()
+    }
+
+    fn file(tensors: &Tensors) -> Vec<u8> {
+        let bytes: Vec<Vec<u8>> =
+            tensors.iter().map(|(_, _, v)| v.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
+        let views = tensors.iter().zip(&bytes).map(|((name, shape, _), bytes)| {
+            (*name, TensorView::new(Dtype::F32, shape.clone(), bytes).unwrap())
+        });
+        serialize(views, None).unwrap()
+    }
+
+    /// A weights file.
+    pub(in crate::forecast) fn small_network() -> Vec<u8> {
+        file(&small_tensors())
+    }
+
+    #[test]
+    fn people_are_foreseen_alike_in_any_company() {
+        let weights = Weights::from_safetensors(&small_network()).unwrap();
+        let observed: Vec<_> = (0..13)
+            .map(|person| {
+                let angle = f64::from(person);
+                [DVec2::new(0.1 * angle.cos(), 0.1 * angle.sin()); OBSERVED_DISPLACEMENTS]
+            })
+            .collect();
+        let together = weights.roll_out(&observed, |_, displacement| displacement.mean_m);
+        for (person, &observed) in observed.iter().enumerate() {
+            let alone = weights.roll_out(&[observed], |_, displacement| displacement.mean_m);
+            assert_eq!(alone[0], together[person]);
+        }
+    }
+
+    #[test]
+    fn a_wrong_tensor_is_named_with_what_was_expected_and_found() {
+        let refused = |change: &dyn Fn(&mut Tensors)| {
+            let mut tensors = small_tensors();
+            change(&mut tensors);
+            Weights::from_safetensors(&file(&tensors)).unwrap_err().to_string()
+        };
+        let message = refused(&|tensors| tensors[6] = ("dec.weight", vec![4, 16], vec![0.0; 64]));
+        assert_eq!(message, "weights: dec.weight: expected f32 of shape [5, 16], found F32 of shape [4, 16]");
+        let message = refused(&|tensors| drop(tensors.remove(2)));
+        assert_eq!(message, "weights: enc.weight_ih: expected f32 of shape [64, 8], found no such tensor");
+        let message = refused(&|tensors| tensors[7].2[3] = f32::NAN);
+        assert_eq!(message, "weights: dec.bias: expected f32 of shape [5], found NaN at place 3");
+        let message = refused(&|tensors| tensors[3] = ("enc.weight_hh", vec![40, 10], vec![0.0; 400]));
+        assert!(message.contains("expected a multiple of 16 hidden units, found 10"), "{message}");
+        assert!(Weights::from_safetensors(b"not a file").is_err());
+    }
+}
