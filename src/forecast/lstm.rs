@@ -3,6 +3,7 @@
 //! One network, run for each person alone. It reads nine displacements of the observation window, in metres a
 //! frame, and then goes on for eight steps more, each fed with the displacement foreseen by the step before.
 
+use std::fmt;
 use std::sync::Arc;
 
 use safetensors::{Dtype, SafeTensors};
@@ -26,12 +27,11 @@ pub const SIGMA_SCALE_M: f32 = 0.1;
 pub const RHO_LIMIT: f32 = 0.95;
 
 /// The network's weights, packed once for the forward pass. A clone shares them.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Weights {
     network: Arc<Network>,
 }
 
-#[derive(Debug)]
 struct Network {
     /// Per unit of the embedding: weights of x and y, bias.
     embedding: Vec<[f32; 3]>,
@@ -102,6 +102,14 @@ impl Weights {
             }
         }
         foreseen
+    }
+}
+
+impl fmt::Debug for Weights {
+    /// The widths, not a million numbers.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let PackedCell { inputs, units, .. } = self.network.cell;
+        f.debug_struct("Weights").field("embedded", &inputs).field("units", &units).finish()
     }
 }
 

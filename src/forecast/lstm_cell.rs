@@ -14,7 +14,6 @@ const GATES: usize = 4;
 type Lanes = [f32; LANES];
 
 /// An LSTM layer's weights.
-#[derive(Debug)]
 pub(super) struct PackedCell {
     /// Inputs before the hidden state.
     pub inputs: usize,
@@ -180,6 +179,32 @@ fn exp<const FUSED: bool>(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_processor_agrees() {
+        let (inputs, units) = (5, 2 * LANES);
+        let values =
+            |count: usize| -> Vec<f32> { (0..count).map(|i| (i as f32 * 0.7).sin() * 0.2).collect() };
+        let cell = PackedCell::pack(
+            inputs,
+            units,
+            &values(GATES * units * inputs),
+            &values(GATES * units * units),
+            &values(GATES * units),
+        );
+        let mut plain = vec![GroupState::zero(&cell); 2];
+        plain[1].rows[..inputs].fill([1.0; GROUP]);
+        let mut as_here = plain.clone();
+        for _ in 0..17 {
+            step_with::<false>(&cell, &mut plain);
+            step(&cell, &mut as_here);
+        }
+        for (plain, here) in plain.iter().zip(&as_here) {
+            for (plain, here) in plain.rows.as_flattened().iter().zip(here.rows.as_flattened()) {
+                assert!((plain - here).abs() < 1e-6, "{plain} and {here}");
+            }
+        }
+    }
 
     #[test]
     fn exp_and_its_children_are_exact_to_single_precision() {
