@@ -45,8 +45,9 @@ pub fn columns_per_packet(model: &Model) -> usize {
 /// A column's time is the packet's own, in the hour that brings it nearest to the time of reception. Between the
 /// azimuths that the packet gives the head turns at the packet's own rate.
 ///
-/// Packets with two returns a firing hold each column twice, the last return in the even block and the strongest
-/// in the odd one: the strongest is given, as a sensor set to one return gives it.
+/// Packets with two returns a firing hold each column twice, the last return in the even block and the strongest,
+/// or the second strongest where the last one is the strongest, in the odd one. Of the two the more reflecting is
+/// given.
 pub fn decode(
     model: &Model,
     packet: &Packet,
@@ -62,18 +63,24 @@ pub fn decode(
         return;
     };
     let beams = model.beams.len();
-    let mut range_m = [0.0; RETURNS_PER_BLOCK];
-    let mut reflectivity = [0; RETURNS_PER_BLOCK];
     for firing in 0..BLOCKS / head.blocks_per_firing {
-        let block = block(payload, (firing + 1) * head.blocks_per_firing - 1);
-        for (i, bytes) in block[4..].chunks_exact(3).enumerate() {
-            range_m[i] = f32::from(u16::from_le_bytes([bytes[0], bytes[1]])) * RANGE_UNIT_M;
-            reflectivity[i] = bytes[2];
+        let mut range_m = [0.0; RETURNS_PER_BLOCK];
+        let mut reflectivity = [0; RETURNS_PER_BLOCK];
+        let first = firing * head.blocks_per_firing;
+        for b in first..first + head.blocks_per_firing {
+            for (i, bytes) in block(payload, b)[4..].chunks_exact(3).enumerate() {
+                let distance = u16::from_le_bytes([bytes[0], bytes[1]]);
+                if distance != 0 && bytes[2] >= reflectivity[i] {
+                    range_m[i] = f32::from(distance) * RANGE_UNIT_M;
+                    reflectivity[i] = bytes[2];
+                }
+            }
         }
         for k in 0..model.columns_per_block {
             let after_block_ns = k as f64 * model.column_period_ns;
             let after_packet_ns = (firing * model.columns_per_block + k) as f64 * model.column_period_ns;
-            let azimuth_cdeg = f64::from(azimuth_cdeg(block)) + head.rate_cdeg_per_ns * after_block_ns;
+            let azimuth_cdeg =
+                f64::from(azimuth_cdeg(block(payload, first))) + head.rate_cdeg_per_ns * after_block_ns;
             let column = Column {
                 time_ns: head.time_ns + after_packet_ns.round() as i64,
                 azimuth_cdeg: (azimuth_cdeg % f64::from(TURN_CDEG)) as f32,

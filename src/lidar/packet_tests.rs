@@ -29,7 +29,7 @@ fn example(model: &Model, time_ns: i64, azimuth_cdeg: f64) -> Decoded {
         })
         .collect();
     let returns = columns.len() * model.beams.len();
-    let range_m = (0..returns).map(|_| f32::from(random.random::<u16>()) * RANGE_UNIT_M).collect();
+    let range_m = (0..returns).map(|_| f32::from(random.random_range(1..=u16::MAX)) * RANGE_UNIT_M).collect();
     let reflectivity = (0..returns).map(|_| random.random()).collect();
     (columns, range_m, reflectivity)
 }
@@ -108,21 +108,23 @@ fn the_hour_is_the_one_nearest_to_reception() {
 }
 
 #[test]
-fn two_returns_give_the_strongest() {
+fn of_two_returns_the_more_reflecting_is_given() {
     let model = Model::hdl_32e();
-    let (columns, mut range_m, reflectivity) = example(&model, 0, 0.0);
-    for (c, ranges_m) in range_m.chunks_mut(32).enumerate() {
-        ranges_m.fill(if c % 2 == 0 { 20.0 } else { 10.0 });
-    }
+    let (columns, ..) = example(&model, 0, 0.0);
     let pairs: Vec<_> = (0..12).map(|c| columns[c / 2]).collect();
+    // Beam by beam: the odd block's is stronger, the even block's, both are the same, there is but one.
+    let even = [(20.0, 5), (20.0, 9), (10.0, 7), (10.0, 7)];
+    let odd = [(10.0, 8), (10.0, 3), (10.0, 7), (0.0, 0)];
+    let block = |values: [(f32, u8); 4]| values.repeat(8);
+    let returns = [block(even), block(odd)].concat().repeat(6);
+    let (range_m, reflectivity): (Vec<_>, Vec<_>) = returns.into_iter().unzip();
     let mut packet = encode(&model, &pairs, &range_m, &reflectivity, 0);
     packet.payload[1204] = DUAL;
     let mut health = Health::default();
     let got = decode_all(&model, &packet, &mut health);
     assert!(health.is_clean());
-    assert_eq!(got.0.len(), 6);
-    assert!(got.1.iter().all(|&range_m| range_m == 10.0));
-    assert_eq!(got.0[5].time_ns, 5 * 46_080);
+    assert_eq!((got.0.len(), got.0[5].time_ns), (6, 5 * 46_080));
+    assert_eq!((&got.1[..4], &got.2[..4]), (&[10.0, 20.0, 10.0, 10.0][..], &[8, 9, 7, 7][..]));
     assert!((got.0[0].azimuth_rate_cdeg_per_ns / columns[0].azimuth_rate_cdeg_per_ns - 1.0).abs() < 0.02);
 }
 
