@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use umbracast::Health;
 use umbracast::lidar::packet::decode;
-use umbracast::lidar::{Model, Packet, RangeImage};
+use umbracast::lidar::{Model, RangeImage};
 use umbracast_io::messages::read_scan;
 use umbracast_io::pcd::read_pcd;
 
