@@ -72,6 +72,8 @@ pub struct ClusterConfig {
     pub radius_m: f64,
     /// The radius grows by this for each metre from the nearest sensor.
     pub radius_per_range: f64,
+    /// How far a point is moved along the horizontal line of sight before it is clustered.
+    pub shift_m: f64,
     /// Smaller clusters are dropped.
     pub points_min: usize,
 }
@@ -110,6 +112,28 @@ pub struct SplitConfig {
     pub merge_m: f64,
     /// Gap test: what stands for the mean.
     pub merge_mean: MergeMean,
+    /// One person more or fewer.
+    pub evidence: EvidenceConfig,
+}
+
+/// When there is one person more or fewer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EvidenceConfig {
+    /// Two people when the means of the halves of a cluster lie farther apart than this.
+    pub halves_m: f64,
+    /// The same where two people are expected.
+    pub expected_halves_m: f64,
+    /// A point or part nearer than this to an expected person may be that person.
+    pub expected_m: f64,
+    /// Each half needs as many points.
+    pub points_min: usize,
+    /// Parts whose means are nearer than this are one person.
+    pub one_person_m: f64,
+    /// A low part nearer than this to a person is a leg.
+    pub limb_m: f64,
+    /// Low: its top is below this share of the person's.
+    pub limb_top_share: f64,
 }
 
 /// Where a person stands, given the points.

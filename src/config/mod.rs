@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 pub use blockage::{BlockageConfig, BlockageMethod, BoxKind};
 pub use detect::{
-    BackgroundConfig, BackgroundMethod, ClusterConfig, DetectConfig, MeasureConfig, MergeMean, ObbAxes,
-    PositionMethod, SplitConfig, SplitMethod,
+    BackgroundConfig, BackgroundMethod, ClusterConfig, DetectConfig, EvidenceConfig, MeasureConfig,
+    MergeMean, ObbAxes, PositionMethod, SplitConfig, SplitMethod,
 };
 pub use forecast::{ForecastConfig, ForecastMethod, Rollout};
 pub use track::{Assignment, Boxes, GateOn, MeasuredAt, ProcessNoise, TrackConfig};

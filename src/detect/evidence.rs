@@ -1,50 +1,268 @@
-//! Is it one person more?
+//! One person more, or one fewer? A cluster is split as long as its parts lie farther apart than the halves of one
+//! body, and parts nearer than two bodies can stand become one. Where people are expected moves both thresholds.
 
-use super::Point;
-use crate::geometry::DVec2;
+use super::{Cluster, Prior};
+use crate::config::EvidenceConfig;
+use crate::geometry::{DVec2, DVec3};
 
-/// Farthest apart that the middles of the two halves of one body are seen.
-const HALVES_M: f64 = 0.42;
+/// Passes of k-means; it settles in three or four.
+const PASSES: usize = 10;
+/// Points that deviate more than this along their longest axis are more than four people in a row.
+const CROWD_M: f64 = 0.7;
 
-/// Splits a cluster in two as long as that is likelier than one person; parts go to `parts`.
-pub fn split(points: &[Point], cluster: Vec<u32>, points_min: usize, parts: &mut Vec<Vec<u32>>) {
-    if cluster.len() >= 2 * points_min {
-        let (a, b, apart_m) = halves(points, &cluster);
-        if apart_m > HALVES_M && a.len() >= points_min && b.len() >= points_min {
-            split(points, a, points_min, parts);
-            split(points, b, points_min, parts);
-            return;
-        }
-    }
-    parts.push(cluster);
+/// A part of the foreground that may be a person.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// Indices of its points, ascending.
+    pub points: Cluster,
+    sum_m: DVec2,
+    top_m: f64,
 }
 
-/// Two-means from the ends of the longest axis.
-fn halves(points: &[Point], cluster: &[u32]) -> (Vec<u32>, Vec<u32>, f64) {
-    let at = |i: u32| points[i as usize].position_m.truncate();
-    let n = cluster.len() as f64;
-    let mean: DVec2 = cluster.iter().map(|&i| at(i)).sum::<DVec2>() / n;
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for &i in cluster {
-        let d = at(i) - mean;
-        xx += d.x * d.x;
-        xy += d.x * d.y;
-        yy += d.y * d.y;
+impl Part {
+    fn new(moved_m: &[DVec3], points: Cluster) -> Self {
+        let sum_m = points.iter().map(|&i| moved_m[i as usize].truncate()).sum();
+        let top_m = points.iter().map(|&i| moved_m[i as usize].z).fold(0.0, f64::max);
+        Self { points, sum_m, top_m }
     }
-    let axis = DVec2::from_angle(0.5 * f64::atan2(2.0 * xy, xx - yy));
-    let (mut p, mut q) = (mean - axis, mean + axis);
-    for _ in 0..10 {
-        let mut sums = [(DVec2::ZERO, 0.0); 2];
-        for &i in cluster {
-            let side = usize::from(at(i).distance_squared(q) < at(i).distance_squared(p));
-            sums[side].0 += at(i);
-            sums[side].1 += 1.0;
+
+    fn mean_m(&self) -> DVec2 {
+        self.sum_m / self.points.len().max(1) as f64
+    }
+}
+
+/// Splits a cluster as long as one person more is likelier; parts go to `parts`. `moved_m` are all points, each
+/// moved behind the surface that its sensor saw.
+pub fn split(
+    moved_m: &[DVec3],
+    priors: &[Prior],
+    cluster: Cluster,
+    config: &EvidenceConfig,
+    parts: &mut Vec<Part>,
+) {
+    if cluster.len() < 2 * config.points_min {
+        parts.push(Part::new(moved_m, cluster));
+        return;
+    }
+    let whole = Part::new(moved_m, cluster);
+    let axis_m = long_axis(moved_m, &whole);
+    if axis_m.length() > CROWD_M {
+        // The work grows with the square of the people, so a crowd is halved first; whom the cut divides, the
+        // merge makes whole again.
+        let ends_m = vec![whole.mean_m() - axis_m, whole.mean_m() + axis_m];
+        for half in means(moved_m, &whole.points, ends_m).into_iter().flatten() {
+            split(moved_m, priors, half.points, config, parts);
         }
-        if sums[0].1 == 0.0 || sums[1].1 == 0.0 {
+        return;
+    }
+    let cluster = &whole.points;
+    let expected_m = expected(moved_m, priors, cluster, config);
+    let mut people = means(moved_m, cluster, expected_m)
+        .filter(|people| are_people(people, config.expected_halves_m, config))
+        .unwrap_or_else(|| vec![whole.clone()]);
+    // k against k + 1: the longest part gives way to its two halves, and all find their places anew.
+    while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
+        && are_people(&more, config.halves_m, config)
+    {
+        people = more;
+    }
+    parts.append(&mut people);
+}
+
+/// True when all stand apart and show enough.
+fn are_people(parts: &[Part], apart_m: f64, config: &EvidenceConfig) -> bool {
+    let apart = |k: usize, a: &Part| parts[k + 1..].iter().all(|b| a.mean_m().distance(b.mean_m()) > apart_m);
+    parts.iter().enumerate().all(|(k, a)| a.points.len() >= config.points_min && apart(k, a))
+}
+
+/// Joins parts that are one person, nearest first: those nearer than two people can stand, and legs that lost
+/// their body.
+pub fn merge(parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
+    let reach_m = config.one_person_m.max(config.limb_m);
+    let mut order: Vec<usize> = (0..parts.len()).collect();
+    order.sort_by(|&a, &b| parts[a].mean_m().x.total_cmp(&parts[b].mean_m().x));
+    let mut candidates = Vec::new();
+    for (k, &i) in order.iter().enumerate() {
+        for &j in &order[k + 1..] {
+            let off_m = parts[j].mean_m() - parts[i].mean_m();
+            if off_m.x > reach_m {
+                break;
+            }
+            if off_m.length() < reach_m {
+                candidates.push((off_m.length(), i.min(j), i.max(j)));
+            }
+        }
+    }
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    // What was merged leaves an empty part that points to where it went.
+    let mut into: Vec<usize> = (0..parts.len()).collect();
+    let root = |into: &[usize], mut i: usize| {
+        while into[i] != i {
+            i = into[i];
+        }
+        i
+    };
+    for (_, i, j) in candidates {
+        let (i, j) = (root(&into, i), root(&into, j));
+        if i == j || !is_one_person(&parts[i], &parts[j], priors, config) {
+            continue;
+        }
+        let gone = Part { points: Vec::new(), sum_m: DVec2::ZERO, top_m: 0.0 };
+        let part = std::mem::replace(&mut parts[j], gone);
+        parts[i].points.extend(part.points);
+        parts[i].sum_m += part.sum_m;
+        parts[i].top_m = parts[i].top_m.max(part.top_m);
+        into[j] = i;
+    }
+    parts.retain(|part| !part.points.is_empty());
+    parts.iter_mut().for_each(|part| part.points.sort_unstable());
+}
+
+fn is_one_person(a: &Part, b: &Part, priors: &[Prior], config: &EvidenceConfig) -> bool {
+    let apart_m = a.mean_m().distance(b.mean_m());
+    if apart_m < config.one_person_m {
+        return !are_expected_apart(a.mean_m(), b.mean_m(), priors, config);
+    }
+    // A leg in mid-stride stands apart from its body, is low, and shows less.
+    let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
+    apart_m < config.limb_m && small.top_m < config.limb_top_share * large.top_m
+}
+
+/// True when each of the two is where another confirmed person is expected.
+fn are_expected_apart(a_m: DVec2, b_m: DVec2, priors: &[Prior], config: &EvidenceConfig) -> bool {
+    let nearest = |p_m: DVec2| {
+        let confirmed = priors.iter().filter(|prior| prior.confirmed).map(|prior| prior.position_m);
+        confirmed.min_by(|a, b| a.distance_squared(p_m).total_cmp(&b.distance_squared(p_m)))
+    };
+    let (Some(p), Some(q)) = (nearest(a_m), nearest(b_m)) else { return false };
+    let own = |prior_m: DVec2, p_m: DVec2| prior_m.distance(p_m) < config.expected_m;
+    p.distance(q) > config.expected_halves_m && own(p, a_m) && own(q, b_m)
+}
+
+/// Where confirmed people are expected within the cluster.
+fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32], config: &EvidenceConfig) -> Vec<DVec2> {
+    let is_inside = |prior: &&Prior| {
+        let near = |i: &u32| moved_m[*i as usize].truncate().distance(prior.position_m) < config.expected_m;
+        prior.confirmed && cluster.iter().any(near)
+    };
+    priors.iter().filter(is_inside).map(|prior| prior.position_m).collect()
+}
+
+/// The means of the parts, those of the longest replaced by two, half a step to either side of its middle.
+fn one_more(moved_m: &[DVec3], parts: &[Part]) -> Vec<DVec2> {
+    let axes_m: Vec<DVec2> = parts.iter().map(|part| long_axis(moved_m, part)).collect();
+    let longest = (0..parts.len()).max_by(|&a, &b| axes_m[a].length().total_cmp(&axes_m[b].length()));
+    let mut means_m: Vec<DVec2> = parts.iter().map(Part::mean_m).collect();
+    if let Some(longest) = longest {
+        means_m.push(means_m[longest] + axes_m[longest]);
+        means_m[longest] -= axes_m[longest];
+    }
+    means_m
+}
+
+/// Along the larger deviation in plan view, as long as it.
+fn long_axis(moved_m: &[DVec3], part: &Part) -> DVec2 {
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for &i in &part.points {
+        let off = moved_m[i as usize].truncate() - part.mean_m();
+        xx += off.x * off.x;
+        xy += off.x * off.y;
+        yy += off.y * off.y;
+    }
+    let larger = 0.5 * (xx + yy + ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt());
+    DVec2::from_angle(0.5 * f64::atan2(2.0 * xy, xx - yy)) * (larger / part.points.len().max(1) as f64).sqrt()
+}
+
+/// k-means of the cluster from these means; `None` with fewer than two, or when one of them loses all its points.
+fn means(moved_m: &[DVec3], cluster: &[u32], mut means_m: Vec<DVec2>) -> Option<Vec<Part>> {
+    if means_m.len() < 2 {
+        return None;
+    }
+    let nearest = |means_m: &[DVec2], i: u32| {
+        let p = moved_m[i as usize].truncate();
+        let nearer = |&a: &usize, &b: &usize| {
+            means_m[a].distance_squared(p).total_cmp(&means_m[b].distance_squared(p))
+        };
+        (0..means_m.len()).min_by(nearer).unwrap_or(0)
+    };
+    for _ in 0..PASSES {
+        let mut sums = vec![(DVec2::ZERO, 0.0); means_m.len()];
+        for &i in cluster {
+            let sum = &mut sums[nearest(&means_m, i)];
+            sum.0 += moved_m[i as usize].truncate();
+            sum.1 += 1.0;
+        }
+        let last = std::mem::replace(&mut means_m, sums.iter().map(|(sum, n)| sum / n).collect());
+        if means_m.iter().any(|mean| mean.is_nan()) {
+            return None;
+        }
+        if last == means_m {
             break;
         }
-        (p, q) = (sums[0].0 / sums[0].1, sums[1].0 / sums[1].1);
     }
-    let (a, b) = cluster.iter().partition(|&&i| at(i).distance_squared(p) <= at(i).distance_squared(q));
-    (a, b, p.distance(q))
+    let mut points = vec![Cluster::new(); means_m.len()];
+    for &i in cluster {
+        points[nearest(&means_m, i)].push(i);
+    }
+    Some(points.into_iter().map(|points| Part::new(moved_m, points)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    /// An upright body of 0.26 x 0.5 m, broad along y.
+    fn body(x: f64, y: f64) -> Vec<DVec3> {
+        (0..40)
+            .map(|i| {
+                let around = DVec2::from_angle(f64::from(i) * 2.4);
+                DVec3::new(x + 0.13 * around.x, y + 0.25 * around.y, 0.1 + 0.04 * f64::from(i))
+            })
+            .collect()
+    }
+
+    fn people(points_m: &[DVec3], priors: &[Prior]) -> usize {
+        let config = Config::default().detect.split.evidence;
+        let mut parts = Vec::new();
+        split(points_m, priors, (0..points_m.len() as u32).collect(), &config, &mut parts);
+        merge(&mut parts, priors, &config);
+        parts.len()
+    }
+
+    fn prior(x: f64, y: f64) -> Prior {
+        Prior {
+            position_m: DVec2::new(x, y),
+            velocity_mps: DVec2::X,
+            position_sigma_m: 0.05,
+            height_m: 1.7,
+            confirmed: true,
+        }
+    }
+
+    #[test]
+    fn one_body_stays_whole_and_a_pair_shoulder_to_shoulder_comes_apart() {
+        assert_eq!(people(&body(0.0, 0.0), &[]), 1);
+        assert_eq!(people(&[body(0.0, 0.0), body(0.0, 0.5)].concat(), &[]), 2);
+        assert_eq!(people(&[body(0.0, 0.0), body(0.0, 0.5), body(0.0, 1.0)].concat(), &[]), 3);
+    }
+
+    #[test]
+    fn two_who_are_expected_come_apart_where_strangers_would_not() {
+        let close = [body(0.0, 0.0), body(0.35, 0.0)].concat();
+        assert_eq!(people(&close, &[]), 1);
+        assert_eq!(people(&close, &[prior(0.0, 0.0), prior(0.4, 0.0)]), 2);
+    }
+
+    #[test]
+    fn a_leg_joins_its_body() {
+        let config = Config::default().detect.split.evidence;
+        let mut points_m = body(0.0, 0.0);
+        points_m.extend((0..8).map(|i| DVec3::new(0.4, 0.0, 0.1 * f64::from(i))));
+        let mut parts =
+            vec![Part::new(&points_m, (0..40).collect()), Part::new(&points_m, (40..48).collect())];
+        merge(&mut parts, &[], &config);
+        assert_eq!(parts.len(), 1);
+        assert_eq!(parts[0].points.len(), 48);
+    }
 }

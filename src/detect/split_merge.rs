@@ -1,6 +1,8 @@
 //! One cluster, one person: Haselich's split-merge, or evidence for one person more or fewer.
 
+use super::bias::away;
 use super::cluster::PlanGrid;
+use super::evidence::Part;
 use super::{Cluster, Point, Prior, dp_means, evidence};
 use crate::Site;
 use crate::config::{ClusterConfig, DetectConfig, SplitConfig, SplitMethod};
@@ -12,12 +14,14 @@ pub struct Clusterer {
     cluster: ClusterConfig,
     split: SplitConfig,
     sensors_m: Vec<DVec3>,
-    person_points_min: usize,
     grid: PlanGrid,
+    /// Each point, moved behind the surface that its sensor saw.
+    moved_m: Vec<DVec3>,
     plan_m: Vec<DVec2>,
     radius_m: Vec<f64>,
     labels: Vec<u32>,
     components: Vec<Cluster>,
+    parts: Vec<Part>,
 }
 
 impl Clusterer {
@@ -27,12 +31,13 @@ impl Clusterer {
             cluster: config.cluster.clone(),
             split: config.split.clone(),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
-            person_points_min: config.measure.points_min,
             grid: PlanGrid::default(),
+            moved_m: Vec::new(),
             plan_m: Vec::new(),
             radius_m: Vec::new(),
             labels: Vec::new(),
             components: Vec::new(),
+            parts: Vec::new(),
         }
     }
 
@@ -40,16 +45,20 @@ impl Clusterer {
     pub fn clusters(&mut self, points: &[Point], priors: &[Prior], clusters: &mut Vec<Cluster>) {
         clusters.clear();
         self.components(points);
-        for component in self.components.drain(..) {
-            if component.len() < self.cluster.points_min {
-                continue;
-            }
-            match self.split.method {
-                SplitMethod::DpMeans => haselich(points, &component, &self.split, clusters),
-                SplitMethod::Evidence => {
-                    let _ = priors;
-                    evidence::split(points, component, self.person_points_min, clusters);
+        match self.split.method {
+            SplitMethod::DpMeans => {
+                for component in self.components.drain(..).filter(|c| c.len() >= self.cluster.points_min) {
+                    haselich(points, &component, &self.split, clusters);
                 }
+            }
+            SplitMethod::Evidence => {
+                // Small components may be a limb of somebody, so what is too small is dropped last.
+                for component in self.components.drain(..) {
+                    evidence::split(&self.moved_m, priors, component, &self.split.evidence, &mut self.parts);
+                }
+                evidence::merge(&mut self.parts, priors, &self.split.evidence);
+                let whole = self.parts.drain(..).map(|part| part.points);
+                clusters.extend(whole.filter(|c| c.len() >= self.cluster.points_min));
             }
         }
         let first = |cluster: &Cluster| {
@@ -64,13 +73,17 @@ impl Clusterer {
 
     /// Connected components in plan view.
     fn components(&mut self, points: &[Point]) {
+        self.moved_m.clear();
         self.plan_m.clear();
         self.radius_m.clear();
         for point in points {
             let range_m =
                 self.sensors_m.iter().map(|s| s.distance(point.position_m)).fold(f64::INFINITY, f64::min);
             let range_m = if range_m.is_finite() { range_m } else { 0.0 };
-            self.plan_m.push(point.position_m.truncate());
+            let moved_m =
+                point.position_m + (away(&self.sensors_m, point) * self.cluster.shift_m).extend(0.0);
+            self.moved_m.push(moved_m);
+            self.plan_m.push(moved_m.truncate());
             self.radius_m.push(self.cluster.radius_m + self.cluster.radius_per_range * range_m);
         }
         let found =

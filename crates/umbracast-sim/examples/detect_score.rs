@@ -2,7 +2,7 @@
 //! against the truth at each detection's own time.
 //!
 //! `cargo run --release -p umbracast-sim --example detect_score -- [--mode default] [--preset orca-03]
-//! [--people 10] [--scenes 3] [--seed 100000] [--online] [--pairs] [--tracker] [--points FILE]`
+//! [--people 10] [--scenes 3] [--seed 100000] [--online] [--pairs] [--gap_cm 50] [--tracker] [--misses] [--points FILE]`
 //!
 //! Without `--tracker` the priors are empty. `--points` writes the foreground as CSV for a closer look.
 
@@ -52,7 +52,7 @@ fn main() {
     let mut csv = String::from("scene,frame,kind,a,b,c,d,e\n");
     for seed in first_seed..first_seed + scenes {
         let crowd = if flag("--pairs") {
-            pairs(people / 2, 0.5, 12.5, seed)
+            pairs(people / 2, number("--gap_cm", "50") as f64 * 0.01, 12.5, seed)
         } else {
             circle_crossing(preset, people, 12.5, seed)
         };
@@ -117,6 +117,9 @@ fn main() {
                     score.squared_m2 += off.length_squared();
                     score.away_m += off.dot(away(&config.site, detections[d].position_m));
                 }
+                if flag("--misses") {
+                    print_misses(&frame, &truth, &detections, &pairs);
+                }
                 detected += detections.len();
                 matched += pairs.len();
                 frames += 1;
@@ -141,6 +144,34 @@ fn main() {
     }
     print_row("6 and more", &seen);
     println!("precision {:.4}", matched as f64 / f64::from(detected.max(1) as u32));
+}
+
+/// Who was missed and what is nobody, with the nearest person or detection.
+fn print_misses(frame: &Frame, truth: &[PersonTruth], detections: &[Detection], pairs: &[(usize, usize)]) {
+    let nearest = |p: DVec2, others: &mut dyn Iterator<Item = DVec2>| {
+        others.map(|q| q.distance(p)).filter(|&m| m > 0.0).fold(f64::INFINITY, f64::min)
+    };
+    for (_, t) in truth.iter().enumerate().filter(|(t, _)| pairs.iter().all(|(of, _)| of != t)) {
+        let p = t.state.position_m;
+        let other_m = nearest(p, &mut truth.iter().map(|t| t.state.position_m));
+        let detection_m = nearest(p, &mut detections.iter().map(|d| d.position_m));
+        println!(
+            "{} missed {p:.2}: {} returns, person {other_m:.2} m, detection {detection_m:.2} m",
+            frame.index, t.returns
+        );
+    }
+    for (_, d) in detections.iter().enumerate().filter(|(d, _)| pairs.iter().all(|(_, of)| of != d)) {
+        let person_m = nearest(d.position_m, &mut truth.iter().map(|t| t.state.position_m));
+        let other_m = nearest(d.position_m, &mut detections.iter().map(|d| d.position_m));
+        println!(
+            "{} nobody {:.2}: {} points, top {:.2}, size {:.2}, person {person_m:.2} m, detection {other_m:.2} m",
+            frame.index,
+            d.position_m,
+            d.points,
+            d.top_m,
+            d.aabb.size_m()
+        );
+    }
 }
 
 fn print_row(name: &str, s: &Score) {

@@ -78,7 +78,7 @@ fn scene(crowd: Crowd, seed: u64, samples: &mut Vec<Sample>) {
             measurer.detections(&points, &clusters, &priors, &mut detections);
             tracker.update(&frame, &detections, &mut tracks);
             for cluster in &clusters {
-                let known = samples.len() % UNKNOWN_EVERY != 0;
+                let known = !samples.len().is_multiple_of(UNKNOWN_EVERY);
                 let view = measurer.view(&points, cluster, if known { &priors } else { &[] });
                 let late: i64 = cluster.iter().map(|&i| points[i as usize].time_ns - frame.time_ns).sum();
                 let time_ns = frame.time_ns + late / cluster.len() as i64;
