@@ -206,3 +206,26 @@ fn the_same_seed_gives_the_same_body_and_who_is_not_there_has_none() {
     assert_eq!(mesh(3, -1), (false, Vec::new()));
     assert_eq!(walker(3).state_at(5_000_000_001), None);
 }
+
+#[test]
+fn in_a_crowd_that_starts_stops_and_swerves_nobody_slides_sinks_floats_or_crouches() {
+    let crowd = crate::crowd::circle_crossing(crate::crowd::Preset::Mixed, 10, 12.5, 100_002);
+    for way in crowd.trajectories {
+        let seed = u64::from(way.person);
+        let walker = Walker::new(way, seed);
+        let (mut mesh, mut before) = (Vec::new(), Vec::new());
+        for i in 0..walker.trajectory.positions_m.len() {
+            walker.mesh_at(i as i64 * STEP_NS, &mut mesh);
+            let at = format!("person {seed} at {} s", i as f64 * 0.01);
+            let down = |v: &DVec3| v.z < 1e-8;
+            assert!(mesh.iter().all(|v| v.z > -1e-9), "{at}");
+            assert!(FEET.into_iter().flat_map(part).any(|v| down(&mesh[v])), "{at}");
+            for v in FEET.into_iter().flat_map(part).filter(|_| !before.is_empty()) {
+                assert!(!(down(&mesh[v]) && down(&before[v])) || mesh[v].distance(before[v]) < 3e-4, "{at}");
+            }
+            let hips = walker.walk.at(i as i64 * STEP_NS).hip_height_m;
+            assert!(hips > walker.build.hip_height_m() - 0.10, "{at}: hips at {hips} m");
+            std::mem::swap(&mut mesh, &mut before);
+        }
+    }
+}

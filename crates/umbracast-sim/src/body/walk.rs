@@ -130,7 +130,7 @@ impl Walk {
             let rate_hz = match (here.speed_mps < STANDING_MPS, home) {
                 (true, true) if 2.0 * phase == contact as f64 => 0.0,
                 (true, _) => SETTLE_HZ,
-                (false, _) => self.pace(i, positions[i], phase, contact, build),
+                (false, _) => self.pace_hz(i, positions[i], phase, contact, build),
             };
             phase += rate_hz * STEP_S;
             if (2.0 * phase) as usize > contact {
@@ -142,24 +142,36 @@ impl Walk {
                 let ahead_s = (HEEL_UNDER_PELVIS / rate_hz).min(0.45);
                 let at = (i + (ahead_s / STEP_S) as usize).min(last);
                 self.prints.push(print_at(i, at, contact, &self.instants));
+                // Now that the weight changes over, the other foot leaves as the speed of the moment asks for,
+                // and sooner where the body has run ahead of it.
+                let lag_m = self.lag_m(i, positions[i], phase, contact - 1, build);
+                let share = gait::stance_share(here.speed_mps / (0.53 * build.stature_m));
+                let hurry = lag_m.max(0.0) / self.stride_m(i, build).max(f64::MIN_POSITIVE);
+                self.prints[contact - 1].stance_share = (share - hurry).max(0.52);
             }
             self.instants[i].phase = phase;
         }
     }
 
     /// Strides a second: the published cadence, faster while a foot lags behind the body (after a sudden start).
-    fn pace(&self, i: usize, position_m: DVec2, phase: f64, contact: usize, build: &Build) -> f64 {
-        let here = &self.instants[i];
-        let stride_m = STRIDE * (here.speed_mps * build.stature_m).sqrt();
-        let ahead = DVec2::from_angle(here.heading_rad);
+    fn pace_hz(&self, i: usize, position_m: DVec2, phase: f64, contact: usize, build: &Build) -> f64 {
+        let stride_m = self.stride_m(i, build);
         let lag_m = (contact - 1..=contact)
             .filter(|&c| phase - c as f64 / 2.0 < self.prints[c].stance_share)
-            .map(|c| {
-                let expected_m = (phase - c as f64 / 2.0 - HEEL_UNDER_PELVIS) * stride_m;
-                (position_m - self.prints[c].heel_m).dot(ahead) - expected_m
-            })
+            .map(|c| self.lag_m(i, position_m, phase, c, build))
             .fold(0.0, f64::max);
-        here.speed_mps / stride_m * (1.0 + (2.5 * lag_m / stride_m).min(1.0))
+        self.instants[i].speed_mps / stride_m * (1.0 + (2.5 * lag_m / stride_m).min(1.0))
+    }
+
+    /// How much farther behind than in an even walk a print lies.
+    fn lag_m(&self, i: usize, position_m: DVec2, phase: f64, contact: usize, build: &Build) -> f64 {
+        let expected_m = (phase - contact as f64 / 2.0 - HEEL_UNDER_PELVIS) * self.stride_m(i, build);
+        let ahead = DVec2::from_angle(self.instants[i].heading_rad);
+        (position_m - self.prints[contact].heel_m).dot(ahead) - expected_m
+    }
+
+    fn stride_m(&self, i: usize, build: &Build) -> f64 {
+        STRIDE * (self.instants[i].speed_mps * build.stature_m).sqrt()
     }
 
     /// Lets the hips ride as high as the legs reach, smoothed: an inverted pendulum over each stance leg.
