@@ -15,6 +15,7 @@ use umbracast::Error;
 pub use cells::{Cell, Name, Row};
 use csv_file::CsvFile;
 use parquet_file::ParquetFile;
+pub use parquet_file::TableSummary;
 
 /// Rows held back until they are written together.
 const ROW_GROUP: usize = 65_536;
@@ -113,6 +114,14 @@ pub fn read_each<R: Row>(
 ) -> Result<(), Error> {
     let path = path_in::<R>(directory);
     parquet_file::read(&path, access_points, sink).map_err(|error| error.within(path.display()))
+}
+
+/// Rows and columns of any Parquet file, from its end alone.
+///
+/// # Errors
+/// A file that is not there, is cut off, or is something else.
+pub fn describe(path: &Path) -> Result<TableSummary, Error> {
+    parquet_file::describe(path).map_err(|error| error.within(path.display()))
 }
 
 #[cfg(test)]

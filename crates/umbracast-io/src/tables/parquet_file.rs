@@ -71,6 +71,28 @@ impl ParquetFile {
     }
 }
 
+/// What a Parquet file holds, whoever wrote it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TableSummary {
+    /// How many rows.
+    pub rows: u64,
+    /// Name and physical type of each column, in their order.
+    pub columns: Vec<(String, String)>,
+}
+
+/// Reads the end of the file only.
+pub fn describe(path: &Path) -> Result<TableSummary, Error> {
+    let file = File::open(path).map_err(|e| Error::new(e.to_string()))?;
+    let reader = SerializedFileReader::new(file)
+        .map_err(|e| Error::new(format!("expected a Parquet table, found {e}")))?;
+    let meta = reader.metadata().file_metadata();
+    let columns = meta.schema_descr().columns();
+    Ok(TableSummary {
+        rows: meta.num_rows().max(0) as u64,
+        columns: columns.iter().map(|c| (c.name().to_owned(), c.physical_type().to_string())).collect(),
+    })
+}
+
 fn cannot_write(path: &Path, error: &dyn std::fmt::Display) -> Error {
     Error::new(format!("{}: cannot be written: {error}", path.display()))
 }
