@@ -57,6 +57,18 @@ pub enum People {
     Replayed(Crowd),
 }
 
+impl SceneSpec {
+    /// Everybody's way.
+    pub fn crowd(&self) -> Crowd {
+        let seed = self.seed;
+        match &self.people {
+            People::Replayed(crowd) => crowd.clone(),
+            People::Drawn { preset: Preset::Mixed, people } => crowd::mixed::crowd(*people, CIRCLE_M, seed),
+            People::Drawn { preset, people } => crowd::circle_crossing(*preset, *people, CIRCLE_M, seed),
+        }
+    }
+}
+
 /// How far a run is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
@@ -131,7 +143,7 @@ fn run_scene(
     progress: &impl Fn(u64, u64),
 ) -> Result<SceneResult, Error> {
     let site = &spec.configs[0].site;
-    let mut scene = Scene::new(crowd_of(scene_spec), site, scene_spec.seed)?;
+    let mut scene = Scene::new(scene_spec.crowd(), site, scene_spec.seed)?;
     let mut assembler = Assembler::new(site)?;
     let mut health = Health::default();
     let mut lanes = Vec::new();
@@ -183,16 +195,8 @@ fn lane_run<'a>(lane: &'a Lane, config: &'a Config, assembled: &Health) -> ModeR
     ModeRun { config, rows: &lane.rows, health }
 }
 
-fn crowd_of(spec: &SceneSpec) -> Crowd {
-    match &spec.people {
-        People::Replayed(crowd) => crowd.clone(),
-        People::Drawn { preset: Preset::Mixed, people } => crowd::mixed::crowd(*people, CIRCLE_M, spec.seed),
-        People::Drawn { preset, people } => crowd::circle_crossing(*preset, *people, CIRCLE_M, spec.seed),
-    }
-}
-
-/// As they would arrive: by time, sensors mixed.
-fn push(assembler: &mut Assembler, packets: &[Vec<Packet>], health: &mut Health) {
+/// Gives packets (one list a sensor) to an assembler as they would arrive: by time, sensors mixed.
+pub fn push(assembler: &mut Assembler, packets: &[Vec<Packet>], health: &mut Health) {
     let of_sensor =
         |sensor: usize| (0..packets[sensor].len()).map(move |i| (packets[sensor][i].time_ns, sensor, i));
     let mut order: Vec<(i64, usize, usize)> = (0..packets.len()).flat_map(of_sensor).collect();

@@ -21,3 +21,4 @@ pub mod score;
 pub mod pooled;
 pub mod chain;
 pub mod ladder;
+pub mod labels;
