@@ -1,3 +1,51 @@
-//! The command `umbracast`.
+//! The command `umbracast`. Thin: it reads arguments, opens files, shows progress, and calls the crates.
+//!
+//! Exit codes: 0 done, 1 failed, 2 wrong arguments, 3 done but data was lost or skipped (counted and named).
 
-fn main() {}
+mod args;
+mod setup;
+mod progress;
+mod run_json;
+mod crowds;
+mod input;
+mod commands;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Cli, Command};
+
+/// How a command that did not fail ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Ending {
+    /// Everything was used.
+    Done,
+    /// Something was lost or skipped; says what.
+    DataLost(String),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command.unwrap_or_default() {
+        Command::Demo(args) => commands::demo::run(&args, &cli.common),
+        Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
+        Command::Run(args) => commands::run::run(&args, &cli.common),
+        Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),
+        Command::Inspect(args) => commands::inspect::run(&args, &cli.common),
+        Command::Config(args) => commands::config::run(&args),
+        #[cfg(feature = "train")]
+        Command::Train(args) => commands::train::run(&args, &cli.common),
+    };
+    match result {
+        Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::DataLost(what)) => {
+            eprintln!("umbracast: done, but data was lost: {what}");
+            ExitCode::from(3)
+        }
+        Err(error) => {
+            eprintln!("umbracast: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

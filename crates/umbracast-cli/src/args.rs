@@ -1,0 +1,262 @@
+//! The arguments. The same flag means the same everywhere.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use umbracast::Mode;
+use umbracast_io::trajectories::Unit;
+use umbracast_sim::crowd::Preset;
+
+/// Sees people with LiDARs, foresees where they walk, and tells which radio links they are about to block.
+#[derive(Debug, Parser)]
+#[command(name = "umbracast", version, after_help = "Without a command: demo.")]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// What every command understands.
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Flags of every command.
+#[derive(Debug, Clone, Args)]
+pub struct Common {
+    /// Threads to use; 0 means one a core. Results do not depend on it.
+    #[arg(long, global = true, default_value_t = 0, value_name = "N")]
+    pub threads: usize,
+    /// Print for machines.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Show no progress.
+    #[arg(long, global = true)]
+    pub quiet: bool,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The main job on the embedded site: simulate one scene, run all stages, score, write a report.
+    Demo(Demo),
+    /// Simulate scenes to recordings with their truth.
+    Simulate(Simulate),
+    /// Recordings, PCD clouds or pcap captures through the pipeline; writes tracks and links.
+    Run(Run),
+    /// Score every stage: a run against its truth, or freshly simulated scenes in memory.
+    Evaluate(Evaluate),
+    /// Say what is in a file.
+    Inspect(Inspect),
+    /// Print the commented default configuration, or check a file.
+    Config(Config),
+    /// Fit the paper's LSTM on generated trajectories.
+    #[cfg(feature = "train")]
+    Train(Train),
+}
+
+impl Default for Command {
+    fn default() -> Self {
+        Self::Demo(Demo {
+            site: SiteArgs { site: None },
+            crowd: CrowdArgs { preset: Preset::Orca03, people: 10, seed: None },
+            out: PathBuf::from("report"),
+        })
+    }
+}
+
+/// Where everything stands.
+#[derive(Debug, Clone, Args)]
+pub struct SiteArgs {
+    /// TOML file laid over the defaults: site, and any other setting that differs.
+    #[arg(long, value_name = "FILE")]
+    pub site: Option<PathBuf>,
+}
+
+/// Who walks.
+#[derive(Debug, Clone, Args)]
+pub struct CrowdArgs {
+    /// The crowd: orca-03, orca-06 or mixed.
+    #[arg(long, default_value = "orca-03")]
+    pub preset: Preset,
+    /// People in a scene.
+    #[arg(long, default_value_t = 10, value_name = "N")]
+    pub people: usize,
+    /// Seed of the first scene; the next ones count on. Tests begin at 200000.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+}
+
+/// How recorded people are read.
+#[derive(Debug, Clone, Args)]
+pub struct Replay {
+    /// Frames a second of trajectories whose file does not say.
+    #[arg(long, value_name = "HZ")]
+    pub fps: Option<f64>,
+    /// Unit of PeTrack text: m or cm.
+    #[arg(long, default_value = "m")]
+    pub unit: Unit,
+    /// Smoothing of the trajectories, standard deviation in seconds; 0 for none.
+    #[arg(long, default_value_t = 0.12, value_name = "S")]
+    pub smooth: f64,
+}
+
+/// `demo`
+#[derive(Debug, Args)]
+pub struct Demo {
+    #[command(flatten)]
+    pub site: SiteArgs,
+    #[command(flatten)]
+    pub crowd: CrowdArgs,
+    /// Where the report goes.
+    #[arg(long, default_value = "report", value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// `simulate`
+#[derive(Debug, Args)]
+pub struct Simulate {
+    #[command(flatten)]
+    pub site: SiteArgs,
+    #[command(flatten)]
+    pub crowd: CrowdArgs,
+    /// How many scenes.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub scenes: u32,
+    /// Replay these trajectories in place of a crowd: TrajNet++ ndjson, CSV `t_s,id,x_m,y_m[,height_m]`, or
+    /// PeTrack text. One scene a file.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub trajectories: Vec<PathBuf>,
+    #[command(flatten)]
+    pub replay: Replay,
+    /// Write PointCloud2 clouds too (up to 1.2 GB a scene).
+    #[arg(long)]
+    pub clouds: bool,
+    /// Write every table as CSV too.
+    #[arg(long)]
+    pub csv: bool,
+    /// Where the recordings go.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// `run`
+#[derive(Debug, Args)]
+pub struct Run {
+    /// A folder of recordings or PCD clouds, or files: .mcap, .pcd, or .pcap with one for each sensor in the
+    /// site's order.
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// Whose method: hdl, paper or default.
+    #[arg(long, default_value = "default")]
+    pub mode: Mode,
+    /// A recording without people; default: empty.mcap beside the recordings, else learned on the way.
+    #[arg(long, value_name = "FILE")]
+    pub empty: Option<PathBuf>,
+    /// Learn the background on the way even where there is an empty recording.
+    #[arg(long)]
+    pub no_empty: bool,
+    /// Weights of the LSTM in place of the embedded ones.
+    #[arg(long, value_name = "FILE")]
+    pub weights: Option<PathBuf>,
+    /// Write every table as CSV too.
+    #[arg(long)]
+    pub csv: bool,
+    /// Where tracks and links go.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// `evaluate`
+#[derive(Debug, Args)]
+pub struct Evaluate {
+    /// What `run` wrote; left out with --scenes.
+    #[arg(value_name = "DIR")]
+    pub dir: Option<PathBuf>,
+    /// What `simulate` wrote.
+    #[arg(long, value_name = "DIR", requires = "dir")]
+    pub truth: Option<PathBuf>,
+    /// Boxes of people drawn by hand, CSV `frame_file,label_index,x_m,y_m,...` in the sensor's frame.
+    #[arg(long, value_name = "FILE", requires = "dir", conflicts_with = "truth")]
+    pub labels: Option<PathBuf>,
+    /// Simulate and run this many scenes of each preset in memory, and score them.
+    #[arg(long, value_name = "N", conflicts_with = "dir")]
+    pub scenes: Option<u32>,
+    /// The crowds of --scenes: orca-03, orca-06, mixed; several with commas.
+    #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
+    pub preset: Vec<Preset>,
+    /// Real walkers in place of a crowd; one scene a file.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["dir", "scenes"])]
+    pub trajectories: Vec<PathBuf>,
+    #[command(flatten)]
+    pub replay: Replay,
+    /// People in a scene of --scenes.
+    #[arg(long, default_value_t = 10, value_name = "N")]
+    pub people: usize,
+    /// Seed of the first scene; tests begin at 200000.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Modes of --scenes; several with commas.
+    #[arg(long, value_delimiter = ',', default_value = "hdl,paper,default")]
+    pub mode: Vec<Mode>,
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// Where the report goes.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// `inspect`
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// A recording, table, capture, cloud, weights, configuration or report folder.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+}
+
+/// `config`
+#[derive(Debug, Args)]
+pub struct Config {
+    /// Check this file instead of printing the default.
+    #[arg(long, value_name = "FILE")]
+    pub check: Option<PathBuf>,
+    /// Print the complete values of a mode, without comments.
+    #[arg(long)]
+    pub mode: Option<Mode>,
+}
+
+/// `train`
+#[cfg(feature = "train")]
+#[derive(Debug, Args)]
+pub struct Train {
+    /// Passes over the data.
+    #[arg(long, default_value_t = 30)]
+    pub epochs: usize,
+    /// Windows drawn in an epoch.
+    #[arg(long, default_value_t = 16_384)]
+    pub windows: usize,
+    /// Windows in a batch; a whole number of batches makes an epoch.
+    #[arg(long, default_value_t = 128)]
+    pub batch: usize,
+    /// Scenes to train and validate on.
+    #[arg(long, default_value_t = 500)]
+    pub scenes: u64,
+    /// Seed of the first scene; 1 to 99999.
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    pub first_scene: u64,
+    /// The crowds, taken in turn: orca-03, orca-06, mixed.
+    #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
+    pub preset: Vec<Preset>,
+    /// Seed of the first weights and of the windows.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The source's commit, for the card.
+    #[arg(long)]
+    pub commit: Option<String>,
+    /// Noise as a tracker makes it, in place of clean positions.
+    #[arg(long)]
+    pub noise: bool,
+    /// Where weights, card and checkpoints go; a checkpoint found there is continued.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}

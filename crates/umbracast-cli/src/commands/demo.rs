@@ -1,0 +1,20 @@
+//! `demo`: one scene, every stage, every mode, scores and report.
+
+use umbracast::{Config, Error, Mode};
+use umbracast_eval::chain;
+
+use crate::Ending;
+use crate::args::{Common, Demo};
+use crate::commands::evaluate;
+use crate::setup::{self, TEST_SEED};
+
+/// Simulates one test scene in memory and reports on it.
+pub fn run(args: &Demo, common: &Common) -> Result<Ending, Error> {
+    let configs = Mode::ALL
+        .into_iter()
+        .map(|mode| setup::config(mode, args.site.site.as_deref()))
+        .collect::<Result<Vec<Config>, _>>()?;
+    let seed = args.crowd.seed.unwrap_or(TEST_SEED);
+    let scenes = chain::drawn_scenes(&[args.crowd.preset], 1, args.crowd.people, seed);
+    evaluate::in_memory(configs, scenes, Some(&args.out), common)
+}

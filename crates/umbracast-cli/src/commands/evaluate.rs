@@ -1,0 +1,185 @@
+//! `evaluate`: a run against its truth, against labels, or scenes simulated and run in memory.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use umbracast::{Config, Error, Health, Mode};
+use umbracast_eval::chain::{self, SceneSpec, Spec};
+use umbracast_eval::labels;
+use umbracast_eval::pooled::{Scores, pool};
+use umbracast_eval::scene::{SceneRun, SceneTruth};
+use umbracast_eval::score::{ModeRun, SceneScore, score_scene};
+use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
+use umbracast_io::tables;
+
+use crate::args::{Common, Evaluate};
+use crate::progress::bar;
+use crate::setup::{self, TEST_SEED};
+use crate::{Ending, crowds};
+
+/// Scores what the arguments name.
+pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
+    match (&args.dir, &args.truth, &args.labels) {
+        (Some(dir), Some(truth), _) => from_tables(dir, truth, args, common),
+        (Some(dir), None, Some(file)) => against_labels(dir, file, common),
+        (Some(dir), None, None) => {
+            Err(Error::new("expected --truth or --labels beside the run, found neither")
+                .within(dir.display()))
+        }
+        (None, ..) => {
+            let seed = args.seed.unwrap_or(TEST_SEED);
+            let scenes = match args.trajectories.is_empty() {
+                true => {
+                    chain::drawn_scenes(&args.preset, args.scenes.unwrap_or(1) as usize, args.people, seed)
+                }
+                false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed, None)?,
+            };
+            let configs = args
+                .mode
+                .iter()
+                .map(|&mode| setup::config(mode, args.site.site.as_deref()))
+                .collect::<Result<Vec<Config>, _>>()?;
+            in_memory(configs, scenes, args.out.as_deref(), common)
+        }
+    }
+}
+
+/// Simulates, runs and scores without files.
+pub fn in_memory(
+    configs: Vec<Config>,
+    scenes: Vec<SceneSpec>,
+    out: Option<&Path>,
+    common: &Common,
+) -> Result<Ending, Error> {
+    let names: Vec<String> = configs[0].site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let spec = Spec { configs, weights: Some(setup::weights(None)?), scenes, keep: Some(0) };
+    let progress = bar(0, "frames", common.quiet);
+    let results = setup::with_threads(common.threads, || {
+        chain::run(&spec, |done| {
+            if done.frames_done == 1 {
+                progress.inc_length(done.frames);
+            }
+            progress.inc(1);
+        })
+    })??;
+    progress.finish_and_clear();
+    let scores: Vec<&SceneScore> = results.iter().map(|result| &result.score).collect();
+    show(&pool(&scores, &names), out, common)
+}
+
+/// Scores the tables of a run against those of its truth, scene by scene.
+fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Result<Ending, Error> {
+    let path = dir.join("config.toml");
+    let config = Config::with_overlay(Mode::Default, &setup::read_text(&path)?, &path.display().to_string())?;
+    let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let mut scenes: BTreeMap<u32, (SceneTruth, SceneRun)> = BTreeMap::new();
+    for row in tables::read::<PeopleRow>(truth, &names)? {
+        scenes.entry(row.scene).or_default().0.people.push(row);
+    }
+    for row in tables::read::<PeopleLinkRow>(truth, &names)? {
+        scenes.entry(row.scene).or_default().0.links.push(row);
+    }
+    for row in tables::read::<TrackRow>(dir, &names)? {
+        scenes.entry(row.scene).or_default().1.tracks.push(row);
+    }
+    for row in tables::read::<LinkRow>(dir, &names)? {
+        scenes.entry(row.scene).or_default().1.links.push(row);
+    }
+    let weights = setup::weights(None)?;
+    let scores = scenes
+        .iter()
+        .map(|(&number, (truth, run))| {
+            let run = ModeRun { config: &config, rows: run, health: Health::default() };
+            score_scene(number, "recorded", truth, &[run], Some(&weights), None)
+        })
+        .collect::<Result<Vec<SceneScore>, _>>()?;
+    show(&pool(&scores.iter().collect::<Vec<_>>(), &names), args.out.as_deref(), common)
+}
+
+/// Stage 1 against people labelled by hand.
+fn against_labels(dir: &Path, file: &Path, common: &Common) -> Result<Ending, Error> {
+    let path = dir.join("config.toml");
+    let config = Config::with_overlay(Mode::Default, &setup::read_text(&path)?, &path.display().to_string())?;
+    let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let pose = config.site.sensors[0].site_from_sensor();
+    let labels = labels::parse(&setup::read_text(file)?, &pose, &file.display().to_string())?;
+    let tracks: Vec<TrackRow> = tables::read(dir, &names)?;
+    let run_frames = frames_of_run(dir)?;
+    let labels: Vec<_> = labels.into_iter().filter(|row| run_frames.contains(&row.frame)).collect();
+    let score = labels::score(&labels, &tracks);
+    let percent = |share: Option<f64>| share.map_or("-".to_owned(), |s| format!("{s:.3}"));
+    if common.json {
+        let value = serde_json::json!({
+            "labels": labels.len(), "recall": score.recall(), "precision": score.precision(),
+            "position_rmse_m": score.position_rmse_m(), "mode": config.mode,
+        });
+        println!("{value:#}");
+    } else {
+        println!(
+            "{}: {} labels, gate 0.5 m: recall {}, precision {}, distance {} m (RMS, to the middle of the box)",
+            config.mode.name(),
+            labels.len(),
+            percent(score.recall()),
+            percent(score.precision()),
+            percent(score.position_rmse_m()),
+        );
+    }
+    Ok(Ending::Done)
+}
+
+/// The frames that a run has seen, also those without a track, from its `run.json`.
+fn frames_of_run(dir: &Path) -> Result<BTreeSet<u64>, Error> {
+    #[derive(serde::Deserialize)]
+    struct Frames {
+        frame_numbers: Vec<Vec<u64>>,
+    }
+    let path = dir.join("run.json");
+    let frames: Frames = serde_json::from_slice(&setup::read(&path)?)
+        .map_err(|e| Error::new(format!("expected what `run` writes, found: {e}")).within(path.display()))?;
+    Ok(frames.frame_numbers.into_iter().flatten().collect())
+}
+
+fn show(scores: &Scores, _out: Option<&Path>, common: &Common) -> Result<Ending, Error> {
+    let json = serde_json::to_string_pretty(scores).map_err(|e| Error::new(e.to_string()))?;
+    if common.json {
+        println!("{json}");
+        return Ok(Ending::Done);
+    }
+    for group in &scores.groups {
+        println!("{} scenes={}", group.name, group.scenes);
+        for m in &group.modes {
+            println!(
+                "  {:8} mota {:.3} idf1 {:.3} sw {:.2} rec {:.3} prec {:.3} pos {:.4} vel {:.4} d1 {:.4} d9 {:.4}",
+                m.mode.name(),
+                m.mota.value.unwrap_or(0.0),
+                m.idf1.value.unwrap_or(0.0),
+                m.switches_per_scene.value.unwrap_or(0.0),
+                m.recall.value.unwrap_or(0.0),
+                m.precision.value.unwrap_or(0.0),
+                m.position_rmse_m.value.unwrap_or(0.0),
+                m.velocity_rmse_mps.value.unwrap_or(0.0),
+                m.displacement_m[0].value.unwrap_or(0.0),
+                m.displacement_m[8].value.unwrap_or(0.0),
+            );
+        }
+        for l in &group.links {
+            print!("  {:8} {:30} {:8}", l.mode.map_or("-", Mode::name), l.predictor, l.access_point);
+            for w in [1, 3, 8, 9] {
+                let s = &l.windows[w - 1];
+                let v = |e: Option<f64>| e.unwrap_or(f64::NAN);
+                print!(
+                    " | w{w} b {:.3} a {:.3} p {:.3} r {:.3} F {:.3} on {:.3} ece {:.3}",
+                    v(s.base_rate.value),
+                    v(s.accuracy.value),
+                    v(s.precision.value),
+                    v(s.recall.value),
+                    v(s.f1.value),
+                    v(s.onset_f1.value),
+                    v(s.ece)
+                );
+            }
+            println!();
+        }
+    }
+    Ok(Ending::Done)
+}

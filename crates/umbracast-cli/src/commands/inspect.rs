@@ -1,0 +1,178 @@
+//! `inspect`: what is in a file.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use serde_json::json;
+use umbracast::forecast::Weights;
+use umbracast::{Config, Error, Mode};
+use umbracast_io::pcap::PcapReader;
+use umbracast_io::pcd::read_pcd;
+use umbracast_io::recording::{Entry, RecordingReader};
+use umbracast_io::tables;
+
+use crate::args::{Common, Inspect};
+use crate::{Ending, setup};
+
+/// What was found in a file: lines of name and value, and what was lost.
+#[derive(Default)]
+struct Findings {
+    lines: Vec<(String, String)>,
+    lost: Option<String>,
+}
+
+impl Findings {
+    fn say(&mut self, name: &str, value: impl ToString) {
+        self.lines.push((name.to_owned(), value.to_string()));
+    }
+}
+
+/// Tells of every file.
+pub fn run(args: &Inspect, common: &Common) -> Result<Ending, Error> {
+    let mut lost = Vec::new();
+    let mut all = Vec::new();
+    for file in &args.files {
+        let findings = look(file)?;
+        let pairs: serde_json::Map<String, serde_json::Value> =
+            findings.lines.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
+        all.push(json!({ "file": file.display().to_string(), "found": pairs, "lost": findings.lost }));
+        if !common.json {
+            println!("{}", file.display());
+            findings.lines.iter().for_each(|(name, value)| println!("  {name:28} {value}"));
+        }
+        lost.extend(findings.lost);
+    }
+    if common.json {
+        println!("{:#}", serde_json::Value::Array(all));
+    }
+    Ok(if lost.is_empty() { Ending::Done } else { Ending::DataLost(lost.join("; ")) })
+}
+
+fn look(file: &Path) -> Result<Findings, Error> {
+    let bytes = || setup::read(file);
+    let mut found = Findings::default();
+    if file.is_dir() {
+        return Err(Error::new("expected a file, found a folder").within(file.display()));
+    }
+    let extension = file.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    match extension {
+        "mcap" => recording(file, &mut found)?,
+        "parquet" => table(file, &mut found)?,
+        "pcd" => cloud(&bytes()?, file, &mut found)?,
+        "pcap" => capture(file, &mut found)?,
+        "safetensors" => {
+            Weights::from_safetensors(&bytes()?).map_err(|e| e.within(file.display()))?;
+            found.say("kind", "weights of the paper's LSTM");
+            found.say("bytes", bytes()?.len());
+        }
+        "toml" => {
+            let config =
+                Config::with_overlay(Mode::Default, &setup::read_text(file)?, &file.display().to_string())?;
+            found.say("kind", "configuration");
+            found.say("mode", config.mode.name());
+            found.say("site", &config.site.name);
+            found.say("sensors", config.site.sensors.len());
+            found.say("access points", config.site.access_points.len());
+        }
+        "csv" => {
+            let text = setup::read_text(file)?;
+            let header = text.lines().next().filter(|line| line.contains(','));
+            let header = header.ok_or_else(|| {
+                Error::new("expected a header with commas, found none").within(file.display())
+            })?;
+            found.say("kind", "table");
+            found.say("rows", text.lines().count() - 1);
+            found.say("columns", header.replace(',', " "));
+        }
+        "json" => {
+            let value: serde_json::Value = serde_json::from_slice(&bytes()?).map_err(|e| {
+                Error::new(format!("expected JSON, found an error: {e}")).within(file.display())
+            })?;
+            found.say("kind", "JSON");
+            for (key, value) in value.as_object().into_iter().flatten().take(40) {
+                found.say(
+                    key,
+                    if value.is_object() || value.is_array() { "..".to_owned() } else { value.to_string() },
+                );
+            }
+        }
+        other => {
+            return Err(Error::new(format!(
+                "expected .mcap, .parquet, .csv, .pcd, .pcap, .safetensors, .toml or .json, found {other:?}"
+            ))
+            .within(file.display()));
+        }
+    }
+    Ok(found)
+}
+
+fn recording(file: &Path, found: &mut Findings) -> Result<(), Error> {
+    let mut reader = RecordingReader::open(file)?;
+    let mut topics: BTreeMap<String, (u64, u64)> = BTreeMap::new();
+    found.say("kind", "recording");
+    while let Some(entry) = reader.next_entry()? {
+        let (topic, things) = match entry {
+            Entry::Config(text) => {
+                let config = Config::with_overlay(Mode::Default, &text, &file.display().to_string())?;
+                found.say("site", config.site.name);
+                continue;
+            }
+            Entry::Packets(sensor, packets) => (format!("/{sensor}/packets"), packets.len() as u64),
+            Entry::Other(topic, kind, _) => (format!("{topic} {kind}"), 0),
+        };
+        let counts = topics.entry(topic).or_default();
+        *counts = (counts.0 + 1, counts.1 + things);
+    }
+    for (topic, (messages, packets)) in topics {
+        let packets = if packets > 0 { format!(", {packets} packets") } else { String::new() };
+        found.say(&topic, format!("{messages} messages{packets}"));
+    }
+    found.lost = reader.lost().map(str::to_owned);
+    Ok(())
+}
+
+fn table(file: &Path, found: &mut Findings) -> Result<(), Error> {
+    let summary = tables::describe(file)?;
+    found.say("kind", "table");
+    found.say("rows", summary.rows);
+    for (name, kind) in summary.columns {
+        found.say(&name, kind);
+    }
+    Ok(())
+}
+
+fn cloud(bytes: &[u8], file: &Path, found: &mut Findings) -> Result<(), Error> {
+    let cloud = read_pcd(bytes, &file.display().to_string())?;
+    found.say("kind", "point cloud");
+    found.say("points", format!("{} x {}", cloud.width, cloud.height));
+    for field in &cloud.fields {
+        let finite = || field.values.iter().copied().filter(|v| v.is_finite());
+        let (low, high) =
+            (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+        found.say(&field.name, format!("{:?}, {low} to {high}", field.kind));
+    }
+    Ok(())
+}
+
+fn capture(file: &Path, found: &mut Findings) -> Result<(), Error> {
+    let open = File::open(file).map_err(|e| Error::new(e.to_string()).within(file.display()))?;
+    let mut reader = PcapReader::new(BufReader::new(open), &file.display().to_string())?;
+    let mut kinds: BTreeMap<(u16, usize), u64> = BTreeMap::new();
+    let (mut first_ns, mut last_ns) = (None, 0);
+    for datagram in reader.by_ref() {
+        first_ns.get_or_insert(datagram.time_ns);
+        last_ns = datagram.time_ns;
+        *kinds.entry((datagram.port, datagram.payload.len())).or_default() += 1;
+    }
+    found.say("kind", "capture");
+    found.say("duration_s", (last_ns - first_ns.unwrap_or(last_ns)) as f64 * 1e-9);
+    for ((port, bytes), count) in kinds {
+        found.say(&format!("port {port}, {bytes} bytes"), format!("{count} datagrams"));
+    }
+    if reader.truncated() {
+        found.lost = Some(format!("{}: ends within a record", file.display()));
+    }
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! `run`: recorded input through the pipeline; tracks and links to tables.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use umbracast::forecast::Weights;
+use umbracast::{Config, Error, Frame, Health, Pipeline};
+use umbracast_eval::scene::SceneRun;
+use umbracast_io::rows::{self, LinkRow, TrackRow};
+use umbracast_io::tables::TableWriter;
+
+use crate::args::{Common, Run};
+use crate::input::{self, Input};
+use crate::progress::bar;
+use crate::run_json::{RunJson, Stopwatch};
+use crate::{Ending, setup};
+
+/// What came out of one scene.
+#[derive(Default)]
+struct Done {
+    rows: SceneRun,
+    health: Health,
+    lost: Option<String>,
+    /// Of each frame's `step`, seconds.
+    step_s: Vec<f64>,
+    /// Number of every frame, with tracks or without.
+    frames: Vec<u64>,
+}
+
+/// Every input is a scene with a pipeline of its own; tables are written in the order of the scenes.
+pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
+    let inputs = input::scenes(&args.inputs)?;
+    let mut config = setup::config(args.mode, args.site.site.as_deref())?;
+    // A recording brings its site with it; a file given goes before it.
+    if let (None, Some(site)) = (&args.site.site, inputs[0].site()?) {
+        config.site = site;
+    }
+    let weights = setup::weights(args.weights.as_deref())?;
+    let empty = empty_frames(args, &inputs[0], &config)?;
+    setup::make_dir(&args.out)?;
+    setup::write(&args.out.join("config.toml"), config.to_toml())?;
+    let watch = Stopwatch::start();
+    let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let mut tracks = TableWriter::<TrackRow>::create(&args.out, &names, args.csv)?;
+    let mut links = TableWriter::<LinkRow>::create(&args.out, &names, args.csv)?;
+    let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
+    let (mut health, mut lost, mut step_s) = (Health::default(), Vec::new(), Vec::new());
+    let mut frames = Vec::new();
+    setup::with_threads(common.threads, || -> Result<(), Error> {
+        let numbered: Vec<(usize, &Input)> = inputs.iter().enumerate().collect();
+        for some in numbered.chunks(rayon::current_num_threads()) {
+            let scene = |&(number, input): &(usize, &Input)| {
+                let done = run_scene(number as u32, input, &config, &weights, &empty);
+                progress.inc(1);
+                done
+            };
+            for mut done in some.par_iter().map(scene).collect::<Result<Vec<Done>, Error>>()? {
+                tracks.write(&done.rows.tracks)?;
+                links.write(&done.rows.links)?;
+                health.add(&done.health);
+                lost.extend(done.lost);
+                step_s.append(&mut done.step_s);
+                frames.push(done.frames);
+            }
+        }
+        Ok(())
+    })??;
+    tracks.finish()?;
+    links.finish()?;
+    progress.finish_and_clear();
+    step_s.sort_by(f64::total_cmp);
+    let at = |share: f64| step_s.get(((step_s.len() as f64 * share) as usize).min(step_s.len().max(1) - 1));
+    let ms = |share: f64| at(share).map_or(0.0, |s| s * 1e3);
+    let summary = RunJson::new("run", &watch)
+        .with("mode", args.mode)
+        .with("scenes", inputs.len())
+        .with("frames", step_s.len())
+        .with("frame_numbers", &frames)
+        .with("step_ms_median", ms(0.5))
+        .with("step_ms_p99", ms(0.99))
+        .with("health", health)
+        .with("lost", &lost);
+    summary.write(&args.out)?;
+    let text = format!(
+        "{} frames of {} scenes in {}: {:.2} ms a frame (median), {:.2} ms (99 %)",
+        step_s.len(),
+        inputs.len(),
+        args.out.display(),
+        ms(0.5),
+        ms(0.99)
+    );
+    summary.print(common, &text);
+    if !lost.is_empty() {
+        return Ok(Ending::DataLost(lost.join("; ")));
+    }
+    if !health.is_clean() {
+        return Ok(Ending::DataLost(format!("{health:?}")));
+    }
+    Ok(Ending::Done)
+}
+
+fn run_scene(
+    scene: u32,
+    input: &Input,
+    config: &Config,
+    weights: &Weights,
+    empty: &[Frame],
+) -> Result<Done, Error> {
+    let mut pipeline = Pipeline::new(config, Some(weights))?;
+    empty.iter().for_each(|frame| pipeline.learn_empty(frame));
+    let mut done = Done::default();
+    let (mut input_health, mut stage_health) = (Health::default(), Health::default());
+    let lost = input.frames(&config.site, &mut input_health, |frame| {
+        let watch = Stopwatch::start();
+        let outcome = pipeline.step(frame);
+        done.step_s.push(watch.seconds());
+        done.frames.push(frame.index);
+        rows::of_outcome(scene, outcome, &mut done.rows.tracks, &mut done.rows.links);
+        stage_health = outcome.health;
+        Ok(())
+    })?;
+    done.health = input_health;
+    done.health.add(&stage_health);
+    done.lost = lost;
+    Ok(done)
+}
+
+/// The recording without people: as given, else `empty.mcap` beside the first recording.
+fn empty_frames(args: &Run, first: &Input, config: &Config) -> Result<Vec<Frame>, Error> {
+    let beside = || -> Option<PathBuf> {
+        let Input::Recording(file) = first else { return None };
+        Some(file.parent().unwrap_or(Path::new(".")).join("empty.mcap")).filter(|path| path.is_file())
+    };
+    let Some(file) = args.empty.clone().or_else(beside).filter(|_| !args.no_empty) else {
+        return Ok(Vec::new());
+    };
+    let mut frames = Vec::new();
+    Input::Recording(file).frames(&config.site, &mut Health::default(), |frame| {
+        frames.push(frame.clone());
+        Ok(())
+    })?;
+    Ok(frames)
+}

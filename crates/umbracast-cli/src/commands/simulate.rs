@@ -1,0 +1,136 @@
+//! `simulate`: scenes to recordings, with their truth in tables.
+
+use std::fs;
+use std::path::Path;
+
+use indicatif::ProgressBar;
+use rayon::prelude::*;
+use umbracast::lidar::Assembler;
+use umbracast::{Config, Error, Health, Mode};
+use umbracast_eval::chain::{self, EMPTY_FRAMES, SceneSpec};
+use umbracast_eval::scene::SceneTruth;
+use umbracast_io::recording::RecordingWriter;
+use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
+use umbracast_io::tables::TableWriter;
+use umbracast_sim::scene::Scene;
+
+use crate::args::{Common, Simulate};
+use crate::progress::bar;
+use crate::run_json::{RunJson, Stopwatch};
+use crate::setup::{self, TEST_SEED};
+use crate::{Ending, crowds};
+
+/// Simulates every scene, several at a time; tables are written in the order of the scenes.
+pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
+    let config = setup::config(Mode::Default, args.site.site.as_deref())?;
+    let seed = args.crowd.seed.unwrap_or(TEST_SEED);
+    let scenes = if args.trajectories.is_empty() {
+        chain::drawn_scenes(&[args.crowd.preset], args.scenes as usize, args.crowd.people, seed)
+    } else {
+        crowds::recorded_scenes(&args.trajectories, &args.replay, seed, None)?
+    };
+    setup::make_dir(&args.out)?;
+    setup::write(&args.out.join("config.toml"), config.to_toml())?;
+    let watch = Stopwatch::start();
+    record_empty(&config, &args.out.join("empty.mcap"), args.clouds, seed)?;
+    let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let mut people = TableWriter::<PeopleRow>::create(&args.out, &names, args.csv)?;
+    let mut links = TableWriter::<PeopleLinkRow>::create(&args.out, &names, args.csv)?;
+    let progress = bar(scenes.len() as u64, "scenes simulated", common.quiet);
+    let frames = setup::with_threads(common.threads, || -> Result<u64, Error> {
+        let mut frames = 0;
+        let numbered: Vec<(usize, &SceneSpec)> = scenes.iter().enumerate().collect();
+        for some in numbered.chunks(rayon::current_num_threads()) {
+            let truths: Vec<SceneTruth> = some
+                .par_iter()
+                .map(|&(number, scene)| record_scene(&config, args, number, scene, &progress))
+                .collect::<Result<_, _>>()?;
+            for truth in truths {
+                frames += truth.people.last().map_or(0, |row| row.frame + 1);
+                people.write(&truth.people)?;
+                links.write(&truth.links)?;
+            }
+        }
+        Ok(frames)
+    })??;
+    people.finish()?;
+    links.finish()?;
+    progress.finish_and_clear();
+    let summary = RunJson::new("simulate", &watch).with("scenes", scenes.len()).with("frames", frames);
+    summary.write(&args.out)?;
+    summary.print(common, &format!("{} scenes, {frames} frames in {}", scenes.len(), args.out.display()));
+    Ok(Ending::Done)
+}
+
+/// The hall without people.
+fn record_empty(config: &Config, path: &Path, clouds: bool, seed: u64) -> Result<(), Error> {
+    let mut writer = Recorder::create(path, config, clouds)?;
+    for (index, packets) in Scene::empty(&config.site, seed, EMPTY_FRAMES)?.iter().enumerate() {
+        writer.packets((index as i64 + 1) * umbracast::STEP_NS, packets)?;
+    }
+    writer.finish()
+}
+
+fn record_scene(
+    config: &Config,
+    args: &Simulate,
+    number: usize,
+    spec: &SceneSpec,
+    progress: &ProgressBar,
+) -> Result<SceneTruth, Error> {
+    let path = args.out.join(format!("scene-{number:04}.mcap"));
+    let mut scene = Scene::new(spec.crowd(), &config.site, spec.seed)?;
+    let mut writer = Recorder::create(&path, config, args.clouds)?;
+    let mut all = SceneTruth::default();
+    while let Some(frame) = scene.next_frame() {
+        let mut truth = SceneTruth::default();
+        chain::note_truth(number as u32, &frame, &mut truth);
+        writer.packets(frame.time_ns, &frame.packets)?;
+        writer.recording.write_truth(frame.time_ns, frame.index, &truth.people, &truth.links)?;
+        all.people.append(&mut truth.people);
+        all.links.append(&mut truth.links);
+    }
+    writer.finish()?;
+    progress.inc(1);
+    Ok(all)
+}
+
+/// A recording that appears under its name only when it is whole, so a run that was stopped leaves none behind
+/// that looks finished.
+struct Recorder<'a> {
+    recording: RecordingWriter,
+    clouds: Option<Assembler>,
+    path: &'a Path,
+}
+
+impl<'a> Recorder<'a> {
+    fn create(path: &'a Path, config: &Config, clouds: bool) -> Result<Self, Error> {
+        let recording =
+            RecordingWriter::create(&path.with_extension("part"), &config.to_toml(), &config.site, clouds)?;
+        let clouds = clouds.then(|| Assembler::new(&config.site)).transpose()?;
+        Ok(Self { recording, clouds, path })
+    }
+
+    fn packets(&mut self, time_ns: i64, packets: &[Vec<umbracast::lidar::Packet>]) -> Result<(), Error> {
+        self.recording.write_packets(time_ns, packets)?;
+        if let Some(assembler) = &mut self.clouds {
+            chain::push(assembler, packets, &mut Health::default());
+            while let Some(frame) = assembler.pop() {
+                self.recording.write_clouds(&frame)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<(), Error> {
+        if let Some(assembler) = &mut self.clouds {
+            assembler.finish();
+            while let Some(frame) = assembler.pop() {
+                self.recording.write_clouds(&frame)?;
+            }
+        }
+        self.recording.finish()?;
+        fs::rename(self.path.with_extension("part"), self.path)
+            .map_err(|e| Error::new(e.to_string()).within(self.path.display()))
+    }
+}

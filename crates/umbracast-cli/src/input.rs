@@ -1,0 +1,207 @@
+//! What `run` reads: recordings, PCD clouds, captures. Each gives frames, one after the other.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use umbracast::lidar::{Assembler, Cloud, Frame, Packet, Scan};
+use umbracast::{Config, Error, Health, Mode, STEP_NS, Site};
+use umbracast_io::pcap::{DATA_PORT, PcapReader};
+use umbracast_io::pcd::read_pcd;
+use umbracast_io::recording::{Entry, RecordingReader};
+
+use crate::setup;
+
+/// One scene's input.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Input {
+    /// An MCAP recording.
+    Recording(PathBuf),
+    /// PCD clouds of one sensor, a frame each, in natural order of their names.
+    Clouds(Vec<PathBuf>),
+    /// Captures, one for each sensor in the site's order.
+    Captures(Vec<PathBuf>),
+}
+
+/// The scenes that the arguments name.
+///
+/// # Errors
+/// A file of another kind, or a folder without input.
+pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            let found = folder(path)?;
+            if found.is_empty() {
+                return Err(Error::new("expected .mcap, .pcd or .pcap files in the folder, found none")
+                    .within(path.display()));
+            }
+            files.extend(found);
+        } else {
+            files.push(path.clone());
+        }
+    }
+    let (mut scenes, mut clouds, mut captures) = (Vec::new(), Vec::new(), Vec::new());
+    for file in files {
+        match file.extension().and_then(|e| e.to_str()) {
+            Some("mcap") => scenes.push(Input::Recording(file)),
+            Some("pcd") => clouds.push(file),
+            Some("pcap") => captures.push(file),
+            _ => {
+                return Err(Error::new("expected .mcap, .pcd or .pcap").within(file.display()));
+            }
+        }
+    }
+    if !clouds.is_empty() {
+        setup::sort_naturally(&mut clouds);
+        scenes.push(Input::Clouds(clouds));
+    }
+    if !captures.is_empty() {
+        scenes.push(Input::Captures(captures));
+    }
+    Ok(scenes)
+}
+
+/// A folder's recordings (without `empty.mcap`), or its clouds, or its captures.
+fn folder(path: &Path) -> Result<Vec<PathBuf>, Error> {
+    for extension in ["mcap", "pcd", "pcap"] {
+        let mut files = setup::files_with_extension(path, extension)?;
+        files.retain(|file| file.file_name().is_none_or(|name| name != "empty.mcap"));
+        if !files.is_empty() {
+            return Ok(files);
+        }
+    }
+    Ok(Vec::new())
+}
+
+impl Input {
+    /// The site that the input was recorded on, where it says so.
+    ///
+    /// # Errors
+    /// A recording that cannot be read, or whose configuration is not understood.
+    pub fn site(&self) -> Result<Option<Site>, Error> {
+        let Self::Recording(file) = self else { return Ok(None) };
+        let mut reader = RecordingReader::open(file)?;
+        match reader.next_entry()? {
+            Some(Entry::Config(text)) => {
+                let place = format!("{}: recorded configuration", file.display());
+                Ok(Some(Config::with_overlay(Mode::Default, &text, &place)?.site))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// Gives every frame to `sink`; what is broken is counted. Says what was lost at the end of a damaged file.
+    ///
+    /// # Errors
+    /// A file that is not there or of another kind, and what `sink` fails with.
+    pub fn frames(
+        &self,
+        site: &Site,
+        health: &mut Health,
+        mut sink: impl FnMut(&Frame) -> Result<(), Error>,
+    ) -> Result<Option<String>, Error> {
+        match self {
+            Self::Recording(file) => recording(file, site, health, &mut sink),
+            Self::Clouds(files) => clouds(files, site, health, &mut sink),
+            Self::Captures(files) => captures(files, site, health, &mut sink),
+        }
+    }
+}
+
+type Sink<'a> = &'a mut dyn FnMut(&Frame) -> Result<(), Error>;
+
+fn recording(file: &Path, site: &Site, health: &mut Health, sink: Sink) -> Result<Option<String>, Error> {
+    let mut reader = RecordingReader::open(file)?;
+    let mut assembler = Assembler::new(site)?;
+    while let Some(entry) = reader.next_entry()? {
+        let Entry::Packets(name, packets) = entry else { continue };
+        let Some(sensor) = site.sensors.iter().position(|sensor| sensor.name == name) else {
+            let known: Vec<&str> = site.sensors.iter().map(|s| s.name.as_str()).collect();
+            let story = format!("sensor {name:?}: expected one of the site's, {}", known.join(", "));
+            return Err(Error::new(story).within(file.display()));
+        };
+        packets.iter().for_each(|packet| assembler.push(sensor, packet, health));
+        drain(&mut assembler, sink)?;
+    }
+    assembler.finish();
+    drain(&mut assembler, sink)?;
+    Ok(reader.lost().map(str::to_owned))
+}
+
+fn drain(assembler: &mut Assembler, sink: Sink) -> Result<(), Error> {
+    while let Some(frame) = assembler.pop() {
+        sink(&frame)?;
+    }
+    Ok(())
+}
+
+/// Clouds carry no time: one period between them. A file named by a number gives its frame that number.
+fn clouds(files: &[PathBuf], site: &Site, health: &mut Health, sink: Sink) -> Result<Option<String>, Error> {
+    let [sensor] = &site.sensors[..] else {
+        let found = site.sensors.len();
+        return Err(
+            Error::new(format!("clouds come from 1 sensor, the site has {found}")).within(files[0].display())
+        );
+    };
+    let by_name = files.iter().all(|file| setup::number_of(file).is_some());
+    for (count, file) in files.iter().enumerate() {
+        let index = setup::number_of(file).filter(|_| by_name).unwrap_or(count as u64);
+        let time_ns = (index as i64 + 1) * STEP_NS;
+        let name = file.display().to_string();
+        let cloud = read_pcd(&setup::read(file)?, &name)?;
+        let (points, dropped) = cloud.sensor_points(time_ns).map_err(|e| e.within(&name))?;
+        health.points_invalid += dropped;
+        let scan = Scan {
+            sensor: 0,
+            site_from_sensor: sensor.site_from_sensor(),
+            cloud: Cloud::Unorganised(points),
+        };
+        sink(&Frame { index, time_ns, scans: vec![scan] })?;
+    }
+    Ok(None)
+}
+
+fn captures(
+    files: &[PathBuf],
+    site: &Site,
+    health: &mut Health,
+    sink: Sink,
+) -> Result<Option<String>, Error> {
+    if files.len() != site.sensors.len() {
+        let (expected, found) = (site.sensors.len(), files.len());
+        return Err(Error::new(format!(
+            "expected {expected} captures, one for each sensor of the site in its order, found {found}"
+        ))
+        .within(files[0].display()));
+    }
+    let mut readers = files
+        .iter()
+        .map(|file| {
+            let open = File::open(file).map_err(|e| Error::new(e.to_string()).within(file.display()))?;
+            PcapReader::new(BufReader::new(open), &file.display().to_string())
+        })
+        .collect::<Result<Vec<_>, Error>>()?;
+    let mut assembler = Assembler::new(site)?;
+    let mut next: Vec<Option<Packet>> = readers.iter_mut().map(next_packet).collect();
+    // The packets of all sensors in the order of their times.
+    while let Some(sensor) = (0..next.len())
+        .filter(|&sensor| next[sensor].is_some())
+        .min_by_key(|&sensor| next[sensor].as_ref().map(|packet| packet.time_ns))
+    {
+        if let Some(packet) = next[sensor].take() {
+            assembler.push(sensor, &packet, health);
+        }
+        next[sensor] = next_packet(&mut readers[sensor]);
+        drain(&mut assembler, sink)?;
+    }
+    assembler.finish();
+    drain(&mut assembler, sink)?;
+    let cut = files.iter().zip(&readers).find(|(_, reader)| reader.truncated());
+    Ok(cut.map(|(file, _)| format!("{}: ends within a record", file.display())))
+}
+
+fn next_packet(reader: &mut PcapReader<BufReader<File>>) -> Option<Packet> {
+    let datagram = reader.by_ref().find(|datagram| datagram.port == DATA_PORT)?;
+    Some(Packet { time_ns: datagram.time_ns, payload: datagram.payload })
+}

@@ -1,0 +1,78 @@
+//! From arguments to what the crates take: configuration, weights, threads, files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use umbracast::forecast::Weights;
+use umbracast::{Config, Error, Mode};
+
+/// The paper's LSTM as `umbracast train` made it; its card lies beside the file.
+const PAPER_LSTM: &[u8] = include_bytes!("../../../models/paper_lstm.safetensors");
+
+/// First seed of the test scenes (CONVENTIONS: tests 200,000 to 299,999).
+pub const TEST_SEED: u64 = 200_000;
+
+/// The mode's values with the user's file laid over them.
+pub fn config(mode: Mode, site: Option<&Path>) -> Result<Config, Error> {
+    let Some(path) = site else { return Ok(Config::for_mode(mode)) };
+    Config::with_overlay(mode, &read_text(path)?, &path.display().to_string())
+}
+
+/// The weights given, or the embedded ones.
+pub fn weights(file: Option<&Path>) -> Result<Weights, Error> {
+    match file {
+        None => Weights::from_safetensors(PAPER_LSTM),
+        Some(path) => Weights::from_safetensors(&read(path)?).map_err(|e| e.within(path.display())),
+    }
+}
+
+/// A file's bytes, or an error that names it.
+pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    fs::read(path).map_err(|e| Error::new(e.to_string()).within(path.display()))
+}
+
+/// A file's text, or an error that names it.
+pub fn read_text(path: &Path) -> Result<String, Error> {
+    String::from_utf8(read(path)?)
+        .map_err(|e| Error::new(format!("expected UTF-8 text, found {e}")).within(path.display()))
+}
+
+/// Writes a file whole.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Error> {
+    fs::write(path, bytes).map_err(|e| Error::new(e.to_string()).within(path.display()))
+}
+
+/// Makes a folder for output.
+pub fn make_dir(path: &Path) -> Result<(), Error> {
+    fs::create_dir_all(path).map_err(|e| Error::new(e.to_string()).within(path.display()))
+}
+
+/// Files of a folder that end in `.extension`, in natural order: `2.pcd` before `10.pcd`.
+pub fn files_with_extension(folder: &Path, extension: &str) -> Result<Vec<PathBuf>, Error> {
+    let entries = fs::read_dir(folder).map_err(|e| Error::new(e.to_string()).within(folder.display()))?;
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|e| e == extension))
+        .collect();
+    sort_naturally(&mut files);
+    Ok(files)
+}
+
+/// `2.pcd` before `10.pcd`, names without a number last.
+pub fn sort_naturally(files: &mut [PathBuf]) {
+    files.sort_by_key(|path| (number_of(path).unwrap_or(u64::MAX), path.clone()));
+}
+
+/// The number that a file is named by: 70 of `70.pcd`.
+pub fn number_of(path: &Path) -> Option<u64> {
+    path.file_stem()?.to_str()?.parse().ok()
+}
+
+/// A pool of as many threads as asked for.
+pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, Error> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Error::new(format!("--threads {threads}: {e}")))?;
+    Ok(pool.install(work))
+}

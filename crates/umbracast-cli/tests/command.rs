@@ -1,0 +1,168 @@
+//! The command as a user meets it: whole runs, the same bytes, broken files, exit codes.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Two people who cross in front of the `side` access point, for three seconds.
+const CROSSING: &str = "t_s,id,x_m,y_m,height_m\n\
+    0.0,1,6.0,-2.0,1.80\n1.0,1,6.0,-0.7,1.80\n2.0,1,6.0,0.6,1.80\n3.0,1,6.0,1.9,1.80\n\
+    0.0,2,1.0,0.3,1.70\n1.0,2,0.0,0.3,1.70\n2.0,2,-1.0,0.3,1.70\n3.0,2,-2.0,0.3,1.70\n";
+
+fn umbracast(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_umbracast")).args(arguments).arg("--quiet").output().expect("starts")
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+/// Runs and expects code 0.
+fn done(arguments: &[&str]) -> String {
+    let output = umbracast(arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", said(&output));
+    said(&output)
+}
+
+/// Runs and expects a code; gives what was said.
+fn ends_with(code: i32, arguments: &[&str]) -> String {
+    let output = umbracast(arguments);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}", said(&output));
+    said(&output)
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder for the test");
+    folder
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("the test's folder has a plain name")
+}
+
+/// Simulates the crossing into `folder/sim`.
+fn simulate(folder: &Path, threads: &str) -> PathBuf {
+    let trajectories = folder.join("crossing.csv");
+    fs::write(&trajectories, CROSSING).expect("writes");
+    let sim = folder.join("sim");
+    done(&[
+        "simulate",
+        "--trajectories",
+        text(&trajectories),
+        "--seed",
+        "7",
+        "--threads",
+        threads,
+        "--csv",
+        "--out",
+        text(&sim),
+    ]);
+    sim
+}
+
+/// Every file below, without `run.json`, which holds times and machine.
+fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files.retain(|path| path.is_file() && path.file_name().is_some_and(|name| name != "run.json"));
+    files.iter().map(|p| (text(p.strip_prefix(folder).unwrap()).to_owned(), fs::read(p).unwrap())).collect()
+}
+
+fn assert_same(a: &Path, b: &Path) {
+    let (a, b) = (contents(a), contents(b));
+    assert_eq!(a.iter().map(|f| &f.0).collect::<Vec<_>>(), b.iter().map(|f| &f.0).collect::<Vec<_>>());
+    for ((name, a), (_, b)) in a.iter().zip(&b) {
+        assert!(a == b, "{name} differs");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_files_on_one_thread_and_two() {
+    let (one, two) = (folder("same_one"), folder("same_two"));
+    for (folder, threads) in [(&one, "1"), (&two, "2")] {
+        let sim = simulate(folder, threads);
+        for mode in ["default", "paper", "hdl"] {
+            let out = folder.join(mode);
+            done(&["run", text(&sim), "--mode", mode, "--threads", threads, "--csv", "--out", text(&out)]);
+        }
+    }
+    assert_same(&one.join("sim"), &two.join("sim"));
+    for mode in ["default", "paper", "hdl"] {
+        assert!(contents(&one.join(mode)).len() >= 5, "config, tracks and links as parquet and csv");
+        assert_same(&one.join(mode), &two.join(mode));
+    }
+}
+
+#[test]
+fn simulate_run_evaluate_inspect() {
+    let folder = folder("whole_way");
+    let sim = simulate(&folder, "0");
+    let (out, report) = (folder.join("out"), folder.join("report"));
+    done(&["run", text(&sim), "--out", text(&out)]);
+    let table = done(&["evaluate", text(&out), "--truth", text(&sim), "--out", text(&report)]);
+    assert!(table.contains("F1"), "{table}");
+    assert!(report.join("index.html").is_file());
+    for folder in [&sim, &out] {
+        for (name, _) in contents(folder) {
+            let file = folder.join(&name);
+            assert!(!done(&["inspect", text(&file)]).is_empty(), "{name}");
+        }
+    }
+    let tracks = done(&["inspect", text(&out.join("tracks.parquet"))]);
+    assert!(tracks.contains("x_s1_m"), "{tracks}");
+}
+
+#[test]
+fn a_truncated_recording_gives_what_is_whole_and_code_3() {
+    let folder = folder("truncated");
+    let sim = simulate(&folder, "0");
+    let recording = sim.join("scene-0000.mcap");
+    let bytes = fs::read(&recording).expect("a recording");
+    fs::write(&recording, &bytes[..bytes.len() * 6 / 10]).expect("writes");
+    let out = folder.join("out");
+    let message = ends_with(3, &["run", text(&sim), "--out", text(&out)]);
+    assert!(message.contains("scene-0000.mcap"), "{message}");
+    assert!(out.join("tracks.parquet").is_file());
+    ends_with(3, &["inspect", text(&recording)]);
+}
+
+#[test]
+fn an_empty_and_a_wrong_file_are_named() {
+    let folder = folder("wrong_files");
+    for (name, bytes) in [("empty.mcap", &b""[..]), ("wrong.mcap", b"not a recording"), ("empty.pcd", b"")] {
+        let file = folder.join(name);
+        fs::write(&file, bytes).expect("writes");
+        for command in ["inspect", "run"] {
+            let out = folder.join("out");
+            let mut arguments = vec![command, text(&file)];
+            if command == "run" {
+                arguments.extend(["--out", text(&out)]);
+            }
+            let message = ends_with(1, &arguments);
+            assert!(message.contains(name) && message.contains("expected"), "{message}");
+        }
+    }
+    let missing = folder.join("missing.mcap");
+    assert!(ends_with(1, &["inspect", text(&missing)]).contains("missing.mcap"));
+}
+
+#[test]
+fn a_wrong_key_in_a_site_file_names_file_place_expected_and_found() {
+    let folder = folder("wrong_key");
+    let site = folder.join("lab.toml");
+    fs::write(&site, "[site.hall]\nlenght_m = 12.0\n").expect("writes");
+    let message = ends_with(1, &["config", "--check", text(&site)]);
+    assert!(message.contains("lab.toml:2:1") && message.contains("lenght_m") && message.contains("length_m"));
+    fs::write(&site, "[site.hall]\nlength_m = \"twelve\"\n").expect("writes");
+    let message = ends_with(1, &["simulate", "--site", text(&site), "--out", text(&folder.join("sim"))]);
+    assert!(message.contains("lab.toml:2") && message.contains("a number") && message.contains("a string"));
+}
+
+#[test]
+fn wrong_arguments_end_with_code_2() {
+    ends_with(2, &["simulate"]);
+    ends_with(2, &["run", "x", "--out", "y", "--mode", "best"]);
+}
