@@ -52,6 +52,8 @@ pub struct BackgroundConfig {
     pub voxel_m: f64,
     /// A voxel with at least this many points of the empty scene is occupied.
     pub voxel_points: u8,
+    /// So many empty scans make the voxel map.
+    pub map_revolutions: u32,
     /// Edge of the voxels whose points become their centroid; 0 keeps every point.
     pub thin_m: f64,
     /// Points nearer than this to the hall's walls, or outside, are not people.

@@ -18,7 +18,10 @@ pub struct Background {
     /// True once an empty frame was given: then nothing more is learned.
     known: bool,
     map: Option<VoxelMap>,
-    keys: Vec<(u64, u32)>,
+    /// Scans that made the map.
+    map_scans: u32,
+    keys: Vec<u64>,
+    thinned: Vec<Point>,
 }
 
 #[derive(Debug)]
@@ -37,7 +40,7 @@ struct SensorModel {
 #[derive(Debug, Clone, Copy)]
 struct Return {
     elevation_bin: usize,
-    pixel: usize,
+    azimuth_cdeg: f32,
     range_m: f32,
     point: SensorPoint,
 }
@@ -80,7 +83,9 @@ impl Background {
             half_width_m: site.hall.width_m * 0.5 - config.wall_m,
             known: false,
             map: None,
+            map_scans: 0,
             keys: Vec::new(),
+            thinned: Vec::new(),
             config,
         })
     }
@@ -123,8 +128,9 @@ impl Background {
             }
             BackgroundMethod::Voxel => {
                 self.all_points(frame, health, points);
-                self.learn_map(points);
-                let map = self.map.as_ref().expect("just learned");
+                // Without an empty scan the first cloud is the map, and nothing changes it after, as in the
+                // adapted code: who stands in it is never seen.
+                let map = self.map.get_or_insert_with(|| VoxelMap::new(self.config.voxel_m, points));
                 points.retain(|p| map.is_new(p.position_m, self.config.voxel_points));
                 if self.config.thin_m == 0.0 {
                     // DP-means depends on the order; a thinned cloud has one already, its voxels'.
@@ -137,10 +143,14 @@ impl Background {
         points.truncate(limit);
     }
 
-    /// The first cloud is the map, and nothing changes it after (as in the adapted code).
+    /// Adds a scan to the map until it has enough.
     fn learn_map(&mut self, points: &[Point]) {
-        if self.map.is_none() {
-            self.map = Some(VoxelMap::new(self.config.voxel_m, points));
+        if self.map_scans < self.config.map_revolutions {
+            match &mut self.map {
+                Some(map) => map.add(points),
+                None => self.map = Some(VoxelMap::new(self.config.voxel_m, points)),
+            }
+            self.map_scans += 1;
         }
     }
 
@@ -173,7 +183,7 @@ impl Background {
             }
         }
         if self.config.thin_m > 0.0 {
-            thin(points, self.config.thin_m, &mut self.keys);
+            thin(points, self.config.thin_m, &mut self.keys, &mut self.thinned);
         }
     }
 
@@ -293,14 +303,13 @@ impl SensorModel {
     ) {
         self.sort_returns(cloud, health);
         for i in 0..self.returns.len() {
-            let Return { elevation_bin, pixel, range_m, point } = self.returns[i];
+            let Return { elevation_bin, azimuth_cdeg, range_m, point } = self.returns[i];
             // Beams sit between two bins of elevation, so both neighbours count as well.
             let rows = &self.row_of_elevation[elevation_bin.saturating_sub(1)..=elevation_bin + 1];
-            let limit_m = rows
-                .iter()
-                .flatten()
-                .map(|&row| self.cloud_ranges.limit_m(self.cloud_ranges.in_row(pixel, usize::from(row))))
-                .fold(f32::INFINITY, f32::min);
+            let pixel = |row: u16| self.cloud_ranges.pixel(usize::from(row), azimuth_cdeg);
+            let limits_m = rows.iter().flatten().map(|&row| self.cloud_ranges.limit_m(pixel(row)));
+            let limit_m = limits_m.fold(f32::INFINITY, f32::min);
+            let own = self.row_of_elevation[elevation_bin].map(pixel);
             let mut frozen = false;
             if range_m < limit_m {
                 let point = unorganised_point(scan, &point);
@@ -309,8 +318,8 @@ impl SensorModel {
                     frozen = learn.is_some_and(|learn| learn.is_frozen(point.position_m));
                 }
             }
-            if learn.is_some() && !frozen {
-                self.cloud_ranges.observe(pixel, range_m);
+            if let Some(own) = own.filter(|_| learn.is_some() && !frozen) {
+                self.cloud_ranges.observe(own, range_m);
             }
         }
     }
@@ -330,13 +339,12 @@ impl SensorModel {
             // Bins are centred on their multiples, where beams use to be; bin 0 stays empty for the neighbours.
             let elevation_bin = (above_nadir_rad * self.elevation_bins_per_rad).round() as usize + 1;
             let elevation_bin = elevation_bin.min(self.row_of_elevation.len() - 2);
-            let row = *self.row_of_elevation[elevation_bin].get_or_insert_with(|| {
+            if self.row_of_elevation[elevation_bin].is_none() {
+                self.row_of_elevation[elevation_bin] = Some(self.cloud_ranges.rows() as u16);
                 self.cloud_ranges.grow(self.cloud_ranges.rows() + 1);
-                self.cloud_ranges.rows() as u16 - 1
-            });
+            }
             let azimuth_cdeg = (-y).atan2(x).to_degrees() * 100.0;
-            let pixel = self.cloud_ranges.pixel(usize::from(row), azimuth_cdeg);
-            self.returns.push(Return { elevation_bin, pixel, range_m, point });
+            self.returns.push(Return { elevation_bin, azimuth_cdeg, range_m, point });
         }
         self.returns.sort_unstable_by(|a, b| {
             let key = |r: &Return| (r.elevation_bin, r.point.time_ns, r.range_m.to_bits());

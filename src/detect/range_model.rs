@@ -20,7 +20,7 @@ struct Mode {
     seen: u32,
 }
 
-/// The pixels of one sensor, row after row.
+/// The pixels of one sensor, bin after bin, in each bin row after row: as the columns of a scan come.
 #[derive(Debug)]
 pub struct RangeModel {
     bins: usize,
@@ -35,6 +35,8 @@ pub struct RangeModel {
     revolutions: f32,
     /// The revolution that is being observed.
     count: u32,
+    /// True once it was learned without people.
+    known: bool,
     margin_m: f32,
     share: f32,
     start: f32,
@@ -58,6 +60,7 @@ impl RangeModel {
             start: config.start_revolutions as f32,
             memory: config.memory_revolutions as f32,
             count: 1,
+            known: false,
         }
     }
 
@@ -66,13 +69,22 @@ impl RangeModel {
         self.rows
     }
 
-    /// Adds rows about which nothing is known.
+    /// Adds rows about which nothing is known. Pixels change their numbers.
     pub fn grow(&mut self, rows: usize) {
-        self.rows = self.rows.max(rows);
-        let pixels = self.rows * self.bins;
-        self.modes.resize(pixels, [Mode::default(); MODES]);
-        self.nearest_m.resize(pixels, 0.0);
-        self.limit_m.resize(pixels, 0.0);
+        if rows <= self.rows {
+            return;
+        }
+        let (old_rows, old) = (self.rows, std::mem::take(&mut self.modes));
+        self.rows = rows;
+        self.modes = vec![[Mode::default(); MODES]; rows * self.bins];
+        self.nearest_m = vec![0.0; rows * self.bins];
+        self.limit_m = vec![0.0; rows * self.bins];
+        if old_rows > 0 {
+            for (new, old) in self.modes.chunks_exact_mut(rows).zip(old.chunks_exact(old_rows)) {
+                new[..old_rows].copy_from_slice(old);
+            }
+            self.find_limits();
+        }
     }
 
     /// The pixel of a row that looks at this azimuth, hundredths of a degree.
@@ -86,18 +98,13 @@ impl RangeModel {
         } else if bin < 0 {
             bin += bins;
         }
-        row * self.bins + bin.clamp(0, bins - 1) as usize
+        bin.clamp(0, bins - 1) as usize * self.rows + row
     }
 
     /// Returns nearer than this are new. Zero, so that nothing is, until the scene is known.
     #[inline]
     pub fn limit_m(&self, pixel: usize) -> f32 {
         self.limit_m[pixel]
-    }
-
-    /// The pixel in the same place of another row.
-    pub fn in_row(&self, pixel: usize, row: usize) -> usize {
-        row * self.bins + pixel % self.bins
     }
 
     /// Remembers one return.
@@ -123,30 +130,32 @@ impl RangeModel {
     }
 
     /// Closes a revolution that was observed and works out the limits anew. What was always empty counts as
-    /// open once `known` or once enough revolutions were seen.
+    /// open once the scene is `known` or enough revolutions were seen.
     pub fn close_revolution(&mut self, known: bool) {
+        self.known |= known;
         self.revolutions += 1.0;
         self.count = self.count.wrapping_add(1);
         if self.revolutions > self.memory {
             self.revolutions *= 0.5;
             self.modes.iter_mut().flatten().for_each(|mode| mode.weight *= 0.5);
         }
-        let unseen_m = if known || self.revolutions >= self.start { f32::INFINITY } else { 0.0 };
+        self.find_limits();
+    }
+
+    fn find_limits(&mut self) {
+        let unseen_m = if self.known || self.revolutions >= self.start { f32::INFINITY } else { 0.0 };
         // An empty scan is believed as it is; what walks by has to be outvoted.
-        let least =
-            if known { self.share * self.revolutions } else { (self.share * self.revolutions).max(1.5) };
+        let least = self.share * self.revolutions;
+        let least = if self.known { least } else { least.max(1.5) };
         for (nearest, modes) in self.nearest_m.iter_mut().zip(&self.modes) {
             *nearest = nearest_m(modes, least).unwrap_or(unseen_m).min(unseen_m);
         }
-        for (row, limit) in
-            self.nearest_m.chunks_exact(self.bins).zip(self.limit_m.chunks_exact_mut(self.bins))
-        {
-            let last = row.len() - 1;
-            for bin in 0..row.len() {
-                let left = row[if bin == 0 { last } else { bin - 1 }];
-                let right = row[if bin == last { 0 } else { bin + 1 }];
-                // Edges jitter by one bin from revolution to revolution.
-                limit[bin] = row[bin].min(left).min(right) - self.margin_m;
+        for bin in 0..self.bins {
+            // Edges jitter by one bin from revolution to revolution.
+            let [own, left, right] = [0, self.bins - 1, 1].map(|off| (bin + off) % self.bins * self.rows);
+            for row in 0..self.rows {
+                let around = [own, left, right].map(|first| self.nearest_m[first + row]);
+                self.limit_m[own + row] = around.into_iter().fold(f32::INFINITY, f32::min) - self.margin_m;
             }
         }
     }
