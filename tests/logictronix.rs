@@ -92,20 +92,9 @@ fn people_are_found_without_an_empty_scan() {
                 .count();
             people += labels.len();
             found += hits;
+            // Somebody who is not labelled stands and moves beside the sensor.
             detections.retain(|d| d.position_m.length() > 2.0);
             detected += detections.len();
-            println!("{index}: {} foreground, {hits} of {} found", points.len(), labels.len());
-            for d in &detections {
-                let near = labels.iter().map(|l| l.distance(d.position_m)).fold(f64::INFINITY, f64::min);
-                println!(
-                    "   {:.2} {:?} {} top {:.2} {:.2}",
-                    near,
-                    d.position_m,
-                    d.points,
-                    d.top_m,
-                    d.aabb.size_m()
-                );
-            }
         }
     }
     let (recall, precision) =
