@@ -116,8 +116,8 @@ impl Lines {
             )));
         }
         let record = fields.iter().try_fold(0_usize, |sum, f| sum.checked_add(f.count.checked_mul(8)?));
-        if record.is_none() {
-            return Err(Error::new("COUNT: expected fewer values a point"));
+        if record.is_none() || fields.iter().any(|f| f.count == 0) {
+            return Err(Error::new("COUNT: expected one or a few values a point and field"));
         }
         let viewpoint = match self.line("VIEWPOINT") {
             Some(_) => self.values("VIEWPOINT", Some(7))?.try_into().unwrap_or_default(),

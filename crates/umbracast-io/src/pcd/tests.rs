@@ -87,6 +87,7 @@ fn errors_name_place_expected_and_found() {
     assert_eq!(message("WIDTH 20", "WIDTH many"), "a.pcd: line 7, WIDTH: expected a number, found \"many\"");
     assert_eq!(message("COUNT 1 1", "COUNT 1"), "a.pcd: line 6, COUNT: expected 12 values, found 11");
     assert_eq!(message("POINTS 60", "POINTS 61"), "a.pcd: POINTS: expected WIDTH 20 x HEIGHT 3, found 61");
+    assert!(message("COUNT 1 1", "COUNT 0 1").starts_with("a.pcd: COUNT: expected one"));
     assert_eq!(message("SIZE 2 4", "SIZE 3 4").split(", ").last(), Some("found U3"));
     assert_eq!(
         message("FIELDS", "FILEDS"),
