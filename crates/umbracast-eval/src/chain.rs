@@ -5,10 +5,11 @@ use rayon::prelude::*;
 use umbracast::forecast::Weights;
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
-use umbracast_io::rows::{self, PeopleLinkRow, PeopleRow};
+use umbracast_io::rows;
 use umbracast_sim::crowd::{self, Crowd, Preset};
-use umbracast_sim::scene::{Scene, SceneFrame};
+use umbracast_sim::scene::Scene;
 
+use crate::ladder::{self, SceneLadder};
 use crate::scene::{SceneRun, SceneTruth};
 use crate::score::{ModeRun, SceneScore, score_scene};
 
@@ -30,6 +31,8 @@ pub struct Spec {
     pub scenes: Vec<SceneSpec>,
     /// The index of the scene whose rows are kept, for the figures that show one scene.
     pub keep: Option<usize>,
+    /// The ladder of oracles as well: about as long as a mode.
+    pub ladder: bool,
 }
 
 /// One scene.
@@ -85,6 +88,8 @@ pub struct Progress {
 pub struct SceneResult {
     /// The sums.
     pub score: SceneScore,
+    /// The oracles' sums, where asked for.
+    pub ladder: Option<SceneLadder>,
     /// Truth and one run a mode.
     pub kept: Option<(SceneTruth, Vec<SceneRun>)>,
 }
@@ -155,7 +160,7 @@ fn run_scene(
     let number = index as u32;
     let mut truth = SceneTruth::default();
     while let Some(frame) = scene.next_frame() {
-        note_truth(number, &frame, &mut truth);
+        truth.add(number, &frame);
         push(&mut assembler, &frame.packets, &mut health);
         let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
         lanes.iter_mut().for_each(|lane| lane.step(number, &closed));
@@ -169,7 +174,11 @@ fn run_scene(
     let score =
         score_scene(number, &scene_spec.group, &truth, &runs, spec.weights.as_ref(), Some(scene.walkers()))?;
     let kept = (spec.keep == Some(index)).then(|| (truth, lanes.into_iter().map(|lane| lane.rows).collect()));
-    Ok(SceneResult { score, kept })
+    let ladder = spec.ladder.then(|| {
+        let scene = Scene::truth_only(crowd_of(scene_spec), site, scene_spec.seed);
+        ladder::climb(scene, site, scene_spec.seed)
+    });
+    Ok(SceneResult { score, ladder, kept })
 }
 
 /// One mode's pipeline and what it has said.
@@ -206,35 +215,6 @@ pub fn push(assembler: &mut Assembler, packets: &[Vec<Packet>], health: &mut Hea
     }
 }
 
-/// The rows of a frame's truth.
-pub fn note_truth(scene: u32, frame: &SceneFrame, truth: &mut SceneTruth) {
-    let (number, time_ns) = (frame.index, frame.time_ns);
-    truth.people.extend(frame.people.iter().map(|p| PeopleRow {
-        scene,
-        frame: number,
-        time_ns,
-        person: p.person,
-        x_m: p.state.position_m.x,
-        y_m: p.state.position_m.y,
-        vx_mps: p.state.velocity_mps.x,
-        vy_mps: p.state.velocity_mps.y,
-        heading_rad: p.state.heading_rad,
-        height_m: p.state.height_m,
-        arrived: p.arrived,
-        returns: p.returns,
-    }));
-    truth.links.extend(frame.links.iter().map(|link| PeopleLinkRow {
-        scene,
-        frame: number,
-        time_ns,
-        access_point: link.access_point as u32,
-        person: link.person,
-        blocked: link.blocked,
-        static_blocked: link.static_blocked,
-        self_blocked: link.self_blocked,
-    }));
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -263,6 +243,7 @@ mod tests {
             weights: None,
             scenes: (0..scenes).map(scene).collect(),
             keep: Some(0),
+            ladder: false,
         }
     }
 

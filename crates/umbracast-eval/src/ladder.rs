@@ -131,7 +131,7 @@ pub fn climb(mut scene: Scene, site: &Site, seed: u64) -> SceneLadder {
 }
 
 /// The figures of many scenes together.
-pub fn rows(scenes: &[SceneLadder], site: &Site) -> Vec<LadderRow> {
+pub fn rows(scenes: &[&SceneLadder], site: &Site) -> Vec<LadderRow> {
     let mut rows = Vec::new();
     for (rung, oracle) in ORACLES.iter().enumerate() {
         for (ap, access_point) in site.access_points.iter().enumerate() {
@@ -335,7 +335,7 @@ mod tests {
     fn knowing_more_of_the_body_scores_higher_and_errors_score_lower() {
         let site = Config::default().site;
         let scene = Scene::truth_only(circle_crossing(Preset::Orca03, 10, 12.5, 100_001), &site, 100_001);
-        let rows = rows(&[climb(scene, &site, 1)], &site);
+        let rows = rows(&[&climb(scene, &site, 1)], &site);
         let f1 = |name: &str| {
             let found = |r: &&LadderRow| r.oracle.contains(name) && r.access_point == "side" && r.window == 3;
             rows.iter().find(found).unwrap().f1.unwrap()

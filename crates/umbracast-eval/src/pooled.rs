@@ -1,10 +1,12 @@
 //! The scores: sums of all scenes pooled, by preset and together, with intervals by bootstrap over scenes.
 
 use serde::Serialize;
-use umbracast::{Health, Mode, STEPS};
+use umbracast::{Health, Mode, STEPS, Site};
 
 use crate::bootstrap::{Bootstrap, Pooled};
+use crate::chain::SceneResult;
 use crate::displacement::Displacement;
+use crate::ladder::{self, LadderRow, SceneLadder};
 use crate::score::{Predictor, SceneScore};
 use crate::stage1::Stage1;
 use crate::tally::{Bin, Counts, LinkTally};
@@ -26,6 +28,8 @@ pub struct Estimate {
 pub struct Scores {
     /// One a preset, in the order of the scenes, then [`ALL`] where there are several.
     pub groups: Vec<Group>,
+    /// What oracles reach, over all scenes; empty unless asked for.
+    pub ladder: Vec<LadderRow>,
 }
 
 /// Scenes that are pooled.
@@ -89,7 +93,7 @@ pub struct WindowScores {
     pub lead_median_s: Option<f64>,
     /// Share of onsets warned of.
     pub lead_warned: Option<f64>,
-    /// For the reliability diagram.
+    /// For the reliability diagram: of the modes themselves, empty for all others.
     pub bins: Vec<Bin>,
 }
 
@@ -132,6 +136,15 @@ pub struct ModeScores {
     pub health: Health,
 }
 
+/// The scores of a run in memory, ladder and all.
+pub fn score(results: &[SceneResult], site: &Site) -> Scores {
+    let names: Vec<String> = site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let scenes: Vec<&SceneScore> = results.iter().map(|result| &result.score).collect();
+    let ladders: Vec<&SceneLadder> = results.iter().filter_map(|result| result.ladder.as_ref()).collect();
+    let ladder = if ladders.is_empty() { Vec::new() } else { ladder::rows(&ladders, site) };
+    Scores { ladder, ..pool(&scenes, &names) }
+}
+
 /// Pools scenes. `access_points` are the site's names.
 pub fn pool(scenes: &[&SceneScore], access_points: &[String]) -> Scores {
     let mut names: Vec<&str> = Vec::new();
@@ -148,7 +161,7 @@ pub fn pool(scenes: &[&SceneScore], access_points: &[String]) -> Scores {
     if names.len() > 1 {
         groups.push(group(ALL, scenes, access_points));
     }
-    Scores { groups }
+    Scores { groups, ladder: Vec::new() }
 }
 
 impl Scores {
@@ -188,11 +201,15 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
             for (a, access_point) in access_points.iter().enumerate() {
                 let of_scenes: Vec<&LinkTally> =
                     scenes.iter().filter_map(|scene| scene.said.get(i)?.access_points.get(a)).collect();
+                let mut windows = windows(&bootstrap, &of_scenes);
+                if said.predictor != Predictor::Run {
+                    windows.iter_mut().for_each(|scores| scores.bins.clear());
+                }
                 links.push(LinkScores {
                     mode: said.mode,
                     predictor: said.predictor.name(),
                     access_point: access_point.clone(),
-                    windows: windows(&bootstrap, &of_scenes),
+                    windows,
                 });
             }
         }

@@ -1,0 +1,387 @@
+//! The tables of the report, as rows of cells: printed as text, written as HTML.
+
+use std::fmt::Write as _;
+
+use umbracast::{Mode, STEPS};
+
+use super::published;
+use crate::pooled::{Estimate, Group, ModeScores, Scores, WindowScores};
+use crate::score::Predictor;
+
+/// A table.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Table {
+    /// Above it.
+    pub title: String,
+    /// What a reader must know, below it.
+    pub note: String,
+    /// One a column. The first columns hold words, the others figures.
+    pub header: Vec<String>,
+    /// How many columns hold words.
+    pub words: usize,
+    /// As many cells each as there are columns.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// Windows of the short tables: 100, 300, 800 and 900 ms.
+const SHORT_WINDOWS: [usize; 4] = [1, 3, 8, 9];
+
+impl Table {
+    fn new(title: impl Into<String>, words: usize, header: &[&str]) -> Self {
+        let header = header.iter().map(|&name| name.to_owned()).collect();
+        Self { title: title.into(), words, header, ..Self::default() }
+    }
+
+    fn noted(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// Columns in line, words to the left and figures to the right.
+    pub fn to_text(&self) -> String {
+        let width = |column: usize| {
+            let cells = self.rows.iter().map(|row| row[column].chars().count());
+            cells.chain([self.header[column].chars().count()]).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..self.header.len()).map(width).collect();
+        let line = |cells: &[String]| {
+            let mut text = String::new();
+            for (column, (cell, &width)) in cells.iter().zip(&widths).enumerate() {
+                let gap = if column == 0 { "" } else { "  " };
+                // Writing to a String cannot fail.
+                let _ = if column < self.words {
+                    write!(text, "{gap}{cell:<width$}")
+                } else {
+                    write!(text, "{gap}{cell:>width$}")
+                };
+            }
+            text.trim_end().to_owned()
+        };
+        let mut lines = vec![self.title.clone(), line(&self.header)];
+        lines.extend(self.rows.iter().map(|row| line(row)));
+        if !self.note.is_empty() {
+            lines.push(self.note.clone());
+        }
+        lines.join("\n") + "\n"
+    }
+}
+
+/// The short table of stage 3: every mode and access point at four windows, with what the paper prints.
+pub fn headline(group: &Group) -> Table {
+    let header =
+        ["access point", "window", "mode", "base rate", "accuracy", "precision", "recall", "F1", "onset F1"];
+    let mut table = Table::new(format!("Blockage: {}", scenes(group)), 3, &header);
+    for access_point in group.access_points() {
+        for w in SHORT_WINDOWS {
+            for mode in &group.modes {
+                if let Some(links) = group.link(Some(mode.mode), Predictor::Run, access_point) {
+                    let start = [access_point.to_owned(), window(w), mode.mode.name().to_owned()];
+                    table.rows.push(with_scores(&start, &links.windows[w - 1]));
+                }
+            }
+        }
+    }
+    table.rows.extend(published_rows());
+    table.noted(
+        "In brackets: 95 % interval by bootstrap over scenes. The published F1 follows from the other two.",
+    )
+}
+
+/// A row a preset, mode and access point, at 300 ms.
+pub fn presets(scores: &Scores) -> Table {
+    let header =
+        ["preset", "access point", "mode", "base rate", "accuracy", "precision", "recall", "F1", "onset F1"];
+    let mut table = Table::new("Blockage within 300 ms, by preset", 3, &header);
+    for group in &scores.groups {
+        for access_point in group.access_points() {
+            for mode in &group.modes {
+                if let Some(links) = group.link(Some(mode.mode), Predictor::Run, access_point) {
+                    let start = [group.name.clone(), access_point.to_owned(), mode.mode.name().to_owned()];
+                    table.rows.push(with_scores(&start, &links.windows[2]));
+                }
+            }
+        }
+    }
+    table
+}
+
+fn published_rows() -> [Vec<String>; 2] {
+    let [(_, accuracy), (_, precision), (_, recall)] = published::AT_300_MS;
+    let row = |w: usize, cells: [String; 5]| {
+        let mut row = vec!["(paper)".to_owned(), window(w), "published".to_owned()];
+        row.extend(cells);
+        row.push(String::new());
+        row
+    };
+    let none = String::new;
+    [
+        row(
+            3,
+            [
+                format!("{:.2}", published::BASE_RATE_AT_300_MS),
+                format!("{accuracy:.2}"),
+                format!("{precision:.2}"),
+                format!("{recall:.2}"),
+                format!("{:.3}", published::F1_AT_300_MS),
+            ],
+        ),
+        row(8, [none(), none(), none(), none(), format!("{:.3}", published::F1_FROM_800_MS)]),
+    ]
+}
+
+/// Stage 1 of every mode.
+pub fn tracking(group: &Group) -> Table {
+    let header = [
+        "mode",
+        "recall",
+        "precision",
+        "MOTA",
+        "IDF1",
+        "HOTA",
+        "switches",
+        "position, m",
+        "velocity, m/s",
+        ">= 6 returns",
+        "1 to 5",
+        "none",
+    ];
+    let mut table = Table::new("Detection and tracking", 1, &header);
+    for mode in &group.modes {
+        let mut row = vec![mode.mode.name().to_owned()];
+        let scores = [mode.recall, mode.precision, mode.mota, mode.idf1, mode.hota];
+        row.extend(scores.iter().map(|score| number(score.value, 3)));
+        row.push(number(mode.switches_per_scene.value, 2));
+        row.push(number(mode.position_rmse_m.value, 3));
+        row.push(number(mode.velocity_rmse_mps.value, 3));
+        row.extend(mode.recall_by_returns.iter().rev().map(|&recall| number(recall, 3)));
+        table.rows.push(row);
+    }
+    table.noted(
+        "Everybody in the scene from the first frame, confirmed tracks, gate 0.5 m, HOTA similarity 1 - d / 1 m. \
+         Switches a scene. Position and velocity: root mean square of the 2-D error. Last columns: recall by \
+         returns on the body.",
+    )
+}
+
+/// Stage 2 of every mode beside Table I.
+pub fn displacement(group: &Group) -> Table {
+    let mut header = vec!["mode".to_owned()];
+    header.extend((1..=STEPS).map(|h| format!("{} ms", h * 100)));
+    header.extend(["scored", "NLL", "in 50 %", "in 90 %"].map(str::to_owned));
+    let mut table = Table { header, ..Table::new("Displacement of the forecast, m", 1, &[]) };
+    for mode in &group.modes {
+        let mut row = vec![mode.mode.name().to_owned()];
+        row.extend(mode.displacement_m.iter().map(|step| number(step.value, 3)));
+        row.push(number(mode.scored_share, 3));
+        row.push(number(mean(&mode.nll), 2));
+        let covered =
+            |i: usize| mean(&mode.coverage.iter().map(|covered| covered.map(|c| c[i])).collect::<Vec<_>>());
+        row.extend([number(covered(0), 2), number(covered(1), 2)]);
+        table.rows.push(row);
+    }
+    let four = || vec![String::new(); 4];
+    let reference = |name: &str, values: Vec<String>| [vec![name.to_owned()], values, four()].concat();
+    let carried_on = group.constant_velocity_m.iter().map(|&m| number(m, 3)).collect();
+    table.rows.push(reference("true state carried on", carried_on));
+    let published = published::DISPLACEMENT_M.iter().map(|m| format!("{m:.2}")).collect();
+    table.rows.push(reference("published", published));
+    table.noted(
+        "Scored: share of people at instants that count who are tracked and stay unarrived. NLL in nats and \
+         shares within the 50 and 90 % regions are means over the steps.",
+    )
+}
+
+/// Every mode and baseline at one access point, at the short windows.
+pub fn baselines(group: &Group, access_point: &str) -> Table {
+    let shown = [
+        Predictor::Never,
+        Predictor::PersistenceOfTruth,
+        Predictor::PersistenceOfTracks,
+        Predictor::ConstantVelocityOfTruth,
+        Predictor::Run,
+    ];
+    compared(group, access_point, &shown, format!("Baselines, access point {access_point}")).noted(
+        "Persistence: as now, the present being the truth's or the mode's own. Constant velocity: true positions \
+         carried on, cast by the mode's stage 3. Lead: median time from the start of the unbroken warning to the \
+         onset, and the share of onsets warned of.",
+    )
+}
+
+/// Each stage replaced by the truth, at one access point.
+pub fn budget(group: &Group, access_point: &str) -> Table {
+    let shown = [Predictor::Run, Predictor::TrueState, Predictor::TrueFuture, Predictor::TrueBody];
+    compared(group, access_point, &shown, format!("Error budget, access point {access_point}")).noted(
+        "One stage at a time replaced by the truth, the rest as in the mode: positions and velocities into \
+         forecast and cast; the true future into the cast; the true walking mesh at the forecast position (yes \
+         or no at the mean).",
+    )
+}
+
+fn compared(group: &Group, access_point: &str, shown: &[Predictor], title: String) -> Table {
+    let header = [
+        "window",
+        "mode",
+        "predictor",
+        "base rate",
+        "accuracy",
+        "precision",
+        "recall",
+        "F1",
+        "onset F1",
+        "AUPRC",
+        "Brier",
+        "ECE",
+        "lead, s",
+        "warned",
+    ];
+    let mut table = Table::new(title, 3, &header);
+    let modes = group.modes.iter().map(|scores| Some(scores.mode));
+    let columns: Vec<Option<Mode>> = std::iter::once(None).chain(modes).collect();
+    for w in SHORT_WINDOWS {
+        for &mode in &columns {
+            for &predictor in shown {
+                let Some(links) = group.link(mode, predictor, access_point) else { continue };
+                let scores = &links.windows[w - 1];
+                let start = [window(w), mode.map_or("", Mode::name).to_owned(), predictor.name().to_owned()];
+                let mut row = with_scores(&start, scores);
+                row.push(number(scores.auprc, 3));
+                row.push(number(scores.brier, 4));
+                row.push(number(scores.ece, 4));
+                row.push(number(scores.lead_median_s, 2));
+                row.push(number(scores.lead_warned, 2));
+                table.rows.push(row);
+            }
+        }
+    }
+    table
+}
+
+/// The ladder of oracles beside what was measured before. `explanations` are (oracle, why it differs).
+pub fn ladder(scores: &Scores, explanations: &[(String, String)]) -> Option<Table> {
+    let mut oracles: Vec<&str> = Vec::new();
+    for row in &scores.ladder {
+        if !oracles.contains(&row.oracle) {
+            oracles.push(row.oracle);
+        }
+    }
+    let header = [
+        "what is known",
+        "access point",
+        "window",
+        "base rate",
+        "F1",
+        "reference",
+        "onset F1",
+        "reference",
+        "differs",
+    ];
+    let mut table = Table::new("Ladder of oracles", 3, &header);
+    let mut apart = Vec::new();
+    for (oracle, reference) in oracles.iter().zip(published::LADDER) {
+        for ((access_point, w), (f1, onset)) in published::LADDER_AT.into_iter().zip(reference) {
+            let at = |row: &&crate::ladder::LadderRow| {
+                row.oracle == *oracle && row.access_point == access_point && row.window == w
+            };
+            let Some(row) = scores.ladder.iter().find(at) else { continue };
+            let far = |found: Option<f64>, expected: f64| {
+                found.is_some_and(|found| (found - expected).abs() > published::LADDER_TOLERANCE)
+            };
+            let differs = far(row.f1, f1) || far(row.onset_f1, onset);
+            if differs && !apart.contains(oracle) {
+                apart.push(*oracle);
+            }
+            table.rows.push(vec![
+                (*oracle).to_owned(),
+                access_point.to_owned(),
+                window(w),
+                number(row.base_rate, 3),
+                number(row.f1, 3),
+                number(Some(f1), 3),
+                number(row.onset_f1, 3),
+                number(Some(onset), 3),
+                if differs { "yes".to_owned() } else { String::new() },
+            ]);
+        }
+    }
+    let why = |oracle: &&str| {
+        let known = explanations.iter().find(|(name, _)| name == oracle);
+        let why = known.map_or("not explained yet", |(_, why)| why);
+        format!("{oracle}: {why}.")
+    };
+    let explained: Vec<String> = apart.iter().map(why).collect();
+    let note = format!(
+        "Reference: an earlier measurement with bodies of 18 capsules on orca-03 (PAPER.md). Marked where F1 or \
+         onset F1 lies more than {:.2} apart. {}",
+        published::LADDER_TOLERANCE,
+        explained.join(" ")
+    );
+    (!table.rows.is_empty()).then(|| table.noted(note.trim_end()))
+}
+
+/// What was counted and skipped, by mode.
+pub fn health(group: &Group) -> Table {
+    let named = |mode: &ModeScores| serde_json::to_value(mode.health).unwrap_or_default();
+    let mut table = Table::new("Health", 1, &["skipped"]);
+    table.header.extend(group.modes.iter().map(|mode| mode.mode.name().to_owned()));
+    let counters = group.modes.first().map(named).unwrap_or_default();
+    for name in counters.as_object().into_iter().flat_map(|fields| fields.keys()) {
+        let mut row = vec![name.replace('_', " ")];
+        row.extend(group.modes.iter().map(|mode| named(mode)[name].to_string()));
+        table.rows.push(row);
+    }
+    table.noted("Everything broken that a run met and skipped. All zero on clean input.")
+}
+
+fn with_scores(start: &[String], scores: &WindowScores) -> Vec<String> {
+    let mut row = start.to_vec();
+    let plain = [scores.base_rate, scores.accuracy, scores.precision, scores.recall];
+    row.extend(plain.iter().map(|score| number(score.value, 3)));
+    row.push(with_interval(&scores.f1));
+    row.push(number(scores.onset_f1.value, 3));
+    row
+}
+
+fn with_interval(score: &Estimate) -> String {
+    match (score.value, score.interval) {
+        (Some(value), Some([low, high])) => format!("{value:.3} [{low:.3}, {high:.3}]"),
+        (value, _) => number(value, 3),
+    }
+}
+
+/// A dash where it is not defined.
+fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+}
+
+fn mean(values: &[Option<f64>]) -> Option<f64> {
+    let sum = values.iter().copied().sum::<Option<f64>>()?;
+    (!values.is_empty()).then(|| sum / values.len() as f64)
+}
+
+fn window(w: usize) -> String {
+    format!("{} ms", w * 100)
+}
+
+fn scenes(group: &Group) -> String {
+    let s = if group.scenes == 1 { "" } else { "s" };
+    format!("{}, {} scene{s}, {} frames", group.name, group.scenes, group.frames)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_stand_in_line() {
+        let mut table = Table::new("Title", 1, &["mode", "F1"]);
+        table.rows = vec![vec!["paper".into(), "0.5".into()], vec!["x".into(), "10.25".into()]];
+        assert_eq!(table.to_text(), "Title\nmode      F1\npaper    0.5\nx      10.25\n");
+    }
+
+    #[test]
+    fn what_is_not_defined_is_a_dash_and_an_interval_stands_in_brackets() {
+        let known = Estimate { value: Some(0.8765), interval: Some([0.86, 0.891]) };
+        assert_eq!(with_interval(&known), "0.876 [0.860, 0.891]");
+        assert_eq!(with_interval(&Estimate::default()), "-");
+    }
+}
