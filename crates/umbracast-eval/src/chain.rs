@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use umbracast::forecast::Weights;
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
-use umbracast_io::rows;
+use umbracast_io::rows::{self, PeopleLinkRow, PeopleRow};
 use umbracast_sim::crowd::{self, Crowd, Preset};
-use umbracast_sim::scene::Scene;
+use umbracast_sim::scene::{Scene, SceneFrame};
 
 use crate::ladder::{self, SceneLadder};
 use crate::scene::{SceneRun, SceneTruth};
@@ -160,7 +160,7 @@ fn run_scene(
     let number = index as u32;
     let mut truth = SceneTruth::default();
     while let Some(frame) = scene.next_frame() {
-        truth.add(number, &frame);
+        note_truth(number, &frame, &mut truth);
         push(&mut assembler, &frame.packets, &mut health);
         let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
         lanes.iter_mut().for_each(|lane| lane.step(number, &closed));
@@ -175,7 +175,7 @@ fn run_scene(
         score_scene(number, &scene_spec.group, &truth, &runs, spec.weights.as_ref(), Some(scene.walkers()))?;
     let kept = (spec.keep == Some(index)).then(|| (truth, lanes.into_iter().map(|lane| lane.rows).collect()));
     let ladder = spec.ladder.then(|| {
-        let scene = Scene::truth_only(crowd_of(scene_spec), site, scene_spec.seed);
+        let scene = Scene::truth_only(scene_spec.crowd(), site, scene_spec.seed);
         ladder::climb(scene, site, scene_spec.seed)
     });
     Ok(SceneResult { score, ladder, kept })
@@ -213,6 +213,35 @@ pub fn push(assembler: &mut Assembler, packets: &[Vec<Packet>], health: &mut Hea
     for (_, sensor, i) in order {
         assembler.push(sensor, &packets[sensor][i], health);
     }
+}
+
+/// The rows of a frame's truth.
+pub fn note_truth(scene: u32, frame: &SceneFrame, truth: &mut SceneTruth) {
+    let (number, time_ns) = (frame.index, frame.time_ns);
+    truth.people.extend(frame.people.iter().map(|p| PeopleRow {
+        scene,
+        frame: number,
+        time_ns,
+        person: p.person,
+        x_m: p.state.position_m.x,
+        y_m: p.state.position_m.y,
+        vx_mps: p.state.velocity_mps.x,
+        vy_mps: p.state.velocity_mps.y,
+        heading_rad: p.state.heading_rad,
+        height_m: p.state.height_m,
+        arrived: p.arrived,
+        returns: p.returns,
+    }));
+    truth.links.extend(frame.links.iter().map(|link| PeopleLinkRow {
+        scene,
+        frame: number,
+        time_ns,
+        access_point: link.access_point as u32,
+        person: link.person,
+        blocked: link.blocked,
+        static_blocked: link.static_blocked,
+        self_blocked: link.self_blocked,
+    }));
 }
 
 #[cfg(test)]

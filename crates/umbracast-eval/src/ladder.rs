@@ -14,6 +14,7 @@ use umbracast_sim::random::stream;
 use umbracast_sim::scene::Scene;
 use umbracast_sim::truth::BodyMesh;
 
+use crate::chain::note_truth;
 use crate::instances::instances;
 use crate::links::Said;
 use crate::scene::{SceneTruth, TruthIndex};
@@ -116,7 +117,7 @@ pub struct LadderRow {
 pub fn climb(mut scene: Scene, site: &Site, seed: u64) -> SceneLadder {
     let (mut truth, mut moments) = (SceneTruth::default(), Vec::new());
     while let Some(frame) = scene.next_frame() {
-        truth.add(0, &frame);
+        note_truth(0, &frame, &mut truth);
         moments.push(Moment::new(scene.walkers(), frame.time_ns));
     }
     let errors = state_errors(moments.len(), scene.walkers().len(), seed);

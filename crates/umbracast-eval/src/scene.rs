@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
-use umbracast_sim::scene::SceneFrame;
 
 /// What was so: the tables `people` and `people_links` of one scene, in any order.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -12,37 +11,6 @@ pub struct SceneTruth {
     pub people: Vec<PeopleRow>,
     /// Every link in every frame.
     pub links: Vec<PeopleLinkRow>,
-}
-
-impl SceneTruth {
-    /// Adds the truth of one simulated frame.
-    pub fn add(&mut self, scene: u32, truth: &SceneFrame) {
-        let (frame, time_ns) = (truth.index, truth.time_ns);
-        self.people.extend(truth.people.iter().map(|p| PeopleRow {
-            scene,
-            frame,
-            time_ns,
-            person: p.person,
-            x_m: p.state.position_m.x,
-            y_m: p.state.position_m.y,
-            vx_mps: p.state.velocity_mps.x,
-            vy_mps: p.state.velocity_mps.y,
-            heading_rad: p.state.heading_rad,
-            height_m: p.state.height_m,
-            arrived: p.arrived,
-            returns: p.returns,
-        }));
-        self.links.extend(truth.links.iter().map(|link| PeopleLinkRow {
-            scene,
-            frame,
-            time_ns,
-            access_point: link.access_point as u32,
-            person: link.person,
-            blocked: link.blocked,
-            static_blocked: link.static_blocked,
-            self_blocked: link.self_blocked,
-        }));
-    }
 }
 
 /// What we said: the tables `tracks` and `links` of one scene, in any order.

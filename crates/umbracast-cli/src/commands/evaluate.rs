@@ -52,7 +52,7 @@ pub fn in_memory(
     common: &Common,
 ) -> Result<Ending, Error> {
     let names: Vec<String> = configs[0].site.access_points.iter().map(|ap| ap.name.clone()).collect();
-    let spec = Spec { configs, weights: Some(setup::weights(None)?), scenes, keep: Some(0) };
+    let spec = Spec { configs, weights: Some(setup::weights(None)?), scenes, keep: Some(0), ladder: false };
     let progress = bar(0, "frames", common.quiet);
     let results = setup::with_threads(common.threads, || {
         chain::run(&spec, |done| {

@@ -87,9 +87,10 @@ pub fn axes(title: &str, x_label: &str, y: (f64, f64)) -> Panel {
 }
 
 type Score = fn(&WindowScores) -> Estimate;
+type Marks = Vec<(f64, f64)>;
 
 fn metrics(group: &Group, access_point: &str) -> Result<Figure, Error> {
-    let shown: [(&str, Score, Vec<(f64, f64)>); 4] = [
+    let shown: [(&str, Score, Marks); 4] = [
         ("accuracy", |s| s.accuracy, vec![(300.0, published::AT_300_MS[0].1)]),
         ("precision", |s| s.precision, vec![(300.0, published::AT_300_MS[1].1)]),
         ("recall", |s| s.recall, vec![(300.0, published::AT_300_MS[2].1)]),
@@ -113,7 +114,7 @@ fn metrics(group: &Group, access_point: &str) -> Result<Figure, Error> {
     let everything = shown.iter().flat_map(|(_, score, _)| lines(*score)).flat_map(|line| line.points);
     let lowest = everything.map(|(_, y)| y).fold(0.7, f64::min);
     let from = (lowest * 10.0).floor() / 10.0;
-    let panel = |(name, score, marks): (&str, Score, Vec<(f64, f64)>)| {
+    let panel = |(name, score, marks): (&str, Score, Marks)| {
         let mut panel = axes(name, "window, ms", (from, 1.0));
         panel.series = lines(score).collect();
         panel.series.push(series("published", BLACK, Mark::Diamonds(5.0), marks));

@@ -20,7 +20,7 @@ const LEGEND: f64 = 110.0;
 
 /// The instant of the kept scene at which the most links are about to be blocked.
 fn busiest_frame(kept: &Kept) -> Option<u64> {
-    let index = TruthIndex::new(&kept.truth);
+    let index = TruthIndex::new(kept.truth);
     let mut about_to: BTreeMap<u64, usize> = BTreeMap::new();
     for i in instances(&index).iter().filter(|i| i.access_point == 0) {
         *about_to.entry(i.frame).or_default() += usize::from(!i.blocked_now && i.first_blocked.is_some());
@@ -131,7 +131,7 @@ fn hall(site: &Site, (x, y): Window) -> Panel {
 
 /// One link over time.
 pub fn link(kept: &Kept) -> Result<Option<Figure>, Error> {
-    let index = TruthIndex::new(&kept.truth);
+    let index = TruthIndex::new(kept.truth);
     let all = instances(&index);
     let onsets = |person: u32| {
         let own = all.iter().filter(|i| i.access_point == 0 && i.person == person);
