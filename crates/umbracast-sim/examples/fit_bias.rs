@@ -1,6 +1,6 @@
 //! Fits the linear model of `umbracast::detect::bias` on simulated returns and prints its coefficients.
 //!
-//! `cargo run --release -p umbracast-sim --example fit_bias -- [SCENES]` (2 of each preset and of pairs by default)
+//! `cargo run --release -p umbracast-sim --example fit_bias -- [SCENES]` (3 of each preset and of pairs by default)
 //! Training scenes have the seeds 110,000 and on, the scenes that the errors are printed for 120,000 and on.
 
 use umbracast::Health;
@@ -19,7 +19,7 @@ const OWN_M: f64 = 0.3;
 const UNKNOWN_EVERY: usize = 6;
 
 fn main() {
-    let scenes: u64 = std::env::args().nth(1).map_or(2, |n| n.parse().expect("a number of scenes"));
+    let scenes: u64 = std::env::args().nth(1).map_or(3, |n| n.parse().expect("a number of scenes"));
     let (training, test) = (samples(110_000, scenes), samples(120_000, scenes.div_ceil(2)));
     let away = fit::<ALONG>(training.iter().map(|s| (s.view.along, s.off_m.x)));
     let left = fit::<ACROSS>(training.iter().map(|s| (s.view.across, s.off_m.y)));
