@@ -104,7 +104,7 @@ fn simulate_run_evaluate_inspect() {
     done(&["run", text(&sim), "--out", text(&out)]);
     let table = done(&["evaluate", text(&out), "--truth", text(&sim), "--out", text(&report)]);
     assert!(table.contains("F1"), "{table}");
-    assert!(report.join("index.html").is_file());
+    assert!(report.join("report.html").is_file());
     for folder in [&sim, &out] {
         for (name, _) in contents(folder) {
             let file = folder.join(&name);

@@ -31,8 +31,9 @@ fn main() -> Result<(), Error> {
         let instances = instances(&index);
         let matching = match_scene(&truth.people, &runs[0].tracks);
         let predictions = Said::by_run(&runs[0]).of_tracks(&instances, &matching);
-        let of_window =
-            |w: usize| instances.iter().zip(&predictions).map(move |(i, p)| (p.p[w], i.blocked_within(w + 1)));
+        let of_window = |w: usize| {
+            instances.iter().zip(&predictions).map(move |(i, p)| (p.p[w], i.blocked_within(w + 1)))
+        };
         Ok(std::array::from_fn(|w| of_window(w).collect()))
     };
     let all: Vec<Cases> = specs.par_iter().map(of_scene).collect::<Result<_, _>>()?;

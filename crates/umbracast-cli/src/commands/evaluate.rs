@@ -6,7 +6,8 @@ use std::path::Path;
 use umbracast::{Config, Error, Health, Mode};
 use umbracast_eval::chain::{self, SceneSpec, Spec};
 use umbracast_eval::labels;
-use umbracast_eval::pooled::{Scores, pool};
+use umbracast_eval::pooled::{self, Scores, pool};
+use umbracast_eval::report::{self, Context, Kept};
 use umbracast_eval::scene::{SceneRun, SceneTruth};
 use umbracast_eval::score::{ModeRun, SceneScore, score_scene};
 use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
@@ -16,6 +17,10 @@ use crate::args::{Common, Evaluate};
 use crate::progress::bar;
 use crate::setup::{self, TEST_SEED};
 use crate::{Ending, crowds};
+
+/// Why rungs of the ladder lie below the reference, found by switching one trait of the bodies off at a time.
+const HARSHER_BODIES: &str = "the walking bodies sway over their stance foot, swing their arms and differ in \
+    stature, the reference's do not sway; where rays come down steeply a few centimetres decide";
 
 /// Scores what the arguments name.
 pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
@@ -44,15 +49,15 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
     }
 }
 
-/// Simulates, runs and scores without files.
+/// Simulates, runs and scores without files. The ladder is climbed where there is a report to draw it in.
 pub fn in_memory(
     configs: Vec<Config>,
     scenes: Vec<SceneSpec>,
     out: Option<&Path>,
     common: &Common,
 ) -> Result<Ending, Error> {
-    let names: Vec<String> = configs[0].site.access_points.iter().map(|ap| ap.name.clone()).collect();
-    let spec = Spec { configs, weights: Some(setup::weights(None)?), scenes, keep: Some(0), ladder: false };
+    let spec =
+        Spec { configs, weights: Some(setup::weights(None)?), scenes, keep: Some(0), ladder: out.is_some() };
     let progress = bar(0, "frames", common.quiet);
     let results = setup::with_threads(common.threads, || {
         chain::run(&spec, |done| {
@@ -63,8 +68,17 @@ pub fn in_memory(
         })
     })??;
     progress.finish_and_clear();
-    let scores: Vec<&SceneScore> = results.iter().map(|result| &result.score).collect();
-    show(&pool(&scores, &names), out, common)
+    let scores = pooled::score(&results, &spec.configs[0].site);
+    let best = spec.configs.len() - 1;
+    let label = format!("{}, seed {}", spec.scenes[0].group, spec.scenes[0].seed);
+    let kept = results[0].kept.as_ref().map(|(truth, runs)| Kept {
+        label: &label,
+        mode: spec.configs[best].mode,
+        site: &spec.configs[best].site,
+        truth,
+        run: &runs[best],
+    });
+    show(&scores, &spec.configs, kept, out, common)
 }
 
 /// Scores the tables of a run against those of its truth, scene by scene.
@@ -93,7 +107,16 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
             score_scene(number, "recorded", truth, &[run], Some(&weights), None)
         })
         .collect::<Result<Vec<SceneScore>, _>>()?;
-    show(&pool(&scores.iter().collect::<Vec<_>>(), &names), args.out.as_deref(), common)
+    let scores = pool(&scores.iter().collect::<Vec<_>>(), &names);
+    let kept = scenes.first_key_value().map(|(number, (truth, run))| (format!("scene {number}"), truth, run));
+    let kept = kept.as_ref().map(|(label, truth, run)| Kept {
+        label,
+        mode: config.mode,
+        site: &config.site,
+        truth,
+        run,
+    });
+    show(&scores, std::slice::from_ref(&config), kept, args.out.as_deref(), common)
 }
 
 /// Stage 1 against people labelled by hand.
@@ -139,46 +162,27 @@ fn frames_of_run(dir: &Path) -> Result<BTreeSet<u64>, Error> {
     Ok(frames.frame_numbers.into_iter().flatten().collect())
 }
 
-fn show(scores: &Scores, _out: Option<&Path>, common: &Common) -> Result<Ending, Error> {
-    let json = serde_json::to_string_pretty(scores).map_err(|e| Error::new(e.to_string()))?;
-    if common.json {
-        println!("{json}");
-        return Ok(Ending::Done);
+/// Scores to stdout, the report into a folder where one is given.
+fn show(
+    scores: &Scores,
+    configs: &[Config],
+    kept: Option<Kept>,
+    out: Option<&Path>,
+    common: &Common,
+) -> Result<Ending, Error> {
+    match common.json {
+        true => print!("{}", report::to_json(scores)),
+        false => print!("{}", report::to_text(scores)),
     }
-    for group in &scores.groups {
-        println!("{} scenes={}", group.name, group.scenes);
-        for m in &group.modes {
-            println!(
-                "  {:8} mota {:.3} idf1 {:.3} sw {:.2} rec {:.3} prec {:.3} pos {:.4} vel {:.4} d1 {:.4} d9 {:.4}",
-                m.mode.name(),
-                m.mota.value.unwrap_or(0.0),
-                m.idf1.value.unwrap_or(0.0),
-                m.switches_per_scene.value.unwrap_or(0.0),
-                m.recall.value.unwrap_or(0.0),
-                m.precision.value.unwrap_or(0.0),
-                m.position_rmse_m.value.unwrap_or(0.0),
-                m.velocity_rmse_mps.value.unwrap_or(0.0),
-                m.displacement_m[0].value.unwrap_or(0.0),
-                m.displacement_m[8].value.unwrap_or(0.0),
-            );
-        }
-        for l in &group.links {
-            print!("  {:8} {:30} {:8}", l.mode.map_or("-", Mode::name), l.predictor, l.access_point);
-            for w in [1, 3, 8, 9] {
-                let s = &l.windows[w - 1];
-                let v = |e: Option<f64>| e.unwrap_or(f64::NAN);
-                print!(
-                    " | w{w} b {:.3} a {:.3} p {:.3} r {:.3} F {:.3} on {:.3} ece {:.3}",
-                    v(s.base_rate.value),
-                    v(s.accuracy.value),
-                    v(s.precision.value),
-                    v(s.recall.value),
-                    v(s.f1.value),
-                    v(s.onset_f1.value),
-                    v(s.ece)
-                );
-            }
-            println!();
+    if let Some(folder) = out {
+        let arguments: Vec<String> = std::env::args().skip(1).collect();
+        let command = format!("umbracast {}", arguments.join(" "));
+        let explanations: Vec<(String, String)> =
+            scores.ladder.iter().map(|row| (row.oracle.to_owned(), HARSHER_BODIES.to_owned())).collect();
+        let context = Context { configs, command: command.trim_end(), kept, explanations: &explanations };
+        report::write(folder, scores, &context)?;
+        if !common.json {
+            println!("\nreport: {}", folder.join("report.html").display());
         }
     }
     Ok(Ending::Done)

@@ -303,14 +303,19 @@ pub fn ladder(scores: &Scores, explanations: &[(String, String)]) -> Option<Tabl
             ]);
         }
     }
-    let why = |oracle: &&str| {
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for oracle in apart {
         let known = explanations.iter().find(|(name, _)| name == oracle);
-        let why = known.map_or("not explained yet", |(_, why)| why);
-        format!("{oracle}: {why}.")
-    };
-    let explained: Vec<String> = apart.iter().map(why).collect();
+        let why = known.map_or("not explained yet", |(_, why)| why.as_str());
+        match reasons.iter_mut().find(|(reason, _)| *reason == why) {
+            Some((_, oracles)) => oracles.push(oracle),
+            None => reasons.push((why, vec![oracle])),
+        }
+    }
+    let explained: Vec<String> =
+        reasons.iter().map(|(why, oracles)| format!("{}: {why}.", oracles.join("; "))).collect();
     let note = format!(
-        "Reference: an earlier measurement with bodies of 18 capsules on orca-03 (PAPER.md). Marked where F1 or \
+        "Reference: an earlier measurement with bodies of 18 capsules on orca-03. Marked where F1 or \
          onset F1 lies more than {:.2} apart. {}",
         published::LADDER_TOLERANCE,
         explained.join(" ")
