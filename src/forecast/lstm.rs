@@ -42,9 +42,9 @@ struct Network {
 }
 
 impl Weights {
-    /// From the bytes of a safetensors file with PyTorch's tensors of f32: `emb.weight` [E, 2], `emb.bias` [E],
-    /// `enc.weight_ih` [4 H, E], `enc.weight_hh` [4 H, H], `enc.bias_ih` and `enc.bias_hh` [4 H], `dec.weight`
-    /// [5, H], `dec.bias` [5]; gates in the order i f g o. The paper has E = 64 and H = 512.
+    /// From the bytes of a safetensors file with PyTorch's tensors of f32: `emb.weight` `[E, 2]`, `emb.bias` `[E]`,
+    /// `enc.weight_ih` `[4 H, E]`, `enc.weight_hh` `[4 H, H]`, `enc.bias_ih` and `enc.bias_hh` `[4 H]`, `dec.weight`
+    /// `[5, H]`, `dec.bias` `[5]`; gates in the order i f g o. The paper has E = 64 and H = 512.
     ///
     /// # Errors
     /// A tensor that is missing, has another shape or kind, or holds a number that is not finite.

@@ -141,7 +141,7 @@ fn clouds(files: &[PathBuf], site: &Site, health: &mut Health, sink: Sink) -> Re
     let [sensor] = &site.sensors[..] else {
         let found = site.sensors.len();
         return Err(
-            Error::new(format!("clouds come from 1 sensor, the site has {found}")).within(files[0].display())
+            Error::new(format!("clouds: expected a site with 1 sensor, found {found}")).within(files[0].display())
         );
     };
     let by_name = files.iter().all(|file| setup::number_of(file).is_some());

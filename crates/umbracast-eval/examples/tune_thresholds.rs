@@ -24,7 +24,8 @@ fn main() -> Result<(), Error> {
     let specs = chain::drawn_scenes(&presets, scenes.div_ceil(presets.len()), 10, FIRST_SEED);
     let of_scene = |scene: &chain::SceneSpec| -> Result<Cases, Error> {
         let configs = vec![Config::default()];
-        let spec = Spec { configs, weights: None, scenes: vec![scene.clone()], keep: Some(0) };
+        let scenes = vec![scene.clone()];
+        let spec = Spec { configs, weights: None, scenes, keep: Some(0), ladder: false };
         let results = chain::run(&spec, |_| {})?;
         let (truth, runs) = results[0].kept.as_ref().expect("the only scene is kept");
         let index = TruthIndex::new(truth);

@@ -1,7 +1,7 @@
 //! Simulated LiDARs that give true sensor packets.
 //!
-//! The hall stands still and is traced once ([`hall`]); a frame looks it up and draws only the people into it
-//! ([`raster`]), each column at the instant it fires ([`head`]). Then come noise, drop-outs and limits, and the
+//! The hall stands still and is traced once (`hall`); a frame looks it up and draws only the people into it
+//! (`raster`), each column at the instant it fires (`head`). Then come noise, drop-outs and limits, and the
 //! packet codec, so that a simulated sensor and a real one enter the pipeline by the same door.
 
 mod head;
