@@ -131,7 +131,7 @@ fn metrics(group: &Group, access_point: &str) -> Result<Figure, Error> {
             base_rate(group, access_point),
             published::BASE_RATE_AT_300_MS
         ),
-        drawing: draw_grid(&panels, 2, (430.0, 280.0))?,
+        drawing: draw_grid("metrics", &panels, 2, (430.0, 280.0))?,
     })
 }
 
@@ -162,7 +162,7 @@ fn displacement(group: &Group) -> Result<Figure, Error> {
                   have not arrived. The dashed line starts from the true state: what is left of it is the future \
                   alone."
             .into(),
-        drawing: draw(&panel, (860.0, 400.0))?,
+        drawing: draw("displacement", &panel, (860.0, 400.0))?,
     })
 }
 
@@ -196,7 +196,7 @@ fn reliability(group: &Group, access_point: &str) -> Result<Option<Figure>, Erro
             ece(3),
             ece(9)
         ),
-        drawing: draw(&panel, (560.0, 560.0))?,
+        drawing: draw("reliability", &panel, (560.0, 560.0))?,
     }))
 }
 
@@ -236,6 +236,6 @@ fn ladder(scores: &Scores, group: &Group, access_point: &str) -> Result<Option<F
         caption: "F1 if the future were known and people had the body named (dashed), beside what the modes \
                   reach. The upright body is the ceiling: nobody can pass it without knowing the gait."
             .into(),
-        drawing: draw(&panel, (860.0, 460.0))?,
+        drawing: draw("ladder", &panel, (860.0, 460.0))?,
     }))
 }

@@ -12,7 +12,7 @@ const STYLE: &str = "
 :root { color-scheme: light; }
 * { box-sizing: border-box; }
 body { font: 16px/1.55 system-ui, sans-serif; color: #222; background: #fff; margin: 0 auto; padding: 1.5rem 1rem 4rem;
-  max-width: 62rem; }
+  max-width: 74rem; }
 h1 { font-size: 1.7rem; line-height: 1.2; margin: 0.5rem 0; }
 h2 { font-size: 1.25rem; margin: 2.8rem 0 0.4rem; }
 p { max-width: 44rem; }
@@ -22,18 +22,25 @@ p { max-width: 44rem; }
 .card b { display: block; font-size: 1.6rem; font-weight: 600; line-height: 1.3; }
 .card span { color: #555; font-size: 0.85rem; display: block; }
 figure { margin: 0.8rem 0 0; }
-figure svg { width: 100%; height: auto; display: block; }
+figure svg { display: block; min-width: 34rem; }
 figcaption, .note { color: #555; font-size: 0.9rem; max-width: 44rem; margin: 0.3rem 0 0; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 0.85rem; font-variant-numeric: tabular-nums; white-space: nowrap; }
-th, td { padding: 0.25rem 0.6rem; text-align: right; border-bottom: 1px solid #e6e6e6; }
+table { border-collapse: collapse; font-size: 0.82rem; font-variant-numeric: tabular-nums; white-space: nowrap; }
+th, td { padding: 0.25rem 0.45rem; text-align: right; border-bottom: 1px solid #e6e6e6; }
 th { border-bottom: 2px solid #999; font-weight: 600; }
 .w { text-align: left; }
-tr.new td { border-top: 1px solid #999; }
+tr.new td { border-top: 2px solid #bbb; }
 pre { background: #f6f6f6; border-radius: 6px; padding: 0.8rem; overflow-x: auto; font-size: 0.8rem; line-height: 1.4; }
 summary { cursor: pointer; margin: 0.4rem 0; }
 nav a { margin-right: 1rem; white-space: nowrap; }
 @media print { body { max-width: none; } h2, figure, tr { break-inside: avoid; } }
+";
+
+const MODES: &str = "<p>Three modes stand side by side. <b>hdl</b>: stage 1 (detect, track) as the code that the paper's
+authors adapted ships it, with the paper's forecast and cast. <b>paper</b>: the method as its authors describe it.
+<b>default</b>: the best of this software. A window counts as blocked when the link is cut at any step of it; F1 is the
+harmonic mean of precision and recall, and onset F1 the same over links that are in sight when the prediction is made,
+where saying &quot;as now&quot; earns nothing.</p>
 ";
 
 /// The whole page.
@@ -75,7 +82,8 @@ fn opening(group: &Group) -> String {
     let mut text = format!(
         "<p class=\"lead\">LiDARs see people walk, each walker's way is foreseen for 0.9 s, and a ray from every \
          access point to every person tells which radio links a body is about to block. This report holds \
-         {scenes} ({} frames) against the truth; mode {} at access point {}.</p>\n<div class=\"cards\">\n",
+         {scenes} ({} frames) against the truth. First figures: mode {} at access point {}.</p>\n\
+         <div class=\"cards\">\n",
         group.frames,
         mode.mode.name(),
         escaped(first)
@@ -87,7 +95,7 @@ fn opening(group: &Group) -> String {
     if let Some(links) = group.link(Some(mode.mode), Predictor::Run, first) {
         let at = &links.windows[2];
         card(at.f1.value, 3, "", &format!("F1 at 300 ms; published {:.3}", published::F1_AT_300_MS));
-        card(at.onset_f1.value, 3, "", "the same for links in sight now");
+        card(at.onset_f1.value, 3, "", "onset F1: links in sight now");
         card(
             at.base_rate.value,
             2,
@@ -99,7 +107,7 @@ fn opening(group: &Group) -> String {
     let published = published::DISPLACEMENT_M[published::DISPLACEMENT_M.len() - 1];
     card(ahead, 2, " m", &format!("off after 900 ms; published {published:.2} m"));
     card(mode.tracked_share.value.map(|share| share * 100.0), 1, " %", "of people are followed");
-    text + "</div>\n"
+    text + "</div>\n" + MODES
 }
 
 fn drawn(figure: &Figure) -> String {

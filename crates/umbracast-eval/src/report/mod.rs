@@ -95,3 +95,79 @@ fn tables(scores: &Scores, context: &Context) -> Vec<Table> {
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     std::fs::write(path, bytes).map_err(|e| Error::new(format!("{}: cannot be written: {e}", path.display())))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made::{link_row, track_row, truth_of};
+    use crate::pooled::pool;
+    use crate::score::{ModeRun, score_scene};
+    use umbracast::Health;
+
+    /// Three people who stand still; the link of the first is blocked from frame 30 on and we say so in time.
+    fn scene() -> (SceneTruth, SceneRun) {
+        let truth = truth_of(3, 60, |person, frame| person == 0 && frame >= 30);
+        let mut run = SceneRun::default();
+        for frame in 0..60 {
+            for person in 0..3_u32 {
+                run.tracks.push(track_row(frame, u64::from(person), f64::from(person) * 10.0, 0.0));
+                run.links.push(link_row(frame, u64::from(person), person == 0 && frame >= 21));
+            }
+        }
+        (truth, run)
+    }
+
+    fn scores(config: &Config, groups: &[&str]) -> Scores {
+        let (truth, run) = scene();
+        let of = |group: &&str| {
+            let run = ModeRun { config, rows: &run, health: Health::default() };
+            score_scene(0, group, &truth, &[run], None, None).unwrap()
+        };
+        let scenes: Vec<_> = groups.iter().map(of).collect();
+        pool(&scenes.iter().collect::<Vec<_>>(), &["side".to_owned()])
+    }
+
+    #[test]
+    fn the_page_holds_everything_itself_and_the_same_scores_give_the_same_files() {
+        let config = Config::for_mode(Mode::Default);
+        let scores = scores(&config, &["orca-03"]);
+        let (truth, run) = scene();
+        let kept =
+            Kept { label: "hand made", mode: Mode::Default, site: &config.site, truth: &truth, run: &run };
+        let command = "umbracast evaluate --out <here>";
+        let configs = [config.clone()];
+        let context = Context { configs: &configs, command, kept: Some(kept), explanations: &[] };
+        let written = [0, 1].map(|_| {
+            let directory = tempfile::tempdir().unwrap();
+            write(directory.path(), &scores, &context).unwrap();
+            let names = ["report.html", "scores.json", "metrics.svg", "metrics.png", "plan.svg", "link.png"];
+            names.map(|name| std::fs::read(directory.path().join(name)).unwrap())
+        });
+        assert!(written[0] == written[1], "same scores, other bytes");
+        let page = String::from_utf8(written[0][0].clone()).unwrap();
+        assert!(!page.contains("<script") && !page.contains("src=") && !page.contains("<link"));
+        assert_eq!(page.matches("<svg").count(), page.matches("</svg>").count());
+        assert!(page.contains("umbracast evaluate --out &lt;here&gt;") && page.contains("acceleration_psd"));
+        assert_eq!(&written[0][3][1..4], b"PNG");
+    }
+
+    #[test]
+    fn the_text_shows_what_was_scored_beside_what_was_published() {
+        let text = to_text(&scores(&Config::for_mode(Mode::Default), &["orca-03", "orca-03"]));
+        // Warned from frame 21 for a blockage at 30: right at w = 9, early before; nothing is missed.
+        let row = text.lines().find(|line| line.contains("900 ms") && line.contains("default")).unwrap();
+        assert!(row.contains("1.000 [1.000, 1.000]"), "{row}");
+        assert!(text.contains("published") && text.contains("0.785"));
+    }
+
+    #[test]
+    fn several_presets_get_a_row_each_and_a_pooled_one() {
+        let scores = scores(&Config::for_mode(Mode::Default), &["orca-03", "orca-06", "orca-03"]);
+        let named: Vec<_> = scores.groups.iter().map(|group| (group.name.as_str(), group.scenes)).collect();
+        assert_eq!(named, [("orca-03", 2), ("orca-06", 1), ("all", 3)]);
+        let text = to_text(&scores);
+        assert!(
+            ["orca-03 ", "orca-06 ", "all "].iter().all(|name| text.lines().any(|l| l.starts_with(name)))
+        );
+    }
+}

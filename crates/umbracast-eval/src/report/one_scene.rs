@@ -78,7 +78,7 @@ pub fn plan(kept: &Kept) -> Result<Option<Figure>, Error> {
              said of the link.",
             kept.mode.name()
         ),
-        drawing: draw(&panel, (WIDTH, height))?,
+        drawing: draw("plan", &panel, (WIDTH, height))?,
     }))
 }
 
@@ -182,7 +182,7 @@ pub fn link(kept: &Kept) -> Result<Option<Figure>, Error> {
             "Mode {}. Red: the link is truly blocked. A warning is right when red follows within its window.",
             kept.mode.name()
         ),
-        drawing: draw(&panel, (WIDTH, 360.0))?,
+        drawing: draw("link", &panel, (WIDTH, 360.0))?,
     }))
 }
 

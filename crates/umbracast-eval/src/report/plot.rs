@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use kuva::backend::png::PngBackend;
 use kuva::backend::svg::SvgBackend;
-use kuva::plot::legend::LegendPosition;
+use kuva::plot::legend::{LegendEntry, LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 use kuva::plot::{LinePlot, ScatterPlot};
 use kuva::render::annotations::{ShadedRegion, TextAnnotation};
@@ -79,27 +79,27 @@ pub struct Drawing {
     pub png: Vec<u8>,
 }
 
-/// Draws one panel of this size in pixels.
+/// Draws one panel of this size in pixels. `name` tells the figure from others on the same page.
 ///
 /// # Errors
 /// The picture could not be coded.
-pub fn draw(panel: &Panel, size: (f64, f64)) -> Result<Drawing, Error> {
+pub fn draw(name: &str, panel: &Panel, size: (f64, f64)) -> Result<Drawing, Error> {
     let (plots, layout) = parts(panel, true);
-    finished(&render_multiple(plots, layout.with_width(size.0).with_height(size.1)))
+    finished(name, &render_multiple(plots, layout.with_width(size.0).with_height(size.1)))
 }
 
 /// Draws panels in rows of `columns`, each of this size in pixels, with one legend below: the first panel's.
 ///
 /// # Errors
 /// The picture could not be coded.
-pub fn draw_grid(panels: &[Panel], columns: usize, size: (f64, f64)) -> Result<Drawing, Error> {
+pub fn draw_grid(name: &str, panels: &[Panel], columns: usize, size: (f64, f64)) -> Result<Drawing, Error> {
     let (plots, layouts): (Vec<_>, Vec<_>) = panels.iter().map(|panel| parts(panel, false)).unzip();
     let figure = Figure::new(panels.len().div_ceil(columns), columns)
         .with_plots(plots)
         .with_layouts(layouts)
         .with_cell_size(size.0, size.1)
         .with_shared_legend_position(FigureLegendPosition::Bottom);
-    finished(&figure.render())
+    finished(name, &figure.render())
 }
 
 fn parts(panel: &Panel, legend: bool) -> (Vec<Plot>, Layout) {
@@ -134,8 +134,12 @@ fn parts(panel: &Panel, legend: bool) -> (Vec<Plot>, Layout) {
         layout = layout.with_annotation(note);
     }
     if legend {
-        layout = layout.with_legend_position(LegendPosition::OutsideBottomColumns);
-        layout.show_legend = true;
+        // Given its words, the legend knows how wide its columns must be.
+        let entries = panel.series.iter().filter(|series| !series.name.is_empty()).map(entry).collect();
+        layout = layout
+            .with_legend_entries(entries)
+            .with_legend_position(LegendPosition::OutsideBottomColumns)
+            .with_legend_box(false);
     }
     (panel.series.iter().map(plot).collect(), layout)
 }
@@ -165,6 +169,17 @@ fn plot(series: &Series) -> Plot {
     }
 }
 
+fn entry(series: &Series) -> LegendEntry {
+    let (shape, dasharray) = match series.mark {
+        Mark::Line(_) => (LegendShape::Line, None),
+        Mark::Dashed(_) => (LegendShape::Line, Some("6 4".into())),
+        Mark::Discs(_) => (LegendShape::Circle, None),
+        Mark::Diamonds(_) => (LegendShape::Marker(MarkerShape::Diamond), None),
+        Mark::Squares(_) => (LegendShape::Marker(MarkerShape::Square), None),
+    };
+    LegendEntry { label: series.name.clone(), color: series.color.into(), shape, dasharray }
+}
+
 fn theme() -> Theme {
     Theme {
         axis_color: "#666666".into(),
@@ -181,13 +196,13 @@ fn fixed(digits: usize) -> TickFormat {
     TickFormat::Custom(Arc::new(move |value| format!("{value:.digits$}")))
 }
 
-fn finished(scene: &Scene) -> Result<Drawing, Error> {
+fn finished(name: &str, scene: &Scene) -> Result<Drawing, Error> {
     let svg = SvgBackend::new().render_scene(scene);
     let png = PngBackend::new()
         .with_scale(2.0)
         .render_scene(scene)
         .map_err(|e| Error::new(format!("figure: cannot be drawn as PNG: {e}")))?;
-    Ok(Drawing { svg: scalable(&svg, scene.width, scene.height), png })
+    Ok(Drawing { svg: renamed(&scalable(&svg, scene.width, scene.height), name), png })
 }
 
 /// The crate writes a fixed size; a page needs one that shrinks with it.
@@ -195,6 +210,37 @@ fn scalable(svg: &str, width: f64, height: f64) -> String {
     let body = svg.split_once('>').map_or("", |(_, body)| body);
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+         style=\"width: 100%; max-width: {width}px; height: auto\" \
          font-family=\"system-ui, sans-serif\" role=\"img\">{body}"
     )
+}
+
+/// The crate numbers its clip paths through the whole program; here they count within the figure, so that the
+/// same scores give the same bytes and two figures on a page do not share one.
+fn renamed(svg: &str, name: &str) -> String {
+    const CLIP: &str = "kuva-clip-";
+    let mut pieces = svg.split(CLIP);
+    let mut text = pieces.next().unwrap_or_default().to_owned();
+    let mut seen: Vec<&str> = Vec::new();
+    for piece in pieces {
+        let (number, rest) = piece.split_at(piece.find(|c: char| !c.is_ascii_digit()).unwrap_or(piece.len()));
+        let at = seen.iter().position(|&known| known == number).unwrap_or_else(|| {
+            seen.push(number);
+            seen.len() - 1
+        });
+        text += &format!("{name}-clip-{at}{rest}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clip_paths_count_within_their_figure() {
+        let svg = "<clipPath id=\"kuva-clip-7\"/><g clip-path=\"url(#kuva-clip-7)\"/><clipPath id=\"kuva-clip-12\"/>";
+        let expected = "<clipPath id=\"plan-clip-0\"/><g clip-path=\"url(#plan-clip-0)\"/><clipPath id=\"plan-clip-1\"/>";
+        assert_eq!(renamed(svg, "plan"), expected);
+    }
 }

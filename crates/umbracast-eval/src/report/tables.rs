@@ -108,7 +108,7 @@ pub fn presets(scores: &Scores) -> Table {
 fn published_rows() -> [Vec<String>; 2] {
     let [(_, accuracy), (_, precision), (_, recall)] = published::AT_300_MS;
     let row = |w: usize, cells: [String; 5]| {
-        let mut row = vec!["(paper)".to_owned(), window(w), "published".to_owned()];
+        let mut row = vec!["(not given)".to_owned(), window(w), "published".to_owned()];
         row.extend(cells);
         row.push(String::new());
         row
