@@ -52,6 +52,8 @@ pub struct TrackConfig {
     pub detection_probability: f64,
     /// Expected returns at which that chance has fallen to half.
     pub returns_at_half: f64,
+    /// A body that sensors meet only below this height is not detected.
+    pub seen_top_min_m: f64,
     /// Distance between two people below which they often give one detection.
     pub resolution_m: f64,
     /// How much likelier a detection is from a person than from nobody.

@@ -65,3 +65,28 @@ fn height_m(cell: usize) -> f64 {
 fn rise(sigmas: f64) -> f64 {
     1.0 / (1.0 + (-1.702 * sigmas).exp())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tops_that_sweep_over_a_gap_tell_the_height_and_one_alone_little() {
+        let mut height = Height::new(1.72, 0.09);
+        height.see(1.50, 1.0 / 0.3);
+        assert!((height.mean_m() - 1.70).abs() < 0.05, "{}", height.mean_m());
+        for frame in 0..100 {
+            height.see(1.85 - 0.3 * f64::from(frame * 7 % 20) / 20.0, 1.0 / 0.3);
+        }
+        assert!((height.mean_m() - 1.85).abs() < 0.03, "{}", height.mean_m());
+    }
+
+    #[test]
+    fn one_raised_arm_does_not_make_a_giant() {
+        let mut height = Height::new(1.72, 0.09);
+        (0..50).for_each(|frame| height.see(1.45 + 0.01 * f64::from(frame % 20), 1.0 / 0.2));
+        let before_m = height.mean_m();
+        height.see(2.1, 1.0 / 0.2);
+        assert!((height.mean_m() - before_m).abs() < 0.02, "{before_m} to {}", height.mean_m());
+    }
+}

@@ -251,3 +251,67 @@ pub fn inverted(a: Mat2) -> (Mat2, f64) {
 pub fn quadratic(a: Mat2, y: DVec2) -> f64 {
     a[0][0] * y.x * y.x + (a[0][1] + a[1][0]) * y.x * y.y + a[1][1] * y.y * y.y
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Config, Mode};
+
+    fn filter(config: &TrackConfig) -> Filter {
+        let mut filter = Filter::new(config, DVec2::ZERO, 0.9, 0.01);
+        for i in 1..20 {
+            filter.predict(config, 0.1);
+            filter.correct(DVec2::new(0.1 * f64::from(i), 0.0), 0.9, [[0.01, 0.0], [0.0, 0.01]]);
+        }
+        filter
+    }
+
+    #[test]
+    fn two_steps_do_what_one_as_long_as_both_does() {
+        let mut config = Config::for_mode(Mode::Default).track;
+        (config.acceleration_m2ps3, config.model_share) = (vec![0.2], vec![1.0]);
+        let (mut once, mut twice) = (filter(&config), filter(&config));
+        once.predict(&config, 0.1);
+        twice.predict(&config, 0.03);
+        twice.predict(&config, 0.07);
+        let (once, twice) = (once.state(), twice.state());
+        for i in 0..4 {
+            assert!((once.x[i] - twice.x[i]).abs() < 1e-12);
+            for j in 0..4 {
+                assert!((once.P[i][j] - twice.P[i][j]).abs() < 1e-12, "P[{i}][{j}]");
+            }
+        }
+    }
+
+    #[test]
+    fn hdl_has_the_steady_gains_measured_on_the_original() {
+        let config = Config::for_mode(Mode::Hdl).track;
+        let mut filter = Filter::new(&config, DVec2::ZERO, 0.9, 0.2);
+        for _ in 0..300 {
+            filter.predict(&config, 0.1);
+            filter.correct(DVec2::ZERO, 0.9, [[0.2, 0.0], [0.0, 0.2]]);
+        }
+        // K = P H' / R after the update: 0.355 for the position, 0.180 for the velocity.
+        let P = filter.state().P;
+        assert!((P[0][0] / 0.2 - 0.355).abs() < 1e-3 && (P[0][2] / 0.2 - 0.180).abs() < 1e-3, "{P:?}");
+        let z = filter.vertical.unwrap();
+        assert!((z.P[0][0] - P[0][0]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_stop_is_followed_sooner_by_several_models_than_by_the_calm_one() {
+        let several = Config::for_mode(Mode::Default).track;
+        let mut calm = several.clone();
+        (calm.acceleration_m2ps3, calm.model_share) = (vec![several.acceleration_m2ps3[0]], vec![1.0]);
+        let speed_after_stop = |config: &TrackConfig| {
+            let mut filter = filter(config);
+            for _ in 0..8 {
+                filter.predict(config, 0.1);
+                filter.correct(DVec2::new(1.9, 0.0), 0.9, [[0.0013, 0.0], [0.0, 0.0013]]);
+            }
+            filter.state().velocity_mps().length()
+        };
+        let (quick, slow) = (speed_after_stop(&several), speed_after_stop(&calm));
+        assert!(quick < 0.2 && slow > 0.4, "{quick} and {slow} m/s");
+    }
+}

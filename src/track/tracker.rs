@@ -76,7 +76,7 @@ impl Tracker {
             .collect();
         let chance = |body: &Body, view: &View| {
             let seen = if config.visibility {
-                detection_probability(view.returns, config.detection_probability, config.returns_at_half)
+                detection_probability(config, view)
             } else {
                 config.detection_probability
             };

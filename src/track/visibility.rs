@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::config::TrackConfig;
 use crate::geometry::slab::hit_obb;
 use crate::geometry::{DMat3, DVec2, DVec3, Obb, Pose};
 use crate::lidar::{Cloud, Frame, RangeImage};
@@ -10,7 +11,7 @@ use crate::site::Site;
 
 /// Radius of the upright cylinder that stands for a body, both as what is seen and as what hides: the trunk,
 /// 0.26 m by 0.46 m, averaged over all directions.
-const BODY_RADIUS_M: f64 = 0.18;
+const BODY_RADIUS_M: f64 = 0.155;
 /// A body is looked at in so many slices from the feet to the top.
 const SLICES: usize = 8;
 /// Directions round a sensor, counted apart, so that a lost packet hides a sector only.
@@ -61,6 +62,8 @@ pub struct View {
     pub returns: f64,
     /// Beams that meet a metre of upright head, all sensors together.
     pub beams_per_m_at_top: f64,
+    /// Upper end of the highest part of the body that beams meet, above the floor.
+    pub top_m: f64,
 }
 
 impl Visibility {
@@ -123,6 +126,9 @@ impl Visibility {
                     let foot = body.position_m + across * (side * BODY_RADIUS_M);
                     if free(foot.extend(0.5 * (low + high))) {
                         let beams = eye.beams_between(foot.extend(low), foot.extend(high));
+                        if beams > 0.0 {
+                            view.top_m = view.top_m.max(high);
+                        }
                         view.returns += beams * eye.columns_on(foot.extend(low)) * 0.5;
                         if slice + 1 == SLICES {
                             view.beams_per_m_at_top += 0.5 * beams / (high - low);
@@ -216,8 +222,81 @@ fn cylinder_hides(axis_m: DVec2, radius_m: f64, height_m: f64, eye_m: DVec3, tar
     enter < leave && z(enter).min(z(leave)) < height_m
 }
 
-/// Chance that a body with so many expected returns is detected.
-pub fn detection_probability(returns: f64, most: f64, returns_at_half: f64) -> f64 {
-    let (n, half) = (returns * returns, returns_at_half * returns_at_half);
-    if n + half > 0.0 { most * n / (n + half) } else { 0.0 }
+/// Chance that a body seen like this is detected (the shape of the curve is a fit to simulated scenes).
+pub fn detection_probability(config: &TrackConfig, view: &View) -> f64 {
+    if view.returns <= 0.0 || view.top_m < config.seen_top_min_m {
+        return 0.0;
+    }
+    let few = config.returns_at_half / view.returns;
+    config.detection_probability / (1.0 + few * few)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+    use crate::lidar::{Column, Model, Scan};
+
+    /// One HDL-32E in the west of the default site, whose columns lie evenly over `turn_cdeg` from ahead on.
+    fn frame(turn_cdeg: f32) -> Frame {
+        let column = |i: u16| Column {
+            time_ns: i64::from(i),
+            azimuth_cdeg: f32::from(i) * turn_cdeg / 2170.0,
+            azimuth_rate_cdeg_per_ns: 0.0,
+        };
+        let image = RangeImage {
+            beams: Model::hdl_32e().beams,
+            columns: (0..2170).map(column).collect(),
+            range_m: Vec::new(),
+            reflectivity: Vec::new(),
+        };
+        let site_from_sensor = Config::default().site.sensors[1].site_from_sensor();
+        let scan = Scan { sensor: 1, site_from_sensor, cloud: Cloud::Organised(image) };
+        Frame { index: 0, time_ns: 0, scans: vec![scan] }
+    }
+
+    fn body(x_m: f64, y_m: f64) -> Body {
+        Body { position_m: DVec2::new(x_m, y_m), height_m: 1.75 }
+    }
+
+    fn view(frame: &Frame, seen: Body, others: &[Body]) -> View {
+        let visibility = Visibility::new(&Config::default().site);
+        visibility.view(&visibility.eyes(frame), &seen, others)
+    }
+
+    #[test]
+    fn a_body_gives_fewer_returns_the_farther_it_is() {
+        let frame = frame(36_000.0);
+        let returns = [-10.0, -4.0, 2.0].map(|x_m| view(&frame, body(x_m, 0.0), &[]).returns);
+        assert!(returns[0] > returns[1] && returns[1] > returns[2] && returns[2] > 5.0, "{returns:?}");
+    }
+
+    #[test]
+    fn whoever_stands_right_behind_somebody_is_seen_less_and_in_front_not() {
+        let frame = frame(36_000.0);
+        let alone = view(&frame, body(0.0, 0.0), &[]);
+        let behind = view(&frame, body(0.0, 0.0), &[body(-0.5, 0.0)]);
+        let before = view(&frame, body(0.0, 0.0), &[body(0.5, 0.0)]);
+        assert!(behind.returns < 0.7 * alone.returns, "{behind:?}, alone {alone:?}");
+        assert_eq!(before, alone);
+    }
+
+    #[test]
+    fn a_pillar_hides_a_person_and_a_lost_sector_does_too() {
+        let whole = frame(36_000.0);
+        assert_eq!(view(&whole, body(-11.2, 12.27), &[]).returns, 0.0);
+        // Clockwise from ahead: the first half looks to the south of the room.
+        let half = frame(18_000.0);
+        assert_eq!(view(&half, body(-4.0, 6.0), &[]).returns, 0.0);
+        assert!(view(&half, body(-4.0, -6.0), &[]).returns > 10.0);
+    }
+
+    #[test]
+    fn where_the_highest_beam_meets_the_knees_only_legs_are_seen() {
+        let frame = frame(36_000.0);
+        let legs = view(&frame, body(3.0, 0.0), &[]);
+        assert!(legs.top_m < 0.9 && legs.top_m > 0.0, "{legs:?}");
+        let config = Config::default().track;
+        assert_eq!(detection_probability(&config, &View { top_m: 0.4, ..legs }), 0.0);
+    }
 }
