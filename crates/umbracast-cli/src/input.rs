@@ -140,9 +140,8 @@ fn drain(assembler: &mut Assembler, sink: Sink) -> Result<(), Error> {
 fn clouds(files: &[PathBuf], site: &Site, health: &mut Health, sink: Sink) -> Result<Option<String>, Error> {
     let [sensor] = &site.sensors[..] else {
         let found = site.sensors.len();
-        return Err(
-            Error::new(format!("clouds: expected a site with 1 sensor, found {found}")).within(files[0].display())
-        );
+        return Err(Error::new(format!("clouds: expected a site with 1 sensor, found {found}"))
+            .within(files[0].display()));
     };
     let by_name = files.iter().all(|file| setup::number_of(file).is_some());
     for (count, file) in files.iter().enumerate() {
