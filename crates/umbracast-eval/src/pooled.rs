@@ -28,8 +28,6 @@ pub struct Estimate {
 pub struct Scores {
     /// One a preset, in the order of the scenes, then [`ALL`] where there are several.
     pub groups: Vec<Group>,
-    /// What oracles reach, over all scenes; empty unless asked for.
-    pub ladder: Vec<LadderRow>,
 }
 
 /// Scenes that are pooled.
@@ -47,6 +45,8 @@ pub struct Group {
     pub modes: Vec<ModeScores>,
     /// Mean displacement of constant velocity from the true state, by step, metres.
     pub constant_velocity_m: Vec<Option<f64>>,
+    /// What oracles reach; empty unless asked for.
+    pub ladder: Vec<LadderRow>,
 }
 
 /// Stage 3 of one predictor at one access point.
@@ -140,9 +140,15 @@ pub struct ModeScores {
 pub fn score(results: &[SceneResult], site: &Site) -> Scores {
     let names: Vec<String> = site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let scenes: Vec<&SceneScore> = results.iter().map(|result| &result.score).collect();
-    let ladders: Vec<&SceneLadder> = results.iter().filter_map(|result| result.ladder.as_ref()).collect();
-    let ladder = if ladders.is_empty() { Vec::new() } else { ladder::rows(&ladders, site) };
-    Scores { ladder, ..pool(&scenes, &names) }
+    let mut scores = pool(&scenes, &names);
+    for group in &mut scores.groups {
+        let members = results.iter().filter(|result| group.name == ALL || result.score.group == group.name);
+        let ladders: Vec<&SceneLadder> = members.filter_map(|result| result.ladder.as_ref()).collect();
+        if !ladders.is_empty() {
+            group.ladder = ladder::rows(&ladders, site);
+        }
+    }
+    scores
 }
 
 /// Pools scenes. `access_points` are the site's names.
@@ -161,7 +167,7 @@ pub fn pool(scenes: &[&SceneScore], access_points: &[String]) -> Scores {
     if names.len() > 1 {
         groups.push(group(ALL, scenes, access_points));
     }
-    Scores { groups, ladder: Vec::new() }
+    Scores { groups }
 }
 
 impl Scores {
@@ -218,7 +224,15 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
         constant_velocity_m = (1..=STEPS).map(|h| pooled.mean_m(h)).collect();
     }
     let frames = scenes.iter().map(|scene| scene.frames).sum();
-    Group { name: name.to_owned(), scenes: scenes.len(), frames, links, modes, constant_velocity_m }
+    Group {
+        name: name.to_owned(),
+        scenes: scenes.len(),
+        frames,
+        links,
+        modes,
+        constant_velocity_m,
+        ladder: Vec::new(),
+    }
 }
 
 fn windows(bootstrap: &Bootstrap, scenes: &[&LinkTally]) -> Vec<WindowScores> {

@@ -175,3 +175,43 @@ pub fn score_scene(
         modes,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made::{link_row, track_row, truth_of};
+    use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow};
+    use umbracast_io::tables::{read, write};
+
+    fn score(truth: &SceneTruth, rows: &SceneRun) -> SceneScore {
+        let config = Config::for_mode(Mode::Default);
+        let run = ModeRun { config: &config, rows, health: Health::default() };
+        score_scene(0, "hand made", truth, &[run], None, None).unwrap()
+    }
+
+    #[test]
+    fn tables_read_back_from_files_score_as_the_rows_in_memory() {
+        let truth = truth_of(2, 40, |person, frame| person == 1 && frame % 7 == 0);
+        let run = SceneRun {
+            tracks: (0..40).map(|frame| track_row(frame, 5, 9.9, 0.1)).collect(),
+            links: (0..40).map(|frame| link_row(frame, 5, frame % 5 == 0)).collect(),
+        };
+        let (folder, names) = (tempfile::tempdir().unwrap(), ["side".to_owned(), "centre".to_owned()]);
+        let path = folder.path();
+        write(path, &names, false, &truth.people).unwrap();
+        write(path, &names, false, &truth.links).unwrap();
+        write(path, &names, false, &run.tracks).unwrap();
+        write(path, &names, false, &run.links).unwrap();
+        let truth_read = SceneTruth {
+            people: read::<PeopleRow>(path, &names).unwrap(),
+            links: read::<PeopleLinkRow>(path, &names).unwrap(),
+        };
+        let run_read = SceneRun {
+            tracks: read::<TrackRow>(path, &names).unwrap(),
+            links: read::<LinkRow>(path, &names).unwrap(),
+        };
+        let in_memory = score(&truth, &run);
+        assert_eq!(score(&truth_read, &run_read), in_memory);
+        assert_eq!(in_memory.modes[0].displacement.tracked_share(), Some(0.5));
+    }
+}

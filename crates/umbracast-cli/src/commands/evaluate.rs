@@ -177,8 +177,12 @@ fn show(
     if let Some(folder) = out {
         let arguments: Vec<String> = std::env::args().skip(1).collect();
         let command = format!("umbracast {}", arguments.join(" "));
-        let explanations: Vec<(String, String)> =
-            scores.ladder.iter().map(|row| (row.oracle.to_owned(), HARSHER_BODIES.to_owned())).collect();
+        let explanations: Vec<(String, String)> = scores
+            .groups
+            .iter()
+            .flat_map(|group| &group.ladder)
+            .map(|row| (row.oracle.to_owned(), HARSHER_BODIES.to_owned()))
+            .collect();
         let context = Context { configs, command: command.trim_end(), kept, explanations: &explanations };
         report::write(folder, scores, &context)?;
         if !common.json {

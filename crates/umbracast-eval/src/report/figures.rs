@@ -39,7 +39,7 @@ pub fn all(scores: &Scores, kept: Option<&Kept>, access_point: &str) -> Result<V
     let Some(group) = scores.headline() else { return Ok(Vec::new()) };
     let mut figures = vec![metrics(group, access_point)?, displacement(group)?];
     figures.extend(reliability(group, access_point)?);
-    figures.extend(ladder(scores, group, access_point)?);
+    figures.extend(ladder(group, access_point)?);
     if let Some(kept) = kept {
         figures.extend(one_scene::plan(kept)?);
         figures.extend(one_scene::link(kept)?);
@@ -200,11 +200,11 @@ fn reliability(group: &Group, access_point: &str) -> Result<Option<Figure>, Erro
     }))
 }
 
-fn ladder(scores: &Scores, group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
+fn ladder(group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
     /// The bodies of the true future; the rungs with errors stand in the table.
     const SHOWN: usize = 5;
     let mut oracles: Vec<&str> = Vec::new();
-    for row in &scores.ladder {
+    for row in &group.ladder {
         if !oracles.contains(&row.oracle) && oracles.len() < SHOWN {
             oracles.push(row.oracle);
         }
@@ -215,7 +215,7 @@ fn ladder(scores: &Scores, group: &Group, access_point: &str) -> Result<Option<F
     let mut panel = axes("F1", "window, ms", (0.5, 1.0));
     for (oracle, color) in oracles.iter().zip([GREY, GOLD, SKY, GREEN, BLACK]) {
         let rows =
-            scores.ladder.iter().filter(|row| row.oracle == *oracle && row.access_point == access_point);
+            group.ladder.iter().filter(|row| row.oracle == *oracle && row.access_point == access_point);
         let points = rows.filter_map(|row| Some((row.window as f64 * 100.0, row.f1?))).collect();
         panel.series.push(series(*oracle, color, Mark::Dashed(1.6), points));
     }

@@ -25,8 +25,8 @@ figure { margin: 0.8rem 0 0; }
 figure svg { display: block; min-width: 34rem; }
 figcaption, .note { color: #555; font-size: 0.9rem; max-width: 44rem; margin: 0.3rem 0 0; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 0.82rem; font-variant-numeric: tabular-nums; white-space: nowrap; }
-th, td { padding: 0.25rem 0.45rem; text-align: right; border-bottom: 1px solid #e6e6e6; }
+table { border-collapse: collapse; font-size: 0.8rem; font-variant-numeric: tabular-nums; white-space: nowrap; }
+th, td { padding: 0.25rem 0.4rem; text-align: right; border-bottom: 1px solid #e6e6e6; }
 th { border-bottom: 2px solid #999; font-weight: 600; }
 .w { text-align: left; }
 tr.new td { border-top: 2px solid #bbb; }

@@ -27,5 +27,7 @@ pub const LADDER: [[(f64, f64); 4]; 10] = [
 ];
 /// Where the rungs were measured: access point and window.
 pub const LADDER_AT: [(&str, usize); 4] = [("side", 1), ("side", 3), ("side", 9), ("centre", 3)];
+/// On scenes of this preset.
+pub const LADDER_PRESET: &str = "orca-03";
 /// A difference from the ladder that asks for an explanation.
 pub const LADDER_TOLERANCE: f64 = 0.05;

@@ -256,10 +256,13 @@ fn compared(group: &Group, access_point: &str, shown: &[Predictor], title: Strin
     table
 }
 
-/// The ladder of oracles beside what was measured before. `explanations` are (oracle, why it differs).
+/// The ladder of oracles beside what was measured before, on the preset it was measured with where there is one.
+/// `explanations` are (oracle, why it differs).
 pub fn ladder(scores: &Scores, explanations: &[(String, String)]) -> Option<Table> {
+    let same_preset = scores.groups.iter().find(|group| group.name == published::LADDER_PRESET);
+    let group = same_preset.or(scores.headline())?;
     let mut oracles: Vec<&str> = Vec::new();
-    for row in &scores.ladder {
+    for row in &group.ladder {
         if !oracles.contains(&row.oracle) {
             oracles.push(row.oracle);
         }
@@ -275,14 +278,14 @@ pub fn ladder(scores: &Scores, explanations: &[(String, String)]) -> Option<Tabl
         "reference",
         "differs",
     ];
-    let mut table = Table::new("Ladder of oracles", 3, &header);
+    let mut table = Table::new(format!("Ladder of oracles: {}", scenes(group)), 3, &header);
     let mut apart = Vec::new();
     for (oracle, reference) in oracles.iter().zip(published::LADDER) {
         for ((access_point, w), (f1, onset)) in published::LADDER_AT.into_iter().zip(reference) {
             let at = |row: &&crate::ladder::LadderRow| {
                 row.oracle == *oracle && row.access_point == access_point && row.window == w
             };
-            let Some(row) = scores.ladder.iter().find(at) else { continue };
+            let Some(row) = group.ladder.iter().find(at) else { continue };
             let far = |found: Option<f64>, expected: f64| {
                 found.is_some_and(|found| (found - expected).abs() > published::LADDER_TOLERANCE)
             };
@@ -315,8 +318,9 @@ pub fn ladder(scores: &Scores, explanations: &[(String, String)]) -> Option<Tabl
     let explained: Vec<String> =
         reasons.iter().map(|(why, oracles)| format!("{}: {why}.", oracles.join("; "))).collect();
     let note = format!(
-        "Reference: an earlier measurement with bodies of 18 capsules on orca-03. Marked where F1 or \
-         onset F1 lies more than {:.2} apart. {}",
+        "Reference: an earlier measurement with bodies of 18 capsules on {}. Marked where F1 or onset \
+         F1 lies more than {:.2} apart. {}",
+        published::LADDER_PRESET,
         published::LADDER_TOLERANCE,
         explained.join(" ")
     );
