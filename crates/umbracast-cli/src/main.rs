@@ -5,6 +5,7 @@
 mod args;
 mod setup;
 mod progress;
+mod say;
 mod run_json;
 mod crowds;
 mod input;

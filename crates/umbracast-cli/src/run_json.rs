@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use umbracast::Error;
 
 use crate::args::Common;
-use crate::setup;
+use crate::{say, setup};
 
 /// Wall-clock time since its start.
 #[derive(Debug, Clone, Copy)]
@@ -62,8 +62,8 @@ impl RunJson {
     /// To stdout: the JSON with `--json`, else `text`.
     pub fn print(&self, common: &Common, text: &str) {
         match common.json {
-            true => println!("{:#}", Value::Object(self.0.clone())),
-            false => println!("{text}"),
+            true => say::line(format_args!("{:#}", Value::Object(self.0.clone()))),
+            false => say::line(text),
         }
     }
 }

@@ -3,16 +3,16 @@
 use umbracast::config::DEFAULT_TOML;
 use umbracast::{Error, Mode};
 
-use crate::{Ending, args, setup};
+use crate::{Ending, args, say, setup};
 
 pub fn run(args: &args::Config) -> Result<Ending, Error> {
     match (&args.check, args.mode) {
         (Some(file), mode) => {
             setup::config(mode.unwrap_or(Mode::Default), Some(file))?;
-            println!("{}: understood", file.display());
+            say::line(format_args!("{}: understood", file.display()));
         }
-        (None, Some(mode)) => print!("{}", setup::config(mode, None)?.to_toml()),
-        (None, None) => print!("{DEFAULT_TOML}"),
+        (None, Some(mode)) => say::text(&setup::config(mode, None)?.to_toml()),
+        (None, None) => say::text(DEFAULT_TOML),
     }
     Ok(Ending::Done)
 }

@@ -16,7 +16,7 @@ use umbracast_io::tables;
 use crate::args::{Common, Evaluate};
 use crate::progress::bar;
 use crate::setup::{self, TEST_SEED};
-use crate::{Ending, crowds};
+use crate::{Ending, crowds, say};
 
 /// Why rungs of the ladder lie below the reference, found by switching one trait of the bodies off at a time.
 const HARSHER_BODIES: &str = "the walking bodies sway over their stance foot, swing their arms and differ in \
@@ -136,16 +136,16 @@ fn against_labels(dir: &Path, file: &Path, common: &Common) -> Result<Ending, Er
             "labels": labels.len(), "recall": score.recall(), "precision": score.precision(),
             "position_rmse_m": score.position_rmse_m(), "mode": config.mode,
         });
-        println!("{value:#}");
+        say::line(format_args!("{value:#}"));
     } else {
-        println!(
+        say::line(format_args!(
             "{}: {} labels, gate 0.5 m: recall {}, precision {}, distance {} m (RMS, to the middle of the box)",
             config.mode.name(),
             labels.len(),
             percent(score.recall()),
             percent(score.precision()),
             percent(score.position_rmse_m()),
-        );
+        ));
     }
     Ok(Ending::Done)
 }
@@ -171,8 +171,8 @@ fn show(
     common: &Common,
 ) -> Result<Ending, Error> {
     match common.json {
-        true => print!("{}", report::to_json(scores)),
-        false => print!("{}", report::to_text(scores)),
+        true => say::text(&report::to_json(scores)),
+        false => say::text(&report::to_text(scores)),
     }
     if let Some(folder) = out {
         let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -186,7 +186,7 @@ fn show(
         let context = Context { configs, command: command.trim_end(), kept, explanations: &explanations };
         report::write(folder, scores, &context)?;
         if !common.json {
-            println!("\nreport: {}", folder.join("report.html").display());
+            say::line(format_args!("\nreport: {}", folder.join("report.html").display()));
         }
     }
     Ok(Ending::Done)

@@ -14,7 +14,7 @@ use umbracast_io::recording::{Entry, RecordingReader};
 use umbracast_io::tables;
 
 use crate::args::{Common, Inspect};
-use crate::{Ending, setup};
+use crate::{Ending, say, setup};
 
 /// What was found in a file: lines of name and value, and what was lost.
 #[derive(Default)]
@@ -39,13 +39,13 @@ pub fn run(args: &Inspect, common: &Common) -> Result<Ending, Error> {
             findings.lines.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
         all.push(json!({ "file": file.display().to_string(), "found": pairs, "lost": findings.lost }));
         if !common.json {
-            println!("{}", file.display());
-            findings.lines.iter().for_each(|(name, value)| println!("  {name:28} {value}"));
+            say::line(file.display());
+            findings.lines.iter().for_each(|(name, value)| say::line(format_args!("  {name:28} {value}")));
         }
         lost.extend(findings.lost);
     }
     if common.json {
-        println!("{:#}", serde_json::Value::Array(all));
+        say::line(format_args!("{:#}", serde_json::Value::Array(all)));
     }
     Ok(if lost.is_empty() { Ending::Done } else { Ending::DataLost(lost.join("; ")) })
 }
