@@ -1,14 +1,16 @@
 //! What stands beside a weights file.
 
+use umbracast::STEPS;
 use umbracast::forecast::lstm::{RHO_LIMIT, SIGMA_FLOOR_M, SIGMA_SCALE_M};
+
+use umbracast_sim::crowd::Preset;
 
 use crate::score::Scores;
 use crate::train::TrainOptions;
 
 /// The card as Markdown.
-pub fn write(options: &TrainOptions, losses: &[[f64; 2]], scores: &Scores) -> String {
+pub fn write(options: &TrainOptions, losses: &[[f64; 2]], scores: &[(Preset, Scores)]) -> String {
     let presets: Vec<&str> = options.presets.iter().map(|preset| preset.name()).collect();
-    let millimetres = |values: &[f64]| row(values, 1000.0, 1);
     let epochs: String = losses
         .iter()
         .enumerate()
@@ -29,10 +31,7 @@ pub fn write(options: &TrainOptions, losses: &[[f64; 2]], scores: &Scores) -> St
          log-likelihood, Adam from {rate} to zero along half a cosine, gradients clipped at {clip}.\n\
          - Commit: {commit}.\n\n\
          ## Scores on validation windows, exact positions\n\n\
-         | step | {steps} |\n|---|{rule}|\n\
-         | displacement error, mm | {displacement} |\n\
-         | last displacement repeated, mm | {repeated} |\n\
-         | displacements within the 90 % ellipse | {within} |\n\n\
+         | step | {steps} |\n|---|{rule}|\n{tables}\n\
          ## Negative log-likelihood of a displacement\n\n\
          | epoch | training | validation |\n|---|---|---|\n{epochs}",
         embedded = options.size.embedded,
@@ -54,11 +53,20 @@ pub fn write(options: &TrainOptions, losses: &[[f64; 2]], scores: &Scores) -> St
         rate = options.learning_rate,
         clip = options.clip,
         commit = if options.commit.is_empty() { "unknown" } else { &options.commit },
-        steps = (1..=scores.displacement_m.len()).map(|i| i.to_string()).collect::<Vec<_>>().join(" | "),
-        rule = "---|".repeat(scores.displacement_m.len()).trim_end_matches('|'),
-        displacement = millimetres(&scores.displacement_m),
-        repeated = millimetres(&scores.repeated_m),
-        within = row(&scores.within_90, 1.0, 2),
+        steps = (1..=STEPS).map(|i| i.to_string()).collect::<Vec<_>>().join(" | "),
+        rule = ["---"; STEPS].join("|"),
+        tables = scores.iter().map(|(preset, scores)| table(preset.name(), scores)).collect::<String>(),
+    )
+}
+
+fn table(preset: &str, scores: &Scores) -> String {
+    format!(
+        "| {preset}: displacement error, mm | {} |\n\
+         | {preset}: last displacement repeated, mm | {} |\n\
+         | {preset}: displacements within the 90 % ellipse | {} |\n",
+        row(&scores.displacement_m, 1000.0, 1),
+        row(&scores.repeated_m, 1000.0, 1),
+        row(&scores.within_90, 1.0, 2),
     )
 }
 

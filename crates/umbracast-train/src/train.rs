@@ -91,8 +91,8 @@ impl TrainOptions {
             Err(Error::new(format!("training: expected {what}, found {found:?}")))
         };
         let (scenes, seeds) = (&self.scenes, SCENE_SEEDS);
-        if scenes.start < seeds.start || scenes.end > seeds.end || scenes.end < scenes.start + 2 {
-            return wrong("two or more scene seeds of 1 to 99,999", scenes);
+        if scenes.start < seeds.start || scenes.end > seeds.end {
+            return wrong("scene seeds of 1 to 99,999", scenes);
         }
         if self.presets.is_empty() || self.people == 0 {
             return wrong("a preset and people", &(&self.presets, self.people));
@@ -159,8 +159,8 @@ pub struct TrainedModel {
     pub safetensors: Vec<u8>,
     /// What stands beside it, as Markdown: where it comes from and how good it is.
     pub card: String,
-    /// On validation windows.
-    pub scores: Scores,
+    /// On validation windows of each preset, positions exact.
+    pub scores: Vec<(Preset, Scores)>,
 }
 
 /// Fits the paper's network.
@@ -170,9 +170,9 @@ pub struct TrainedModel {
 pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&Progress)) -> Result<TrainedModel, Error> {
     options.check()?;
     let device = options.processor.device();
-    let [trained, validated] = ways(options);
-    let exact = Noise { white_m: 0.0, lasting_m: 0.0 };
-    let validation = validated.draw(VALIDATED, options.noise, options.seed);
+    let [trained_on, validated_on] = scenes(options);
+    let trained = ways(&trained_on, options)?;
+    let validation = ways(&validated_on, options)?.draw(VALIDATED, options.noise, options.seed);
     let mut run = resumed(options, &device)?;
     for epoch in run.losses.len()..options.epochs {
         // Windows depend on the epoch alone, so that a resumed training sees the same ones.
@@ -208,20 +208,32 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&Progress)) -> Res
         }
     }
     let safetensors = to_safetensors(&[("", &run.network)], None)?;
-    let scores = score(
-        &umbracast::forecast::Weights::from_safetensors(&safetensors)?,
-        &validated.draw(SCORED, exact, options.seed),
-    );
+    let weights = umbracast::forecast::Weights::from_safetensors(&safetensors)?;
+    let exact = Noise { white_m: 0.0, lasting_m: 0.0 };
+    let mut scores = Vec::new();
+    for &preset in &options.presets {
+        let scenes: Vec<_> = validated_on.iter().copied().filter(|scene| scene.1 == preset).collect();
+        let windows = ways(&scenes, options)?.draw(SCORED, exact, options.seed);
+        scores.push((preset, score(&weights, &windows)));
+    }
     let card = card::write(options, &run.losses, &scores);
     Ok(TrainedModel { safetensors, card, scores })
 }
 
-/// Ways of the scenes trained on and of those validated on.
-fn ways(options: &TrainOptions) -> [Ways; 2] {
+/// The scenes trained on and those validated on, each with its preset.
+fn scenes(options: &TrainOptions) -> [Vec<(u64, Preset)>; 2] {
     let scenes = &options.scenes;
     let split = scenes.start + ((scenes.end - scenes.start) as f64 * TRAINED_SHARE).round() as u64;
-    [scenes.start..split, split..scenes.end]
-        .map(|scenes| Ways::simulate(scenes, &options.presets, options.people, options.radius_m))
+    let preset = |seed: u64| options.presets[seed as usize % options.presets.len()];
+    [scenes.start..split, split..scenes.end].map(|seeds| seeds.map(|seed| (seed, preset(seed))).collect())
+}
+
+fn ways(scenes: &[(u64, Preset)], options: &TrainOptions) -> Result<Ways, Error> {
+    let ways = Ways::simulate(scenes, options.people, options.radius_m);
+    if ways.windows() == 0 {
+        return Err(Error::new("training: expected somebody who walks for 19 frames, found nobody"));
+    }
+    Ok(ways)
 }
 
 fn batch_loss(network: &Network, windows: &[Window], device: &Device) -> Tensor<1> {

@@ -39,11 +39,10 @@ pub struct Ways {
 }
 
 impl Ways {
-    /// Of the people of some scenes. Scene `i` has the seed `first_seed + i` and the presets in turn.
-    pub fn simulate(scenes: std::ops::Range<u64>, presets: &[Preset], people: usize, radius_m: f64) -> Self {
+    /// Of the people of some scenes, each with its seed and preset.
+    pub fn simulate(scenes: &[(u64, Preset)], people: usize, radius_m: f64) -> Self {
         let mut ways = Vec::new();
-        for seed in scenes {
-            let preset = presets[seed as usize % presets.len()];
+        for &(seed, preset) in scenes {
             for trajectory in circle_crossing(preset, people, radius_m, seed).trajectories {
                 let frames = (1..).map_while(|frame| {
                     let time_ns = frame * STEP_NS;
@@ -110,7 +109,7 @@ mod tests {
     const EXACT: Noise = Noise { white_m: 0.0, lasting_m: 0.0 };
 
     fn ways() -> Ways {
-        Ways::simulate(1..3, &[Preset::Orca03], 3, 5.0)
+        Ways::simulate(&[(1, Preset::Orca03), (2, Preset::Orca03)], 3, 5.0)
     }
 
     #[test]

@@ -10,7 +10,7 @@ use umbracast_train::{TrainOptions, TrainedModel, train};
 
 fn small(checkpoint: Option<PathBuf>) -> TrainOptions {
     TrainOptions {
-        scenes: 1..6,
+        scenes: 1..7,
         people: 3,
         radius_m: 5.0,
         size: Size { embedded: 16, units: 32 },
@@ -56,7 +56,7 @@ fn training_lowers_the_loss_and_gives_weights_that_the_runtime_reads() {
     assert_eq!(losses.len(), 3);
     assert!(losses[2] < losses[0], "{losses:?}");
     Weights::from_safetensors(&model.safetensors).unwrap();
-    assert!(model.card.contains("scene seeds 1 to 5"), "{}", model.card);
+    assert!(model.card.contains("scene seeds 1 to 6"), "{}", model.card);
 }
 
 #[test]
