@@ -1,5 +1,5 @@
-//! Makes `models/paper_lstm.safetensors` and its card: `paper_lstm DIR COMMIT [EPOCHS]`. Stopped and started
-//! again, it goes on after the last whole epoch.
+//! Makes `models/paper_lstm.safetensors` and its card, with EPOCHS 15: `paper_lstm DIR COMMIT [EPOCHS]`. Stopped and
+//! started again, it goes on after the last whole epoch.
 
 use std::path::Path;
 use std::{env, fs};
