@@ -16,9 +16,8 @@ use crate::run_json::{RunJson, Stopwatch};
 use crate::{Ending, setup};
 
 /// What came out of one scene.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Done {
-    rows: SceneRun,
     health: Health,
     lost: Option<String>,
     /// Of each frame's `step`, seconds.
@@ -46,27 +45,49 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
     let (mut health, mut lost, mut step_s) = (Health::default(), Vec::new(), Vec::new());
     let mut frames = Vec::new();
-    setup::with_threads(common.threads, || -> Result<(), Error> {
+    let run_all = || -> Result<(), Error> {
+        let mut take = |mut done: Done| {
+            health.add(&done.health);
+            lost.extend(done.lost.take());
+            step_s.append(&mut done.step_s);
+            frames.push(done.frames);
+            progress.inc(1);
+        };
+        if let [input] = &inputs[..] {
+            // A single input may go on for ever: its rows are written as they come.
+            take(run_scene(0, input, &config, &weights, &empty, |rows| {
+                tracks.write(&rows.tracks)?;
+                links.write(&rows.links)?;
+                (rows.tracks.clear(), rows.links.clear());
+                Ok(())
+            })?);
+            return Ok(());
+        }
         let numbered: Vec<(usize, &Input)> = inputs.iter().enumerate().collect();
         for some in numbered.chunks(rayon::current_num_threads()) {
             let scene = |&(number, input): &(usize, &Input)| {
-                let done = run_scene(number as u32, input, &config, &weights, &empty);
-                progress.inc(1);
-                done
+                let mut all = SceneRun::default();
+                let done = run_scene(number as u32, input, &config, &weights, &empty, |rows| {
+                    all.tracks.append(&mut rows.tracks);
+                    all.links.append(&mut rows.links);
+                    Ok(())
+                });
+                done.map(|done| (done, all))
             };
-            for mut done in some.par_iter().map(scene).collect::<Result<Vec<Done>, Error>>()? {
-                tracks.write(&done.rows.tracks)?;
-                links.write(&done.rows.links)?;
-                health.add(&done.health);
-                lost.extend(done.lost);
-                step_s.append(&mut done.step_s);
-                frames.push(done.frames);
+            for result in some.par_iter().map(scene).collect::<Vec<Result<(Done, SceneRun), Error>>>() {
+                let (done, rows) = result?;
+                tracks.write(&rows.tracks)?;
+                links.write(&rows.links)?;
+                take(done);
             }
         }
         Ok(())
-    })??;
+    };
+    let result = setup::with_threads(common.threads, run_all)?;
+    // What is done stays, also when a later input fails.
     tracks.finish()?;
     links.finish()?;
+    result?;
     progress.finish_and_clear();
     step_s.sort_by(f64::total_cmp);
     let at = |share: f64| step_s.get(((step_s.len() as f64 * share) as usize).min(step_s.len().max(1) - 1));
@@ -106,7 +127,9 @@ fn run_scene(
     config: &Config,
     weights: &Weights,
     empty: &[Frame],
+    mut sink: impl FnMut(&mut SceneRun) -> Result<(), Error>,
 ) -> Result<Done, Error> {
+    let mut rows = SceneRun::default();
     let mut pipeline = Pipeline::new(config, Some(weights))?;
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     let mut done = Done::default();
@@ -116,9 +139,9 @@ fn run_scene(
         let outcome = pipeline.step(frame);
         done.step_s.push(watch.seconds());
         done.frames.push(frame.index);
-        rows::of_outcome(scene, outcome, &mut done.rows.tracks, &mut done.rows.links);
+        rows::of_outcome(scene, outcome, &mut rows.tracks, &mut rows.links);
         stage_health = outcome.health;
-        Ok(())
+        sink(&mut rows)
     })?;
     done.health = input_health;
     done.health.add(&stage_health);
