@@ -1,9 +1,9 @@
 //! What the running pipeline met that it could not use: counted here, skipped, and recovered from.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Counters of everything broken that was skipped. All zero on clean input.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Health {
     /// Packets whose length is not a sensor packet's.
     pub packets_wrong_size: u64,

@@ -27,6 +27,23 @@ pub struct Outcome {
     pub blockages: Vec<Blockage>,
     /// What was skipped since the start.
     pub health: Health,
+    last_ns: Option<i64>,
+}
+
+impl Outcome {
+    /// Takes the frame's number and time. False, counted, and everything emptied for a frame that does not lie
+    /// after the last one.
+    fn begin(&mut self, frame: &Frame) -> bool {
+        let later = self.last_ns.is_none_or(|last_ns| frame.time_ns > last_ns);
+        if later {
+            self.last_ns = Some(frame.time_ns);
+        } else {
+            let health = Health { frames_out_of_order: self.health.frames_out_of_order + 1, ..self.health };
+            *self = Self { health, last_ns: self.last_ns, ..Self::default() };
+        }
+        (self.frame, self.time_ns) = (frame.index, frame.time_ns);
+        later
+    }
 }
 
 /// The three stages with what each remembers.
@@ -66,7 +83,9 @@ impl Pipeline {
     /// One frame through all stages.
     pub fn step(&mut self, frame: &Frame) -> &Outcome {
         let o = &mut self.outcome;
-        (o.frame, o.time_ns) = (frame.index, frame.time_ns);
+        if !o.begin(frame) {
+            return o;
+        }
         let priors = self.tracker.priors(frame.time_ns);
         self.background.foreground(frame, &priors, &mut o.health, &mut o.foreground);
         self.clusterer.clusters(&o.foreground, &priors, &mut o.clusters);

@@ -1,6 +1,5 @@
 //! What a ray meets: an upright body made of two elliptic cylinders, a trunk up to the shoulders and a head.
-//! One box to the top of the head costs 0.16 of F1 (see `record/ladder`): above the shoulders there is only a
-//! head.
+//! One box to the top of the head does far worse (the report's ladder): above the shoulders there is only a head.
 
 use crate::geometry::{DVec2, DVec3};
 

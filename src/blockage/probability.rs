@@ -80,6 +80,7 @@ impl Sampler {
     fn mark(&mut self, size: &BodySize, ue: &Ue, ap_m: DVec3, person: usize, step: usize) {
         let q = &self.people[person];
         let ap = ap_m.truncate();
+        let reach_m = REACH_M + ue.forward_m.abs() + ue.left_m.abs();
         for (other, p) in self.people.iter().enumerate() {
             if other == person || !may_block(ap_m, ue, q, p, step) {
                 continue;
@@ -88,7 +89,7 @@ impl Sampler {
                 let i = step * self.samples + k;
                 let (at_p, at_q) = (p.positions_m[i], q.positions_m[i]);
                 // Whoever stands beyond the UE cannot be in the way.
-                if *blocked || at_p.distance_squared(ap) > (at_q.distance(ap) + REACH_M).powi(2) {
+                if *blocked || at_p.distance_squared(ap) > (at_q.distance(ap) + reach_m).powi(2) {
                     continue;
                 }
                 let heading_rad = q.ahead[i].to_angle();

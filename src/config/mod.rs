@@ -6,6 +6,7 @@ mod track;
 mod forecast;
 mod blockage;
 mod overlay;
+mod check;
 
 use serde::{Deserialize, Serialize};
 
@@ -89,8 +90,8 @@ impl Config {
     /// for messages.
     ///
     /// # Errors
-    /// Text that is not TOML, a key that does not exist, or a value of the wrong kind: with file, line, what
-    /// was expected and what was found.
+    /// Text that is not TOML, a key that does not exist, a value of the wrong kind: with file, line, what was
+    /// expected and what was found. A value that cannot work, or a file of another mode.
     pub fn with_overlay(mode: Mode, text: &str, file: &str) -> Result<Self, Error> {
         let mut layers = vec![("config/default.toml", DEFAULT_TOML)];
         match mode {
@@ -99,7 +100,23 @@ impl Config {
             Mode::Default => {}
         }
         layers.push((file, text));
-        overlay::parse(&layers)
+        let config: Self = overlay::parse(&layers)?;
+        if config.mode != mode {
+            let (asked, found) = (mode.name(), config.mode.name());
+            return Err(Error::new(format!("{file}: mode: expected {asked}, found a file of mode {found}")));
+        }
+        check::check(&config).map_err(|error| error.within(file))?;
+        Ok(config)
+    }
+
+    /// The configuration that a run wrote beside its output: its mode is the one it names.
+    ///
+    /// # Errors
+    /// As [`Config::with_overlay`].
+    pub fn of_run(text: &str, file: &str) -> Result<Self, Error> {
+        let named =
+            |mode: &Mode| text.lines().any(|line| line.trim() == format!("mode = \"{}\"", mode.name()));
+        Self::with_overlay(Mode::ALL.into_iter().find(named).unwrap_or(Mode::Default), text, file)
     }
 
     /// The same as TOML text, as every run writes it beside its output.
@@ -123,8 +140,7 @@ mod tests {
         for mode in Mode::ALL {
             let config = Config::for_mode(mode);
             assert_eq!(config.mode, mode);
-            let again = Config::with_overlay(mode, &config.to_toml(), "config.toml").unwrap();
-            assert_eq!(again, config);
+            assert_eq!(Config::of_run(&config.to_toml(), "config.toml").unwrap(), config);
         }
     }
 
@@ -134,6 +150,13 @@ mod tests {
         let message = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
         assert!(message.starts_with("lab.toml:4:"), "{message}");
         assert!(message.contains("nome") && message.contains("position_m"), "{message}");
+    }
+
+    #[test]
+    fn a_file_of_another_mode_is_refused() {
+        let text = Config::for_mode(Mode::Default).to_toml();
+        let message = Config::with_overlay(Mode::Paper, &text, "config.toml").unwrap_err().to_string();
+        assert!(message.contains("expected paper, found a file of mode default"), "{message}");
     }
 
     #[test]

@@ -119,7 +119,7 @@ pub struct Simulate {
     #[command(flatten)]
     pub crowd: CrowdArgs,
     /// How many scenes.
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: u32,
     /// Replay these trajectories in place of a crowd: TrajNet++ ndjson, CSV `t_s,id,x_m,y_m[,height_m]`, or
     /// PeTrack text. One scene a file.
@@ -180,7 +180,7 @@ pub struct Evaluate {
     #[arg(long, value_name = "FILE", requires = "dir", conflicts_with = "truth")]
     pub labels: Option<PathBuf>,
     /// Simulate and run this many scenes of each preset in memory, and score them.
-    #[arg(long, value_name = "N", conflicts_with = "dir")]
+    #[arg(long, value_name = "N", conflicts_with = "dir", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: Option<u32>,
     /// The crowds of --scenes: orca-03, orca-06, mixed; several with commas.
     #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
@@ -201,6 +201,9 @@ pub struct Evaluate {
     pub mode: Vec<Mode>,
     #[command(flatten)]
     pub site: SiteArgs,
+    /// Weights of the LSTM in place of the embedded ones; those that `run` was given.
+    #[arg(long, value_name = "FILE")]
+    pub weights: Option<PathBuf>,
     /// Where the report goes.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -5,12 +5,18 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use umbracast::lidar::{Assembler, Cloud, Frame, Packet, Scan};
-use umbracast::{Config, Error, Health, Mode, STEP_NS, Site};
+use umbracast::{Config, Error, Health, STEP_NS, Site};
 use umbracast_io::pcap::{DATA_PORT, PcapReader};
 use umbracast_io::pcd::read_pcd;
 use umbracast_io::recording::{Entry, RecordingReader};
 
 use crate::setup;
+
+/// The number of the scene in the name that `simulate` gives a recording, `scene-0003.mcap`.
+pub fn scene_number(input: &Input) -> Option<u32> {
+    let Input::Recording(file) = input else { return None };
+    file.file_stem()?.to_str()?.strip_prefix("scene-")?.parse().ok()
+}
 
 /// One scene's input.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,10 +34,16 @@ pub enum Input {
 /// # Errors
 /// A file of another kind, or a folder without input.
 pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
-    let mut files = Vec::new();
+    let (mut files, mut folders_of_clouds) = (Vec::new(), Vec::new());
     for path in paths {
         if path.is_dir() {
             let found = folder(path)?;
+            let clouds: Vec<PathBuf> =
+                found.iter().filter(|file| file.extension().is_some_and(|e| e == "pcd")).cloned().collect();
+            if !clouds.is_empty() {
+                folders_of_clouds.push(Input::Clouds(clouds));
+                continue;
+            }
             if found.is_empty() {
                 return Err(Error::new("expected .mcap, .pcd or .pcap files in the folder, found none")
                     .within(path.display()));
@@ -52,6 +64,7 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
             }
         }
     }
+    scenes.extend(folders_of_clouds);
     if !clouds.is_empty() {
         setup::sort_naturally(&mut clouds);
         scenes.push(Input::Clouds(clouds));
@@ -85,7 +98,7 @@ impl Input {
         match reader.next_entry()? {
             Some(Entry::Config(text)) => {
                 let place = format!("{}: recorded configuration", file.display());
-                Ok(Some(Config::with_overlay(Mode::Default, &text, &place)?.site))
+                Ok(Some(Config::of_run(&text, &place)?.site))
             }
             _ => Ok(None),
         }
@@ -143,7 +156,8 @@ fn clouds(files: &[PathBuf], site: &Site, health: &mut Health, sink: Sink) -> Re
         return Err(Error::new(format!("clouds: expected a site with 1 sensor, found {found}"))
             .within(files[0].display()));
     };
-    let by_name = files.iter().all(|file| setup::number_of(file).is_some());
+    // Longer numbers are times, which are no frame numbers.
+    let by_name = files.iter().all(|file| setup::number_of(file).is_some_and(|n| n < 1_000_000_000));
     for (count, file) in files.iter().enumerate() {
         let index = setup::number_of(file).filter(|_| by_name).unwrap_or(count as u64);
         let time_ns = (index as i64 + 1) * STEP_NS;

@@ -18,6 +18,12 @@ pub fn config(mode: Mode, site: Option<&Path>) -> Result<Config, Error> {
     Config::with_overlay(mode, &read_text(path)?, &path.display().to_string())
 }
 
+/// The configuration that a run wrote into its folder.
+pub fn config_of_run(folder: &Path) -> Result<Config, Error> {
+    let path = folder.join("config.toml");
+    Config::of_run(&read_text(&path)?, &path.display().to_string())
+}
+
 /// The weights given, or the embedded ones.
 pub fn weights(file: Option<&Path>) -> Result<Weights, Error> {
     match file {

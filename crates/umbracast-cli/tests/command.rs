@@ -116,6 +116,46 @@ fn simulate_run_evaluate_inspect() {
 }
 
 #[test]
+fn scenes_in_memory_and_from_recordings_score_the_same() {
+    let folder = folder("memory_and_files");
+    let sim = simulate(&folder, "0");
+    let out = folder.join("out");
+    done(&["run", text(&sim), "--out", text(&out)]);
+    let scores = |arguments: &[&str]| {
+        let json: serde_json::Value = serde_json::from_str(&done(arguments)).expect("scores are JSON");
+        let group = &json["groups"][0];
+        let of_run = |links: &&serde_json::Value| links["predictor"] == "run";
+        let links: Vec<_> =
+            group["links"].as_array().expect("links").iter().filter(of_run).cloned().collect();
+        assert_eq!(links.len(), 2, "one an access point");
+        (links, group["modes"].clone())
+    };
+    let trajectories = folder.join("crossing.csv");
+    let memory = scores(&[
+        "evaluate",
+        "--trajectories",
+        text(&trajectories),
+        "--seed",
+        "7",
+        "--mode",
+        "default",
+        "--json",
+    ]);
+    assert_eq!(memory, scores(&["evaluate", text(&out), "--truth", text(&sim), "--json"]));
+}
+
+#[test]
+fn a_recording_keeps_its_number() {
+    let folder = folder("its_number");
+    let sim = simulate(&folder, "0");
+    fs::rename(sim.join("scene-0000.mcap"), sim.join("scene-0003.mcap")).expect("renames");
+    let out = folder.join("out");
+    done(&["run", text(&sim), "--csv", "--out", text(&out)]);
+    let tracks = fs::read_to_string(out.join("tracks.csv")).expect("tracks");
+    assert!(tracks.lines().nth(1).is_some_and(|row| row.starts_with("3,")), "{tracks}");
+}
+
+#[test]
 fn a_truncated_recording_gives_what_is_whole_and_code_3() {
     let folder = folder("truncated");
     let sim = simulate(&folder, "0");

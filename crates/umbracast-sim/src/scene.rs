@@ -81,7 +81,8 @@ impl Scene {
     /// # Errors
     /// A sensor that cannot be simulated.
     pub fn empty(site: &Site, seed: u64, frames: u64) -> Result<Vec<Vec<Vec<Packet>>>, Error> {
-        let mut sensors = Sensors::new(site, stream(seed, "sensors", 0).next_u64())?;
+        // Noise of its own: that of a scene with the same seed must not be in the background it is seen against.
+        let mut sensors = Sensors::new(site, stream(seed, "empty hall", 0).next_u64())?;
         Ok((0..frames).map(|index| sensors.frame(index, &[]).0).collect())
     }
 

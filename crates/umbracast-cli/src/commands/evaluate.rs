@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use umbracast::{Config, Error, Health, Mode};
+use umbracast::forecast::Weights;
+use umbracast::{Config, Error, Health};
 use umbracast_eval::chain::{self, SceneSpec, Spec};
 use umbracast_eval::labels;
 use umbracast_eval::pooled::{self, Scores, pool};
@@ -44,7 +45,8 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
                 .iter()
                 .map(|&mode| setup::config(mode, args.site.site.as_deref()))
                 .collect::<Result<Vec<Config>, _>>()?;
-            in_memory(configs, scenes, args.out.as_deref(), common)
+            let weights = setup::weights(args.weights.as_deref())?;
+            in_memory(configs, weights, scenes, args.out.as_deref(), common)
         }
     }
 }
@@ -52,12 +54,12 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
 /// Simulates, runs and scores without files. The ladder is climbed where there is a report to draw it in.
 pub fn in_memory(
     configs: Vec<Config>,
+    weights: Weights,
     scenes: Vec<SceneSpec>,
     out: Option<&Path>,
     common: &Common,
 ) -> Result<Ending, Error> {
-    let spec =
-        Spec { configs, weights: Some(setup::weights(None)?), scenes, keep: Some(0), ladder: out.is_some() };
+    let spec = Spec { configs, weights: Some(weights), scenes, keep: Some(0), ladder: out.is_some() };
     let progress = bar(0, "frames", common.quiet);
     let results = setup::with_threads(common.threads, || {
         chain::run(&spec, |done| {
@@ -83,8 +85,7 @@ pub fn in_memory(
 
 /// Scores the tables of a run against those of its truth, scene by scene.
 fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Result<Ending, Error> {
-    let path = dir.join("config.toml");
-    let config = Config::with_overlay(Mode::Default, &setup::read_text(&path)?, &path.display().to_string())?;
+    let config = setup::config_of_run(dir)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut scenes: BTreeMap<u32, (SceneTruth, SceneRun)> = BTreeMap::new();
     for row in tables::read::<PeopleRow>(truth, &names)? {
@@ -99,11 +100,14 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
     for row in tables::read::<LinkRow>(dir, &names)? {
         scenes.entry(row.scene).or_default().1.links.push(row);
     }
-    let weights = setup::weights(None)?;
+    let weights = setup::weights(args.weights.as_deref())?;
+    // What the whole run skipped is told with its first scene.
+    let mut told = about_run(dir)?.health;
     let scores = scenes
         .iter()
         .map(|(&number, (truth, run))| {
-            let run = ModeRun { config: &config, rows: run, health: Health::default() };
+            let health = std::mem::take(&mut told);
+            let run = ModeRun { config: &config, rows: run, health };
             score_scene(number, "recorded", truth, &[run], Some(&weights), None)
         })
         .collect::<Result<Vec<SceneScore>, _>>()?;
@@ -121,14 +125,20 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
 
 /// Stage 1 against people labelled by hand.
 fn against_labels(dir: &Path, file: &Path, common: &Common) -> Result<Ending, Error> {
-    let path = dir.join("config.toml");
-    let config = Config::with_overlay(Mode::Default, &setup::read_text(&path)?, &path.display().to_string())?;
+    let config = setup::config_of_run(dir)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let pose = config.site.sensors[0].site_from_sensor();
     let labels = labels::parse(&setup::read_text(file)?, &pose, &file.display().to_string())?;
     let tracks: Vec<TrackRow> = tables::read(dir, &names)?;
-    let run_frames = frames_of_run(dir)?;
-    let labels: Vec<_> = labels.into_iter().filter(|row| run_frames.contains(&row.frame)).collect();
+    let run_frames: BTreeSet<u64> = about_run(dir)?.frame_numbers.into_iter().flatten().collect();
+    // The hall is what is watched; not every mode cuts what lies outside.
+    let hall = config.site.hall;
+    let watched = |x_m: f64, y_m: f64| 2.0 * x_m.abs() <= hall.length_m && 2.0 * y_m.abs() <= hall.width_m;
+    let tracks: Vec<TrackRow> = tracks.into_iter().filter(|row| watched(row.x_m, row.y_m)).collect();
+    let labels: Vec<PeopleRow> = labels
+        .into_iter()
+        .filter(|row| run_frames.contains(&row.frame) && watched(row.x_m, row.y_m))
+        .collect();
     let score = labels::score(&labels, &tracks);
     let percent = |share: Option<f64>| share.map_or("-".to_owned(), |s| format!("{s:.3}"));
     if common.json {
@@ -150,16 +160,18 @@ fn against_labels(dir: &Path, file: &Path, common: &Common) -> Result<Ending, Er
     Ok(Ending::Done)
 }
 
-/// The frames that a run has seen, also those without a track, from its `run.json`.
-fn frames_of_run(dir: &Path) -> Result<BTreeSet<u64>, Error> {
-    #[derive(serde::Deserialize)]
-    struct Frames {
-        frame_numbers: Vec<Vec<u64>>,
-    }
+/// What a run says of itself in `run.json`.
+#[derive(serde::Deserialize)]
+struct AboutRun {
+    /// By scene: every frame, also those without a track.
+    frame_numbers: Vec<Vec<u64>>,
+    health: Health,
+}
+
+fn about_run(dir: &Path) -> Result<AboutRun, Error> {
     let path = dir.join("run.json");
-    let frames: Frames = serde_json::from_slice(&setup::read(&path)?)
-        .map_err(|e| Error::new(format!("expected what `run` writes, found: {e}")).within(path.display()))?;
-    Ok(frames.frame_numbers.into_iter().flatten().collect())
+    serde_json::from_slice(&setup::read(&path)?)
+        .map_err(|e| Error::new(format!("expected what `run` writes, found: {e}")).within(path.display()))
 }
 
 /// Scores to stdout, the report into a folder where one is given.

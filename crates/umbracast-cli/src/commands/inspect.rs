@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde_json::json;
 use umbracast::forecast::Weights;
-use umbracast::{Config, Error, Mode};
+use umbracast::{Config, Error};
 use umbracast_io::pcap::PcapReader;
 use umbracast_io::pcd::read_pcd;
 use umbracast_io::recording::{Entry, RecordingReader};
@@ -68,8 +68,7 @@ fn look(file: &Path) -> Result<Findings, Error> {
             found.say("bytes", bytes()?.len());
         }
         "toml" => {
-            let config =
-                Config::with_overlay(Mode::Default, &setup::read_text(file)?, &file.display().to_string())?;
+            let config = Config::of_run(&setup::read_text(file)?, &file.display().to_string())?;
             found.say("kind", "configuration");
             found.say("mode", config.mode.name());
             found.say("site", &config.site.name);
@@ -115,7 +114,7 @@ fn recording(file: &Path, found: &mut Findings) -> Result<(), Error> {
     while let Some(entry) = reader.next_entry()? {
         let (topic, things) = match entry {
             Entry::Config(text) => {
-                let config = Config::with_overlay(Mode::Default, &text, &file.display().to_string())?;
+                let config = Config::of_run(&text, &file.display().to_string())?;
                 found.say("site", config.site.name);
                 continue;
             }

@@ -31,11 +31,22 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let inputs = input::scenes(&args.inputs)?;
     let mut config = setup::config(args.mode, args.site.site.as_deref())?;
     // A recording brings its site with it; a file given goes before it.
-    if let (None, Some(site)) = (&args.site.site, inputs[0].site()?) {
-        config.site = site;
+    if args.site.site.is_none() {
+        for (number, input) in inputs.iter().enumerate() {
+            let Some(site) = input.site()? else { continue };
+            if number > 0 && site != config.site {
+                let (expected, found) = (&config.site.name, &site.name);
+                let story = format!(
+                    "site: expected {expected:?} as in the first recording, found another, {found:?}"
+                );
+                return Err(Error::new(story).within(format_args!("{input:?}")));
+            }
+            config.site = site;
+        }
     }
     let weights = setup::weights(args.weights.as_deref())?;
-    let empty = empty_frames(args, &inputs[0], &config)?;
+    let (mut health, mut lost) = (Health::default(), Vec::new());
+    let empty = empty_frames(args, &inputs[0], &config, &mut health, &mut lost)?;
     setup::make_dir(&args.out)?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let watch = Stopwatch::start();
@@ -43,8 +54,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let mut tracks = TableWriter::<TrackRow>::create(&args.out, &names, args.csv)?;
     let mut links = TableWriter::<LinkRow>::create(&args.out, &names, args.csv)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
-    let (mut health, mut lost, mut step_s) = (Health::default(), Vec::new(), Vec::new());
-    let mut frames = Vec::new();
+    let (mut step_s, mut frames) = (Vec::new(), Vec::new());
     let run_all = || -> Result<(), Error> {
         let mut take = |mut done: Done| {
             health.add(&done.health);
@@ -55,7 +65,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         };
         if let [input] = &inputs[..] {
             // A single input may go on for ever: its rows are written as they come.
-            take(run_scene(0, input, &config, &weights, &empty, |rows| {
+            take(run_scene(number_of(0, input), input, &config, &weights, &empty, |rows| {
                 tracks.write(&rows.tracks)?;
                 links.write(&rows.links)?;
                 (rows.tracks.clear(), rows.links.clear());
@@ -67,7 +77,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         for some in numbered.chunks(rayon::current_num_threads()) {
             let scene = |&(number, input): &(usize, &Input)| {
                 let mut all = SceneRun::default();
-                let done = run_scene(number as u32, input, &config, &weights, &empty, |rows| {
+                let done = run_scene(number_of(number, input), input, &config, &weights, &empty, |rows| {
                     all.tracks.append(&mut rows.tracks);
                     all.links.append(&mut rows.links);
                     Ok(())
@@ -121,6 +131,11 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     Ok(Ending::Done)
 }
 
+/// A recording's own number, so that its rows meet its truth; else its place among the inputs.
+fn number_of(place: usize, input: &Input) -> u32 {
+    input::scene_number(input).unwrap_or(place as u32)
+}
+
 fn run_scene(
     scene: u32,
     input: &Input,
@@ -150,7 +165,13 @@ fn run_scene(
 }
 
 /// The recording without people: as given, else `empty.mcap` beside the first recording.
-fn empty_frames(args: &Run, first: &Input, config: &Config) -> Result<Vec<Frame>, Error> {
+fn empty_frames(
+    args: &Run,
+    first: &Input,
+    config: &Config,
+    health: &mut Health,
+    lost: &mut Vec<String>,
+) -> Result<Vec<Frame>, Error> {
     let beside = || -> Option<PathBuf> {
         let Input::Recording(file) = first else { return None };
         Some(file.parent().unwrap_or(Path::new(".")).join("empty.mcap")).filter(|path| path.is_file())
@@ -159,9 +180,9 @@ fn empty_frames(args: &Run, first: &Input, config: &Config) -> Result<Vec<Frame>
         return Ok(Vec::new());
     };
     let mut frames = Vec::new();
-    Input::Recording(file).frames(&config.site, &mut Health::default(), |frame| {
+    lost.extend(Input::Recording(file).frames(&config.site, health, |frame| {
         frames.push(frame.clone());
         Ok(())
-    })?;
+    })?);
     Ok(frames)
 }

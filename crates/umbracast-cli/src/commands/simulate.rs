@@ -32,7 +32,7 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     setup::make_dir(&args.out)?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let watch = Stopwatch::start();
-    record_empty(&config, &args.out.join("empty.mcap"), args.clouds, seed)?;
+    record_empty(&config, &args.out.join("empty.mcap"), args.clouds)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut people = TableWriter::<PeopleRow>::create(&args.out, &names, args.csv)?;
     let mut links = TableWriter::<PeopleLinkRow>::create(&args.out, &names, args.csv)?;
@@ -63,9 +63,9 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
 }
 
 /// The hall without people.
-fn record_empty(config: &Config, path: &Path, clouds: bool, seed: u64) -> Result<(), Error> {
+fn record_empty(config: &Config, path: &Path, clouds: bool) -> Result<(), Error> {
     let mut writer = Recorder::create(path, config, clouds)?;
-    for (index, packets) in Scene::empty(&config.site, seed, EMPTY_FRAMES)?.iter().enumerate() {
+    for (index, packets) in Scene::empty(&config.site, TEST_SEED, EMPTY_FRAMES)?.iter().enumerate() {
         writer.packets((index as i64 + 1) * umbracast::STEP_NS, packets)?;
     }
     writer.finish()

@@ -1,0 +1,71 @@
+//! Values of the right kind that cannot work.
+
+use super::Config;
+use crate::Error;
+
+/// Refuses them with key, what was expected and what was found.
+pub(super) fn check(config: &Config) -> Result<(), Error> {
+    let (track, detect, blockage) = (&config.track, &config.detect, &config.blockage);
+    if track.acceleration_m2ps3.is_empty() || track.acceleration_m2ps3.len() != track.model_share.len() {
+        return Err(Error::new(format!(
+            "track: expected one acceleration_m2ps3 and one model_share for each motion model, found {} and {}",
+            track.acceleration_m2ps3.len(),
+            track.model_share.len()
+        )));
+    }
+    let positive = [
+        ("detect.cluster.radius_m", detect.cluster.radius_m),
+        ("detect.background.voxel_m", detect.background.voxel_m),
+        ("detect.background.azimuth_bin_deg", detect.background.azimuth_bin_deg),
+        ("detect.split.lambda_m", detect.split.lambda_m),
+        ("track.model_dwell_s", track.model_dwell_s),
+        ("track.noise_floor_m", track.noise_floor_m),
+        ("track.height_sigma_m", track.height_sigma_m),
+        ("track.box_average_s", track.box_average_s),
+        ("blockage.trunk_depth_m", blockage.trunk_depth_m),
+        ("blockage.trunk_width_m", blockage.trunk_width_m),
+        ("blockage.head_diameter_m", blockage.head_diameter_m),
+        ("site.hall.length_m", config.site.hall.length_m),
+        ("site.hall.width_m", config.site.hall.width_m),
+        ("site.hall.height_m", config.site.hall.height_m),
+    ];
+    for (key, value) in positive {
+        if value.is_nan() || value <= 0.0 {
+            return Err(Error::new(format!("{key}: expected more than 0, found {value}")));
+        }
+    }
+    if blockage.samples == 0 {
+        return Err(Error::new("blockage.samples: expected 1 or more, found 0"));
+    }
+    if let Some(t) = blockage.threshold.windows(2).find(|t| t[1] > t[0]) {
+        return Err(Error::new(format!(
+            "blockage.threshold: expected values that do not rise with the window (a link blocked within 600 ms \
+             is blocked within 900 ms), found {} after {}",
+            t[1], t[0]
+        )));
+    }
+    if config.site.sensors.is_empty() {
+        return Err(Error::new("site.sensors: expected one or more, found none"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Config, Mode};
+
+    #[test]
+    fn what_cannot_work_is_refused_with_its_key() {
+        for (text, key) in [
+            ("[track]\nmodel_share = [1.0]", "model_share"),
+            ("[detect.cluster]\nradius_m = 0.0", "detect.cluster.radius_m"),
+            ("[track]\nheight_sigma_m = nan", "track.height_sigma_m"),
+            ("[blockage]\nsamples = 0", "blockage.samples"),
+            ("[blockage]\nthreshold = [0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.5]", "blockage.threshold"),
+            ("[site]\nsensors = []", "site.sensors"),
+        ] {
+            let message = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
+            assert!(message.starts_with("lab.toml") && message.contains(key), "{message}");
+        }
+    }
+}
