@@ -34,8 +34,8 @@ pub fn constant_velocity_of_truth(truth: &TruthIndex, config: &Config) -> Said {
     said
 }
 
-/// Positions and velocities replaced: everybody's true state into the mode's forecast and cast. Who has a track
-/// keeps its box, moved to the true position.
+/// Positions and velocities replaced: everybody's true state into the mode's forecast and cast, also of those
+/// whom the run missed. Who has a track keeps its height and its boxes, moved to the true position.
 ///
 /// # Errors
 /// The mode's forecast needs weights and there are none.
@@ -51,12 +51,14 @@ pub fn true_state(
     let rows: BTreeMap<(u64, u64), &TrackRow> = run.tracks.iter().map(|r| ((r.frame, r.track), r)).collect();
     let (mut said, mut forecasts, mut blockages) = (Said::default(), Vec::new(), Vec::new());
     for &frame in &truth.frames {
-        let boxes = |row: &PeopleRow| {
+        let track = |row: &PeopleRow| {
             let own = matching.get(&(frame, row.person)).and_then(|track| rows.get(&(frame, *track)));
-            own.map_or_else(|| person_box(row), |own| box_moved_to(own, row))
+            match own {
+                Some(own) => with_true_state(truth, own, row, config.track.heading_speed_mps),
+                None => true_track(truth, row, person_box(row)),
+            }
         };
-        let tracks: Vec<Track> =
-            truth.people_of(frame).map(|row| true_track(truth, row, boxes(row))).collect();
+        let tracks: Vec<Track> = truth.people_of(frame).map(track).collect();
         forecaster.forecast(&tracks, &mut forecasts);
         caster.cast(&tracks, &forecasts, &mut blockages);
         said.add(frame, &blockages);
@@ -64,8 +66,8 @@ pub fn true_state(
     Ok(said)
 }
 
-/// The future replaced: the run's tracks as they are, at the steps where their persons will truly be. A track
-/// of nobody keeps its own forecast.
+/// The future replaced: the run's tracks as they are, moved to where their persons truly are and will be. A
+/// track of nobody keeps its own forecast.
 pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, config: &Config) -> Said {
     let mut caster = Caster::new(&config.blockage, &config.site);
     let person_of: BTreeMap<(u64, u64), u32> =
@@ -76,20 +78,14 @@ pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, conf
     }
     let (mut said, mut blockages) = (Said::default(), Vec::new());
     for (&frame, rows) in &by_frame {
-        let forecast = |row: &TrackRow| {
-            let mut steps = forecast_of(row);
-            if let Some(&person) = person_of.get(&(frame, row.track)) {
-                for (h, step) in (1..).zip(&mut steps) {
-                    if let Some(there) = truth.person(frame + h, person) {
-                        *step =
-                            Gaussian2 { mean_m: DVec2::new(there.x_m, there.y_m), ..Gaussian2::default() };
-                    }
-                }
+        let ahead = |row: &&TrackRow| {
+            let person = person_of.get(&(frame, row.track));
+            match person.and_then(|&person| truth.person(frame, person)) {
+                Some(person) => with_true_future(truth, row, person),
+                None => with_own_future(row, config.forecast.acceleration_psd_m2ps3),
             }
-            Forecast { track: row.track, steps, coupling: CERTAIN }
         };
-        let tracks: Vec<Track> = rows.iter().map(|row| track_of(row)).collect();
-        let forecasts: Vec<Forecast> = rows.iter().map(|row| forecast(row)).collect();
+        let (tracks, forecasts): (Vec<Track>, Vec<Forecast>) = rows.iter().map(ahead).unzip();
         caster.cast(&tracks, &forecasts, &mut blockages);
         said.add(frame, &blockages);
     }
@@ -113,6 +109,39 @@ pub fn forecast_of(row: &TrackRow) -> [Gaussian2; STEPS] {
 
 /// What is known has no spread.
 const CERTAIN: Coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd: 0.0 };
+
+/// A track with the true state of its person. Its heading follows the velocity as the tracker's does; below
+/// `heading_speed_mps` the track's own is held.
+fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, heading_speed_mps: f64) -> Track {
+    let track = true_track(truth, row, box_moved_to(own, row));
+    let walks = track.velocity_mps.length() > heading_speed_mps;
+    let heading_rad = if walks { track.velocity_mps.to_angle() } else { own.heading_rad };
+    Track { heading_rad, height_m: own.height_m, ..track }
+}
+
+/// A track at the true positions of its person, now and at every step. The present is moved as well: a body
+/// turns as its way does, and a way from an estimate to the truth would turn it by the estimate's error.
+fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow) -> (Track, Forecast) {
+    let (aabb, obb) = box_moved_to(own, now);
+    let position_m = DVec2::new(now.x_m, now.y_m);
+    let track = Track { position_m, aabb, obb, ..track_of(own) };
+    let offset_m = position_m - DVec2::new(own.x_m, own.y_m);
+    let mut steps = forecast_of(own);
+    for (h, step) in (1..).zip(&mut steps) {
+        // Who has left the scene goes on as foreseen.
+        let there = truth.person(now.frame + h, now.person);
+        let mean_m = there.map_or(step.mean_m + offset_m, |there| DVec2::new(there.x_m, there.y_m));
+        *step = Gaussian2 { mean_m, ..Gaussian2::default() };
+    }
+    (track, Forecast { track: own.track, steps, coupling: CERTAIN })
+}
+
+/// A track with its own forecast and the spread that the forecaster gave it.
+fn with_own_future(own: &TrackRow, acceleration_psd: f64) -> (Track, Forecast) {
+    let track = track_of(own);
+    let coupling = Coupling { state: track.covariance, acceleration_psd };
+    (track, Forecast { track: own.track, steps: forecast_of(own), coupling })
+}
 
 /// A person of the truth as the tracker would see him if it made no error.
 fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb)) -> Track {
@@ -190,7 +219,7 @@ fn track_of(row: &TrackRow) -> Track {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::truth_of;
+    use crate::hand_made::{track_row, truth_of};
     use crate::instances::instances;
     use crate::scene::SceneTruth;
     use umbracast::Mode;
@@ -229,6 +258,60 @@ mod tests {
         let (run, matching) = (SceneRun::default(), Matching::new());
         let said = true_state(&index, &run, &matching, &config, None).unwrap();
         assert!(said_of_person_0(&said, &truth)[3]);
+    }
+
+    /// Person 1 of the crossing at frame 9 and a track of it: off to the side, taller, and turned.
+    fn track_beside(truth: &TruthIndex) -> (PeopleRow, TrackRow) {
+        let row = *truth.person(9, 1).unwrap();
+        let own =
+            TrackRow { height_m: 1.9, heading_rad: 0.3, ..track_row(9, 7, row.x_m + 0.4, row.y_m - 0.1) };
+        (row, own)
+    }
+
+    #[test]
+    fn an_error_of_the_present_turns_nobody_whose_future_is_known() {
+        let (truth, _) = crossing();
+        let index = TruthIndex::new(&truth);
+        let (row, own) = track_beside(&index);
+        let (track, forecast) = with_true_future(&index, &own, &row);
+        let (first, last) = (forecast.steps[0].mean_m - track.position_m, forecast.steps[8].mean_m);
+        assert!(first.angle_to(last - forecast.steps[7].mean_m).abs() < 1e-9, "{first}");
+        assert!(track.aabb.min_m.abs_diff_eq(DVec3::new(-0.4, 0.1, 0.0), 1e-9), "{}", track.aabb.min_m);
+        assert_eq!((track.heading_rad, track.height_m), (0.3, 1.9));
+        assert_eq!(forecast.coupling, CERTAIN);
+    }
+
+    #[test]
+    fn a_track_of_nobody_keeps_its_forecast_and_its_spread() {
+        let (truth, config) = crossing();
+        let index = TruthIndex::new(&truth);
+        // Person 0 is followed. Nobody's track stands in the way, if only it were known where: it hardly is.
+        let (mut run, mut matching) = (SceneRun::default(), Matching::new());
+        let standing = |track, x_m: f64| TrackRow {
+            height_m: 1.8,
+            steps: [[x_m, 0.0, 0.0, 0.0, 0.0]; STEPS],
+            ..track_row(9, track, x_m, 0.0)
+        };
+        let mut nobody = standing(8, -1.0);
+        [nobody.covariance[0], nobody.covariance[4]] = [4.0, 4.0];
+        run.tracks = vec![standing(7, 0.0), nobody];
+        matching.insert((9, 0), 7);
+        let instances = instances(&index);
+        let said = true_future(&index, &run, &matching, &config).of_tracks(&instances, &matching);
+        assert!(said[0].p[0] > 0.0 && said[0].p[0] < 0.5, "{:?}", said[0].p);
+        let (_, forecast) = with_own_future(&run.tracks[1], 0.2);
+        assert_eq!((forecast.coupling.state[1][1], forecast.coupling.acceleration_psd), (4.0, 0.2));
+    }
+
+    #[test]
+    fn the_true_state_leaves_a_track_its_height_and_who_stands_his_heading() {
+        let (truth, _) = crossing();
+        let index = TruthIndex::new(&truth);
+        let (row, own) = track_beside(&index);
+        let track = with_true_state(&index, &own, &row, 0.3);
+        assert_eq!((track.position_m, track.height_m), (DVec2::new(row.x_m, row.y_m), 1.9));
+        assert_eq!(track.heading_rad, std::f64::consts::FRAC_PI_2);
+        assert_eq!(with_true_state(&index, &own, &row, 1.1).heading_rad, 0.3);
     }
 
     #[test]

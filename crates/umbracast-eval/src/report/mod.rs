@@ -2,6 +2,7 @@
 
 pub mod published;
 pub mod tables;
+mod ladder_table;
 mod plot;
 mod figures;
 mod one_scene;
@@ -24,7 +25,7 @@ pub struct Context<'a> {
     pub command: &'a str,
     /// The scene that is shown by itself.
     pub kept: Option<Kept<'a>>,
-    /// Why rungs of the ladder differ from the reference: (oracle, reason).
+    /// Why rungs of the ladder lie below the reference: (oracle, reason).
     pub explanations: &'a [(String, String)],
 }
 
@@ -87,7 +88,8 @@ fn tables(scores: &Scores, context: &Context) -> Vec<Table> {
         all.push(tables::baselines(group, access_point));
         all.push(tables::budget(group, access_point));
     }
-    all.extend(tables::ladder(scores, context.explanations));
+    let site = context.configs.first().map(|config| &config.site);
+    all.extend(ladder_table::ladder(scores, site, context.explanations));
     all.push(tables::health(group));
     all
 }

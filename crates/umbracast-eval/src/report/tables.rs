@@ -27,12 +27,12 @@ pub struct Table {
 const SHORT_WINDOWS: [usize; 4] = [1, 3, 8, 9];
 
 impl Table {
-    fn new(title: impl Into<String>, words: usize, header: &[&str]) -> Self {
+    pub(super) fn new(title: impl Into<String>, words: usize, header: &[&str]) -> Self {
         let header = header.iter().map(|&name| name.to_owned()).collect();
         Self { title: title.into(), words, header, ..Self::default() }
     }
 
-    fn noted(mut self, note: impl Into<String>) -> Self {
+    pub(super) fn noted(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
@@ -212,8 +212,8 @@ pub fn budget(group: &Group, access_point: &str) -> Table {
     let shown = [Predictor::Run, Predictor::TrueState, Predictor::TrueFuture, Predictor::TrueBody];
     compared(group, access_point, &shown, format!("Error budget, access point {access_point}")).noted(
         "One stage at a time replaced by the truth, the rest as in the mode: positions and velocities into \
-         forecast and cast; the true future into the cast; the true walking mesh at the forecast position (yes \
-         or no at the mean).",
+         forecast and cast, people whom the mode missed included; the true positions from now on into the cast; \
+         the true walking mesh at the forecast position (yes or no at the mean).",
     )
 }
 
@@ -256,77 +256,6 @@ fn compared(group: &Group, access_point: &str, shown: &[Predictor], title: Strin
     table
 }
 
-/// The ladder of oracles beside what was measured before, on the preset it was measured with where there is one.
-/// `explanations` are (oracle, why it differs).
-pub fn ladder(scores: &Scores, explanations: &[(String, String)]) -> Option<Table> {
-    let same_preset = scores.groups.iter().find(|group| group.name == published::LADDER_PRESET);
-    let group = same_preset.or(scores.headline())?;
-    let mut oracles: Vec<&str> = Vec::new();
-    for row in &group.ladder {
-        if !oracles.contains(&row.oracle) {
-            oracles.push(row.oracle);
-        }
-    }
-    let header = [
-        "what is known",
-        "access point",
-        "window",
-        "base rate",
-        "F1",
-        "reference",
-        "onset F1",
-        "reference",
-        "differs",
-    ];
-    let mut table = Table::new(format!("Ladder of oracles: {}", scenes(group)), 3, &header);
-    let mut apart = Vec::new();
-    for (oracle, reference) in oracles.iter().zip(published::LADDER) {
-        for ((access_point, w), (f1, onset)) in published::LADDER_AT.into_iter().zip(reference) {
-            let at = |row: &&crate::ladder::LadderRow| {
-                row.oracle == *oracle && row.access_point == access_point && row.window == w
-            };
-            let Some(row) = group.ladder.iter().find(at) else { continue };
-            let far = |found: Option<f64>, expected: f64| {
-                found.is_some_and(|found| (found - expected).abs() > published::LADDER_TOLERANCE)
-            };
-            let differs = far(row.f1, f1) || far(row.onset_f1, onset);
-            if differs && !apart.contains(oracle) {
-                apart.push(*oracle);
-            }
-            table.rows.push(vec![
-                (*oracle).to_owned(),
-                access_point.to_owned(),
-                window(w),
-                number(row.base_rate, 3),
-                number(row.f1, 3),
-                number(Some(f1), 3),
-                number(row.onset_f1, 3),
-                number(Some(onset), 3),
-                if differs { "yes".to_owned() } else { String::new() },
-            ]);
-        }
-    }
-    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-    for oracle in apart {
-        let known = explanations.iter().find(|(name, _)| name == oracle);
-        let why = known.map_or("not explained yet", |(_, why)| why.as_str());
-        match reasons.iter_mut().find(|(reason, _)| *reason == why) {
-            Some((_, oracles)) => oracles.push(oracle),
-            None => reasons.push((why, vec![oracle])),
-        }
-    }
-    let explained: Vec<String> =
-        reasons.iter().map(|(why, oracles)| format!("{}: {why}.", oracles.join("; "))).collect();
-    let note = format!(
-        "Reference: an earlier measurement with bodies of 18 capsules on {}. Marked where F1 or onset \
-         F1 lies more than {:.2} apart. {}",
-        published::LADDER_PRESET,
-        published::LADDER_TOLERANCE,
-        explained.join(" ")
-    );
-    (!table.rows.is_empty()).then(|| table.noted(note.trim_end()))
-}
-
 /// What was counted and skipped, by mode.
 pub fn health(group: &Group) -> Table {
     let named = |mode: &ModeScores| serde_json::to_value(mode.health).unwrap_or_default();
@@ -358,7 +287,7 @@ fn with_interval(score: &Estimate) -> String {
 }
 
 /// A dash where it is not defined.
-fn number(value: Option<f64>, digits: usize) -> String {
+pub(super) fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
 }
 
@@ -367,11 +296,11 @@ fn mean(values: &[Option<f64>]) -> Option<f64> {
     (!values.is_empty()).then(|| sum / values.len() as f64)
 }
 
-fn window(w: usize) -> String {
+pub(super) fn window(w: usize) -> String {
     format!("{} ms", w * 100)
 }
 
-fn scenes(group: &Group) -> String {
+pub(super) fn scenes(group: &Group) -> String {
     let s = if group.scenes == 1 { "" } else { "s" };
     format!("{}, {} scene{s}, {} frames", group.name, group.scenes, group.frames)
 }
