@@ -3,7 +3,7 @@
 //! What is seen is the side toward the sensors, and legs and arms swing. So every point first moves away from its
 //! own sensor by a constant; the rest is a linear model of what the points look like and where the person walks,
 //! in a frame along the line of sight. Its coefficients were fitted on simulated returns by
-//! `cargo run --release -p umbracast-sim --example fit_bias`: error of a single frame 0.038 m on scenes of their
+//! `cargo run --release -p umbracast-eval --example fit_bias`: error of a single frame 0.038 m on scenes of their
 //! own (all presets and pairs), 0.046 m with the constant alone, 0.083 m for the mean of the points.
 
 use super::Point;

@@ -1,6 +1,6 @@
 //! Fits the linear model of `umbracast::detect::bias` on simulated returns and prints its coefficients.
 //!
-//! `cargo run --release -p umbracast-sim --example fit_bias -- [SCENES]` (3 of each preset and of pairs by default)
+//! `cargo run --release -p umbracast-eval --example fit_bias -- [SCENES]` (3 of each preset and of pairs by default)
 //! Training scenes have the seeds 110,000 and on, the scenes that the errors are printed for 120,000 and on.
 
 use umbracast::Health;

@@ -1,7 +1,7 @@
 //! Scores stage 1 up to the detections on simulated scenes: recall, precision and position error of single frames,
 //! against the truth at each detection's own time.
 //!
-//! `cargo run --release -p umbracast-sim --example detect_score -- [--mode default] [--preset orca-03]
+//! `cargo run --release -p umbracast-eval --example detect_score -- [--mode default] [--preset orca-03]
 //! [--people 10] [--scenes 3] [--seed 100000] [--online] [--pairs] [--gap_cm 50] [--tracker] [--misses] [--points FILE]`
 //!
 //! Without `--tracker` the priors are empty. `--points` writes the foreground as CSV for a closer look.
