@@ -134,6 +134,24 @@ fn walkers_are_found_while_the_scene_is_learned() {
 }
 
 #[test]
+fn who_stands_at_the_start_is_seen_whole_once_they_walk() {
+    let config = config(Mode::Default);
+    let (mut chain, mut knowing) = (Chain::new(&config), Chain::new(&config));
+    knowing.background.learn_empty(&frame(&config, 0, &[]));
+    for k in 0..8 {
+        chain.step(&frame(&config, k, &PEOPLE_M), &[]);
+        assert!(chain.detections.is_empty());
+    }
+    for k in 8..12 {
+        let walkers = PEOPLE_M.map(|p| p + DVec2::new(0.0, 0.1 * (k - 7) as f64));
+        chain.step(&frame(&config, k, &walkers), &[]);
+        knowing.step(&frame(&config, k, &walkers), &[]);
+    }
+    let (seen, whole) = (chain.points.len(), knowing.points.len());
+    assert!(seen as f64 > 0.8 * whole as f64, "{seen} of {whole} points");
+}
+
+#[test]
 fn who_stands_still_is_learned_unless_expected_there() {
     let config = config(Mode::Default);
     let standing = [PEOPLE_M[0]];

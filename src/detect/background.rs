@@ -97,7 +97,7 @@ impl Background {
                 self.known = true;
                 let mut nothing = Vec::new();
                 for scan in &frame.scans {
-                    let learn = Learn { priors: &[], freeze_m: 0.0 };
+                    let learn = Learn { on_the_way: false, priors: &[], freeze_m: 0.0 };
                     self.scan(scan, Some(learn), &mut Health::default(), &mut nothing);
                 }
             }
@@ -121,8 +121,9 @@ impl Background {
         points.clear();
         match self.config.method {
             BackgroundMethod::RangeImage => {
+                let learn = Learn { on_the_way: true, priors, freeze_m: self.config.freeze_m };
                 for scan in &frame.scans {
-                    let learn = (!self.known).then_some(Learn { priors, freeze_m: self.config.freeze_m });
+                    let learn = (!self.known).then_some(learn);
                     self.scan(scan, learn, health, points);
                 }
             }
@@ -209,9 +210,13 @@ impl Background {
     }
 }
 
-/// Where nothing may be learned.
+/// What may be learned.
 #[derive(Clone, Copy)]
 struct Learn<'a> {
+    /// Not from an empty scan. Then returns nearer than the sensor's range are learned too, though never new: behind
+    /// somebody beside the sensor the scene is unknown, not empty, and what appears there later is no person.
+    on_the_way: bool,
+    /// Where somebody is expected nothing is learned.
     priors: &'a [Prior],
     freeze_m: f64,
 }
@@ -275,6 +280,9 @@ impl SensorModel {
                 }
                 if !(range_m >= range_min_m && range_m <= range_max_m) {
                     health.points_invalid += 1;
+                    if range_m > 0.0 && range_m < range_min_m && learn.is_some_and(|learn| learn.on_the_way) {
+                        self.ranges.observe(pixel, range_m);
+                    }
                     continue;
                 }
                 let mut frozen = false;
@@ -301,7 +309,7 @@ impl SensorModel {
         health: &mut Health,
         points: &mut Vec<Point>,
     ) {
-        self.sort_returns(cloud, health);
+        self.sort_returns(cloud, learn.is_some_and(|learn| learn.on_the_way), health);
         for i in 0..self.returns.len() {
             let Return { elevation_bin, azimuth_cdeg, range_m, point } = self.returns[i];
             // Beams sit between two bins of elevation, so both neighbours count as well.
@@ -311,7 +319,7 @@ impl SensorModel {
             let limit_m = limits_m.fold(f32::INFINITY, f32::min);
             let own = self.row_of_elevation[elevation_bin].map(pixel);
             let mut frozen = false;
-            if range_m < limit_m {
+            if range_m < limit_m && range_m >= self.range_min_m {
                 let point = unorganised_point(scan, &point);
                 if clip.holds(point.position_m) {
                     points.push(point);
@@ -324,15 +332,18 @@ impl SensorModel {
         }
     }
 
-    /// The cloud as a spinning sensor saw it, in an order that does not depend on the cloud's.
-    fn sort_returns(&mut self, cloud: &[SensorPoint], health: &mut Health) {
+    /// The cloud as a spinning sensor saw it, in an order that does not depend on the cloud's; with what is nearer
+    /// than the sensor's range where `keep_near`.
+    fn sort_returns(&mut self, cloud: &[SensorPoint], keep_near: bool, health: &mut Health) {
         self.returns.clear();
         for &point in cloud {
             let [x, y, z] = point.position_m;
             let range_m = (x * x + y * y + z * z).sqrt();
             if !(range_m >= self.range_min_m && range_m <= self.range_max_m) {
                 health.points_invalid += 1;
-                continue;
+                if !(keep_near && range_m > 0.0 && range_m < self.range_min_m) {
+                    continue;
+                }
             }
             let elevation_rad = f64::from(z / range_m).clamp(-1.0, 1.0).asin();
             let above_nadir_rad = elevation_rad + std::f64::consts::FRAC_PI_2;

@@ -7,6 +7,17 @@ use crate::config::BackgroundConfig;
 const MODES: usize = 3;
 /// A mode's mean follows at least this fast: 1/50 a revolution.
 const GAIN_MIN: f32 = 0.02;
+/// Surfaces of one body in neighbouring bins and rows are at most this far apart in range.
+const STEP_M: f32 = 0.3;
+/// Width of one row of a person: a leg or a post is narrower, furniture and walls are wider.
+const WIDTH_M: [f32; 2] = [0.2, 1.0];
+/// Revolutions without a return after which something has gone: edges flicker for one.
+const GONE: u32 = 2;
+/// A mover has gone from this share of its pixels, in this many rows, and came to the bin beside in as many as
+/// `CAME_ROWS`: leaves and edges flicker, but do not also appear on the other side.
+const GONE_SHARE: f32 = 0.2;
+const GONE_ROWS: usize = 3;
+const CAME_ROWS: usize = 2;
 
 /// One range that comes back, with how often it did.
 #[derive(Debug, Clone, Copy, Default)]
@@ -18,6 +29,22 @@ struct Mode {
     weight: f32,
     /// The last of them.
     seen: u32,
+}
+
+/// Pixels of one row that may be a person: something clearly farther is on both sides.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    row: usize,
+    /// From here on to the right, so many of them.
+    first_bin: usize,
+    bins: usize,
+    near_m: f32,
+    /// The nearer of what is beside it.
+    behind_m: f32,
+    /// Pixels that see past it now.
+    gone: usize,
+    /// True where a bin beside it has returns from its range now.
+    came: bool,
 }
 
 /// The pixels of one sensor, bin after bin, in each bin row after row: as the columns of a scan come.
@@ -134,6 +161,10 @@ impl RangeModel {
     pub fn close_revolution(&mut self, known: bool) {
         self.known |= known;
         self.revolutions += 1.0;
+        // After the first halving nothing tells any more what was there from the start.
+        if !self.known && self.count as f32 <= self.memory {
+            self.forget_movers();
+        }
         self.count = self.count.wrapping_add(1);
         if self.revolutions > self.memory {
             self.revolutions *= 0.5;
@@ -142,11 +173,90 @@ impl RangeModel {
         self.find_limits();
     }
 
+    /// Who was there from the start and walks off is background to every pixel that saw a part of them twice.
+    /// Once enough of a body has gone on, it is forgotten as a whole (video's ghost removal): what is beside each
+    /// of its rows is taken to go on behind it.
+    fn forget_movers(&mut self) {
+        let pieces: Vec<Piece> = (0..self.rows * self.bins).filter_map(|pixel| self.piece(pixel)).collect();
+        for seed in pieces.iter().filter(|piece| piece.gone > 0) {
+            let body: Vec<&Piece> = pieces.iter().filter(|piece| self.is_same_body(piece, seed)).collect();
+            let sum = |count: fn(&Piece) -> usize| body.iter().map(|piece| count(piece)).sum::<usize>();
+            let moved = sum(|piece| piece.gone) as f32 >= GONE_SHARE * sum(|piece| piece.bins) as f32;
+            let rows = sum(|piece| usize::from(piece.gone > 0));
+            if !moved || rows < GONE_ROWS || sum(|piece| usize::from(piece.came)) < CAME_ROWS {
+                continue;
+            }
+            for piece in body {
+                let weight = if piece.behind_m.is_finite() { self.revolutions } else { 0.0 };
+                let behind = Mode { range_m: piece.behind_m, spread_m: 0.0, weight, seen: self.count };
+                for bin in piece.first_bin..piece.first_bin + piece.bins {
+                    let modes = &mut self.modes[bin % self.bins * self.rows + piece.row];
+                    *modes = [Mode::default(); MODES];
+                    if weight > 0.0 {
+                        modes[0] = behind;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The piece whose left edge is this pixel.
+    fn piece(&self, pixel: usize) -> Option<Piece> {
+        let (first_bin, row) = (pixel / self.rows, pixel % self.rows);
+        let at = |bins: usize| (first_bin + bins) % self.bins * self.rows + row;
+        let (near_m, left_m) = (self.nearest_m[pixel], self.nearest_m[at(self.bins - 1)]);
+        if near_m <= 0.0 || near_m + STEP_M >= left_m {
+            return None;
+        }
+        let bin_m = near_m * std::f32::consts::TAU / self.bins as f32;
+        let bins_max = ((WIDTH_M[1] / bin_m) as usize).min(self.bins - 1);
+        let (mut last_m, mut gone, mut bins) = (near_m, 0, 0);
+        while bins <= bins_max && (self.nearest_m[at(bins)] - last_m).abs() <= STEP_M {
+            last_m = self.nearest_m[at(bins)];
+            gone += usize::from(self.has_gone(at(bins)));
+            bins += 1;
+        }
+        let right_m = self.nearest_m[at(bins)];
+        let is_person = bins <= bins_max && bins as f32 * bin_m >= WIDTH_M[0] && right_m > last_m + STEP_M;
+        let came = |bins: usize, from_m: f32| {
+            let here = |mode: &Mode| mode.seen == self.count && (mode.range_m - from_m).abs() < STEP_M;
+            self.modes[at(bins)].iter().any(here)
+        };
+        is_person.then(|| Piece {
+            row,
+            first_bin,
+            bins,
+            near_m,
+            behind_m: left_m.min(right_m),
+            gone,
+            came: came(self.bins - 1, near_m) || came(bins, last_m),
+        })
+    }
+
+    /// True where two pieces are one above the other. The order of the rows says nothing: those of clouds come
+    /// as they are first seen.
+    fn is_same_body(&self, a: &Piece, b: &Piece) -> bool {
+        let right_of = |a: &Piece, b: &Piece| (b.first_bin + self.bins - a.first_bin) % self.bins;
+        (right_of(a, b) < a.bins || right_of(b, a) < b.bins) && (a.near_m - b.near_m).abs() < STEP_M
+    }
+
+    /// True where what came back from the start on no longer does, and something farther does.
+    fn has_gone(&self, pixel: usize) -> bool {
+        let (modes, near_m) = (&self.modes[pixel], self.nearest_m[pixel]);
+        let left = |m: &Mode| {
+            m.range_m - 2.0 * m.spread_m == near_m
+                && m.weight + 1.0 >= m.seen as f32
+                && m.seen + GONE <= self.count
+        };
+        modes.iter().any(left)
+            && modes.iter().any(|m| m.seen == self.count && m.range_m > near_m + self.margin_m)
+    }
+
     fn find_limits(&mut self) {
         let unseen_m = if self.known || self.revolutions >= self.start { f32::INFINITY } else { 0.0 };
         // An empty scan is believed as it is; what walks by has to be outvoted.
         let least = self.share * self.revolutions;
-        let least = if self.known { least } else { least.max(1.5) };
+        let least = if self.known { least } else { least.max(self.revolutions.min(1.5)) };
         for (nearest, modes) in self.nearest_m.iter_mut().zip(&self.modes) {
             *nearest = nearest_m(modes, least).unwrap_or(unseen_m).min(unseen_m);
         }
@@ -172,4 +282,66 @@ fn nearest_m(modes: &[Mode; MODES], least: f32) -> Option<f32> {
         let total: f32 = modes.iter().map(|m| m.weight).sum();
         if total >= least { nearest(0.0) } else { None }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config;
+
+    const ROWS: usize = 4;
+    const NEAR_M: f32 = 5.0;
+    const FAR_M: f32 = 10.0;
+
+    /// One revolution in bins of one degree: something at 5 m in bins `first..end`, a wall at 10 m around it.
+    fn look(model: &mut RangeModel, first: usize, end: usize) {
+        for bin in 0..model.bins {
+            let range_m = if (first..end).contains(&bin) { NEAR_M } else { FAR_M };
+            for row in 0..model.rows {
+                model.observe(bin * model.rows + row, range_m);
+            }
+        }
+        model.close_revolution(false);
+    }
+
+    fn learned(first: usize, end: usize) -> RangeModel {
+        let config = config::Config::for_mode(config::Mode::Default);
+        let mut model = RangeModel::new(&config.detect.background, 1.0);
+        model.grow(ROWS);
+        for _ in 0..10 {
+            look(&mut model, first, end);
+        }
+        model
+    }
+
+    fn is_new(model: &RangeModel, bin: usize) -> bool {
+        (0..ROWS).all(|row| NEAR_M < model.limit_m(bin * ROWS + row))
+    }
+
+    #[test]
+    fn who_walks_off_is_forgotten_as_a_whole() {
+        let mut model = learned(100, 106);
+        assert!(!is_new(&model, 104));
+        for step in 1..=3 {
+            look(&mut model, 100 + step, 106 + step);
+        }
+        assert!(is_new(&model, 104));
+    }
+
+    #[test]
+    fn what_stays_is_not_forgotten_where_its_edge_goes() {
+        // A pillar whose edge is no longer hit, and a wall that a walker leaves.
+        for (first, end) in [(100, 106), (100, 180)] {
+            let mut model = learned(first, end);
+            for _ in 0..5 {
+                look(&mut model, first + 2, end);
+            }
+            assert!(!is_new(&model, first + 4), "{first}..{end}");
+        }
+        let mut wall = learned(100, 180);
+        for step in 1..=5 {
+            look(&mut wall, 100 + step, 180 + step);
+        }
+        assert!(!is_new(&wall, 140));
+    }
 }
