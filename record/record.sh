@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 cargo build --release
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
-export PATH="$PWD/target/release:$PATH"
+export PATH="$(realpath "${CARGO_TARGET_DIR:-target}")/release:$PATH"
 
 record() { # FILE COMMAND...
     local file="record/$1.txt"
@@ -24,12 +24,12 @@ more() { # the same, added to the file
 
 # The headline: 40 test scenes, every mode, baselines, error budget, ladder.
 record orca-40-scenes umbracast evaluate --scenes 20 --preset orca-03,orca-06 --out "$scratch/orca"
-cp "$scratch/orca/scores.json" record/orca-40-scenes.json
+cp "$scratch/orca/report.html" record/orca-40-scenes.html # baselines, error budget and ladder too
 
 # How fast: one scene of 10 people with two HDL-32E on one core, and a frame through every mode.
-record speed umbracast simulate --scenes 1 --threads 1 --out "$scratch/sim" --json
+record speed umbracast simulate --scenes 1 --threads 1 --out "$scratch/sim"
 for mode in default paper hdl; do
-    more speed umbracast run "$scratch/sim" --mode "$mode" --threads 1 --out "$scratch/$mode" --json
+    more speed umbracast run "$scratch/sim" --mode "$mode" --threads 1 --out "$scratch/$mode"
 done
 
 # The same seed twice, on one thread and on two.

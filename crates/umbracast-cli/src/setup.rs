@@ -9,7 +9,7 @@ use umbracast::{Config, Error, Mode};
 /// The paper's LSTM as `umbracast train` made it; its card lies beside the file.
 const PAPER_LSTM: &[u8] = include_bytes!("../../../models/paper_lstm.safetensors");
 
-/// First seed of the test scenes (CONVENTIONS: tests 200,000 to 299,999).
+/// First seed of the test scenes (docs/CONVENTIONS.md).
 pub const TEST_SEED: u64 = 200_000;
 
 /// The mode's values with the user's file laid over them.

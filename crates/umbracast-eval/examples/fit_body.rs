@@ -12,7 +12,7 @@ use umbracast_eval::chain::CIRCLE_M;
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 
-/// Tuning seeds only (CONVENTIONS).
+/// Tuning seeds only (docs/CONVENTIONS.md).
 const FIRST_SEED: u64 = 100_000;
 
 /// One link in one frame: the ray, the others, and whether it was blocked.

@@ -12,7 +12,7 @@ use umbracast_eval::matching::match_scene;
 use umbracast_eval::scene::TruthIndex;
 use umbracast_sim::crowd::Preset;
 
-/// Tuning seeds only (CONVENTIONS).
+/// Tuning seeds only (docs/CONVENTIONS.md).
 const FIRST_SEED: u64 = 100_000;
 
 /// By window: probability, blocked in truth.

@@ -17,7 +17,7 @@ use crate::score::{ModeRun, SceneScore, score_scene};
 pub const EMPTY_FRAMES: u64 = 20;
 /// Radius of the circle on which people start (paper, section V-A).
 pub const CIRCLE_M: f64 = 12.5;
-/// Seeds of test scenes start here (CONVENTIONS, "Who counts").
+/// Seeds of test scenes start here (docs/CONVENTIONS.md).
 pub const TEST_SEEDS: u64 = 200_000;
 
 /// What is to be run.

@@ -1,4 +1,4 @@
-//! Who counts (CONVENTIONS, "Who counts"): every case in which a prediction of a link is held against the truth.
+//! Who counts (docs/CONVENTIONS.md): every case in which a prediction of a link is held against the truth.
 
 use umbracast::STEPS;
 use umbracast::track::OBSERVED;

@@ -1,6 +1,6 @@
 //! Stage 1: are people found, where, and as the same person? Counts of one scene, added up over scenes.
 //!
-//! Everybody in the scene counts from frame 0, and confirmed tracks only (CONVENTIONS, "Who counts").
+//! Everybody in the scene counts from frame 0, and confirmed tracks only (docs/CONVENTIONS.md).
 
 use std::collections::BTreeMap;
 

@@ -58,7 +58,8 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     progress.finish_and_clear();
     let summary = RunJson::new("simulate", &watch).with("scenes", scenes.len()).with("frames", frames);
     summary.write(&args.out)?;
-    summary.print(common, &format!("{} scenes, {frames} frames in {}", scenes.len(), args.out.display()));
+    let (count, folder, wall_s) = (scenes.len(), args.out.display(), watch.seconds());
+    summary.print(common, &format!("{count} scenes, {frames} frames in {folder}: {wall_s:.1} s"));
     Ok(Ending::Done)
 }
 

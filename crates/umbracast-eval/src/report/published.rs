@@ -1,4 +1,4 @@
-//! What the paper prints (PAPER.md, "The problem"), to stand beside our figures.
+//! What the paper prints, to stand beside our figures.
 
 /// Accuracy, precision and recall at w = 3 (section V).
 pub const AT_300_MS: [(&str, f64); 3] = [("accuracy", 0.87), ("precision", 0.78), ("recall", 0.79)];
@@ -11,7 +11,7 @@ pub const BASE_RATE_AT_300_MS: f64 = 0.30;
 /// Table I: displacement error at steps 1..=9, metres.
 pub const DISPLACEMENT_M: [f64; 9] = [0.22, 0.27, 0.34, 0.42, 0.51, 0.61, 0.72, 0.83, 0.96];
 
-/// One measured rung of PAPER.md's ladder: F1 and onset F1 at (side, w = 1), (side, 3), (side, 9), (centre, 3),
+/// One measured rung of the reference ladder: F1 and onset F1 at (side, w = 1), (side, 3), (side, 9), (centre, 3),
 /// in the order of [`crate::ladder`]. Measured with other bodies than ours (18 capsules), so they differ a little.
 pub const LADDER: [[(f64, f64); 4]; 10] = [
     [(0.76, 0.24), (0.79, 0.46), (0.84, 0.69), (0.58, 0.25)],

@@ -40,7 +40,7 @@ pub struct Crowd {
     pub duration_ns: i64,
 }
 
-/// The parameter sets of the ORCA crowd (CONVENTIONS: presets are named by their radius).
+/// The parameter sets of the ORCA crowd, named by their radius.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Preset {
     /// Radius 0.3 m.
