@@ -1,18 +1,23 @@
 //! `config`: the commented default, the complete values of a mode, or a check of a file.
 
 use umbracast::config::DEFAULT_TOML;
-use umbracast::{Error, Mode};
+use umbracast::{Config, Error};
 
 use crate::{Ending, args, say, setup};
 
+/// Prints or checks.
 pub fn run(args: &args::Config) -> Result<Ending, Error> {
-    match (&args.check, args.mode) {
-        (Some(file), mode) => {
-            setup::config(mode.unwrap_or(Mode::Default), Some(file))?;
-            say::line(format_args!("{}: understood", file.display()));
-        }
-        (None, Some(mode)) => say::text(&setup::config(mode, None)?.to_toml()),
-        (None, None) => say::text(DEFAULT_TOML),
+    if let Some(file) = &args.check {
+        // A file is of the mode asked for, else of the one it names.
+        match args.mode {
+            Some(mode) => setup::config(mode, Some(file))?,
+            None => Config::of_run(&setup::read_text(file)?, &file.display().to_string())?,
+        };
+        say::line(format_args!("{}: understood", file.display()));
+    } else if let Some(mode) = args.mode {
+        say::text(&setup::config(mode, None)?.to_toml());
+    } else {
+        say::text(DEFAULT_TOML);
     }
     Ok(Ending::Done)
 }

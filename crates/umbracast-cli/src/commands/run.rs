@@ -68,7 +68,8 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
             take(run_scene(number_of(0, input), input, &config, &weights, &empty, |rows| {
                 tracks.write(&rows.tracks)?;
                 links.write(&rows.links)?;
-                (rows.tracks.clear(), rows.links.clear());
+                rows.tracks.clear();
+                rows.links.clear();
                 Ok(())
             })?);
             return Ok(());
