@@ -23,16 +23,21 @@ const GAP_UNKNOWN_M: f64 = 0.4;
 pub(super) struct Height {
     log_p: [f64; CELLS],
     mean_m: f64,
+    sigma_m: f64,
 }
 
 impl Height {
     pub(super) fn new(mean_m: f64, sigma_m: f64) -> Self {
         let log_p = std::array::from_fn(|i| -0.5 * ((height_m(i) - mean_m) / sigma_m).powi(2));
-        Self { log_p, mean_m }
+        Self { log_p, mean_m, sigma_m }
     }
 
     pub(super) fn mean_m(&self) -> f64 {
         self.mean_m
+    }
+
+    pub(super) fn sigma_m(&self) -> f64 {
+        self.sigma_m
     }
 
     /// Takes the highest point of a frame, where so many beams meet a metre of upright head.
@@ -46,14 +51,16 @@ impl Height {
             *log_p += NEW_IN_A_FRAME * p.ln();
         }
         let most = self.log_p.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let (mut sum, mut weighted) = (0.0, 0.0);
+        let (mut sum, mut weighted, mut squares) = (0.0, 0.0, 0.0);
         for (i, log_p) in self.log_p.iter_mut().enumerate() {
             *log_p -= most;
             let p = log_p.exp();
             sum += p;
             weighted += p * height_m(i);
+            squares += p * height_m(i).powi(2);
         }
         self.mean_m = weighted / sum;
+        self.sigma_m = (squares / sum - self.mean_m.powi(2)).max(0.0).sqrt();
     }
 }
 

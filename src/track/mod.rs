@@ -27,10 +27,15 @@ pub struct Track {
     pub velocity_mps: DVec2,
     /// Of (x, y, vx, vy); metres and seconds.
     pub covariance: [[f64; 4]; 4],
-    /// The trunk's, counter-clockwise from +x, held while standing.
+    /// The trunk's, counter-clockwise from +x: the velocity's while walking, held while standing.
     pub heading_rad: f64,
-    /// Standing height.
+    /// One standard deviation of `heading_rad`: what the velocity's covariance leaves open while walking, more
+    /// with the time while standing, and 1.81 (any direction) for who has never walked.
+    pub heading_sigma_rad: f64,
+    /// Standing height, shoes and hair included.
     pub height_m: f64,
+    /// One standard deviation of `height_m`.
+    pub height_sigma_m: f64,
     /// Points of this frame's detection; 0 while it coasts.
     pub points: u32,
     /// False until the track has been seen often enough to be believed.

@@ -1,4 +1,7 @@
 //! One person followed: filter, height, heading, boxes, and how sure it is that somebody is there.
+//!
+//! P: covariance of (x, y, vx, vy).
+#![allow(non_snake_case)]
 
 use std::collections::VecDeque;
 
@@ -16,6 +19,11 @@ const EXISTENCE_MAX: f64 = 0.99;
 const EXISTENCE_AT_BIRTH: f64 = 0.5;
 /// The step that chances of detection are meant for.
 const STEP_S: f64 = crate::STEP_S;
+/// Variance of a heading that may be any: even over a turn.
+const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
+/// How fast who stands may turn away from the last heading: 40 degrees (one sigma) in a second. A guess: nothing
+/// that is measured here tells it.
+const STANDING_TURN_RAD2PS: f64 = 0.5;
 /// The width of a box until one was seen.
 const WIDTH_M: f64 = 0.5;
 
@@ -34,6 +42,9 @@ pub(super) struct Person {
     last_hit_ns: i64,
     points: u32,
     heading_rad: f64,
+    heading_variance_rad2: f64,
+    /// When the track was last given out.
+    given_ns: i64,
     height: Height,
     /// The last detection's boxes, moved so that the detection's position is at the origin.
     aabb: Aabb,
@@ -57,6 +68,8 @@ impl Person {
             last_hit_ns: time_ns,
             points: 0,
             heading_rad: 0.0,
+            heading_variance_rad2: ANY_HEADING_RAD2,
+            given_ns: time_ns,
             height: Height::new(config.height_mean_m, config.height_sigma_m),
             aabb: Aabb::EMPTY,
             obb: Obb::from_aabb(&Aabb::EMPTY),
@@ -123,9 +136,8 @@ impl Person {
     pub(super) fn track(&mut self, config: &TrackConfig, time_ns: i64) -> Track {
         let state = self.filter.state();
         let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
-        if velocity_mps.length() > config.heading_speed_mps {
-            self.heading_rad = velocity_mps.y.atan2(velocity_mps.x);
-        }
+        self.turn(config, &state, (time_ns - self.given_ns) as f64 * 1e-9);
+        self.given_ns = time_ns;
         if self.observed.len() == OBSERVED {
             self.observed.pop_front();
         }
@@ -137,12 +149,29 @@ impl Person {
             velocity_mps,
             covariance: state.P,
             heading_rad: self.heading_rad,
+            heading_sigma_rad: self.heading_variance_rad2.sqrt(),
             height_m: self.height.mean_m(),
+            height_sigma_m: self.height.sigma_m(),
             points: self.points,
             confirmed: self.confirmed,
             aabb,
             obb,
             observed: self.observed.clone(),
+        }
+    }
+
+    /// The heading follows the velocity of who walks; who stands may turn on the spot.
+    fn turn(&mut self, config: &TrackConfig, state: &State, step_s: f64) {
+        let (v, P) = (state.velocity_mps(), &state.P);
+        let squared = v.length_squared();
+        if v.length() > config.heading_speed_mps {
+            self.heading_rad = v.y.atan2(v.x);
+            // d(heading) = (v x dv) / |v|^2.
+            let across = P[3][3] * v.x * v.x - 2.0 * P[2][3] * v.x * v.y + P[2][2] * v.y * v.y;
+            self.heading_variance_rad2 = (across / (squared * squared)).min(ANY_HEADING_RAD2);
+        } else {
+            self.heading_variance_rad2 =
+                (self.heading_variance_rad2 + STANDING_TURN_RAD2PS * step_s).min(ANY_HEADING_RAD2);
         }
     }
 

@@ -18,7 +18,7 @@ use umbracast::{Config, Error, Health, Mode, Site};
 use umbracast_eval::bootstrap::Pooled;
 use umbracast_eval::matching::match_scene;
 use umbracast_eval::stage1::Stage1;
-use umbracast_io::rows::{PeopleRow, TrackRow};
+use umbracast_io::rows::{PeopleRow, TrackRow, of_track};
 use umbracast_io::trajectories;
 use umbracast_sim::crowd::{Crowd, Preset, Recorded, circle_crossing, pairs, replay};
 use umbracast_sim::scene::Scene;
@@ -195,7 +195,9 @@ fn run_scene(crowd: Crowd, site: &Site, seed: u64, contenders: &mut [Contender])
         while let Some(frame) = assembler.pop() {
             for (stage, contender) in stages.iter_mut().zip(contenders.iter_mut()) {
                 stage.step(&frame);
-                contender.tracks.extend(stage.tracks.iter().map(|track| row(&frame, track)));
+                contender
+                    .tracks
+                    .extend(stage.tracks.iter().map(|track| of_track(frame.index, frame.time_ns, track)));
             }
         }
         let Some(truth) = truth else { break };
@@ -224,26 +226,5 @@ fn run_scene(crowd: Crowd, site: &Site, seed: u64, contenders: &mut [Contender])
 fn push(assembler: &mut Assembler, packets: &[Vec<Packet>]) {
     for (sensor, packets) in packets.iter().enumerate() {
         packets.iter().for_each(|packet| assembler.push(sensor, packet, &mut Health::default()));
-    }
-}
-
-fn row(frame: &Frame, track: &Track) -> TrackRow {
-    let c = &track.covariance;
-    TrackRow {
-        frame: frame.index,
-        time_ns: frame.time_ns,
-        track: track.id,
-        x_m: track.position_m.x,
-        y_m: track.position_m.y,
-        vx_mps: track.velocity_mps.x,
-        vy_mps: track.velocity_mps.y,
-        covariance: [
-            c[0][0], c[0][1], c[0][2], c[0][3], c[1][1], c[1][2], c[1][3], c[2][2], c[2][3], c[3][3],
-        ],
-        heading_rad: track.heading_rad,
-        height_m: track.height_m,
-        points: track.points,
-        confirmed: track.confirmed,
-        ..TrackRow::default()
     }
 }

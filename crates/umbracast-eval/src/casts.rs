@@ -115,8 +115,10 @@ const CERTAIN: Coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd: 0.0
 fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, heading_speed_mps: f64) -> Track {
     let track = true_track(truth, row, box_moved_to(own, row));
     let walks = track.velocity_mps.length() > heading_speed_mps;
-    let heading_rad = if walks { track.velocity_mps.to_angle() } else { own.heading_rad };
-    Track { heading_rad, height_m: own.height_m, ..track }
+    let (heading_rad, heading_sigma_rad) =
+        if walks { (track.velocity_mps.to_angle(), 0.0) } else { (own.heading_rad, own.heading_sigma_rad) };
+    let (height_m, height_sigma_m) = (own.height_m, own.height_sigma_m);
+    Track { heading_rad, heading_sigma_rad, height_m, height_sigma_m, ..track }
 }
 
 /// A track at the true positions of its person, now and at every step. The present is moved as well: a body
@@ -156,7 +158,9 @@ fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb)) -> 
         velocity_mps: DVec2::new(row.vx_mps, row.vy_mps),
         covariance: CERTAIN.state,
         heading_rad: row.heading_rad,
+        heading_sigma_rad: 0.0,
         height_m: row.height_m,
+        height_sigma_m: 0.0,
         points: row.returns,
         confirmed: true,
         aabb,
@@ -207,7 +211,9 @@ fn track_of(row: &TrackRow) -> Track {
         velocity_mps: DVec2::new(row.vx_mps, row.vy_mps),
         covariance,
         heading_rad: row.heading_rad,
+        heading_sigma_rad: row.heading_sigma_rad,
         height_m: row.height_m,
+        height_sigma_m: row.height_sigma_m,
         points: row.points,
         confirmed: row.confirmed,
         aabb,

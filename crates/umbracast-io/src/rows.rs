@@ -2,6 +2,7 @@
 #![allow(missing_docs, reason = "names carry the unit; what needs a word has one")]
 
 use serde::{Deserialize, Serialize};
+use umbracast::track::Track;
 use umbracast::{Outcome, STEPS};
 
 /// Truth: one body in one frame. Arrived ones too.
@@ -53,7 +54,9 @@ pub struct TrackRow {
     /// Upper triangle of the covariance of (x, y, vx, vy): xx xy xvx xvy yy yvx yvy vxvx vxvy vyvy.
     pub covariance: [f64; 10],
     pub heading_rad: f64,
+    pub heading_sigma_rad: f64,
     pub height_m: f64,
+    pub height_sigma_m: f64,
     pub points: u32,
     pub confirmed: bool,
     /// min x y z, max x y z.
@@ -83,29 +86,8 @@ pub struct LinkRow {
 /// The rows of one outcome.
 pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, links: &mut Vec<LinkRow>) {
     for (track, forecast) in outcome.tracks.iter().zip(&outcome.forecasts) {
-        let c = &track.covariance;
-        let (b, o) = (&track.aabb, &track.obb);
-        let (lo, hi, m, h, r) = (b.min_m, b.max_m, o.center_m, o.half_m, o.site_from_box.to_cols_array());
-        tracks.push(TrackRow {
-            scene,
-            frame: outcome.frame,
-            time_ns: outcome.time_ns,
-            track: track.id,
-            x_m: track.position_m.x,
-            y_m: track.position_m.y,
-            vx_mps: track.velocity_mps.x,
-            vy_mps: track.velocity_mps.y,
-            covariance: [
-                c[0][0], c[0][1], c[0][2], c[0][3], c[1][1], c[1][2], c[1][3], c[2][2], c[2][3], c[3][3],
-            ],
-            heading_rad: track.heading_rad,
-            height_m: track.height_m,
-            points: track.points,
-            confirmed: track.confirmed,
-            aabb_m: [lo.x, lo.y, lo.z, hi.x, hi.y, hi.z],
-            obb: [m.x, m.y, m.z, h.x, h.y, h.z, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]],
-            steps: forecast.steps.map(|s| [s.mean_m.x, s.mean_m.y, s.xx_m2, s.xy_m2, s.yy_m2]),
-        });
+        let steps = forecast.steps.map(|s| [s.mean_m.x, s.mean_m.y, s.xx_m2, s.xy_m2, s.yy_m2]);
+        tracks.push(TrackRow { scene, steps, ..of_track(outcome.frame, outcome.time_ns, track) });
     }
     links.extend(outcome.blockages.iter().map(|b| LinkRow {
         scene,
@@ -118,4 +100,32 @@ pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, lin
         blocked: b.blocked,
         p: b.p,
     }));
+}
+
+/// The row of a track without a forecast, of scene 0.
+pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
+    let c = &track.covariance;
+    let (b, o) = (&track.aabb, &track.obb);
+    let (lo, hi, m, h, r) = (b.min_m, b.max_m, o.center_m, o.half_m, o.site_from_box.to_cols_array());
+    TrackRow {
+        frame,
+        time_ns,
+        track: track.id,
+        x_m: track.position_m.x,
+        y_m: track.position_m.y,
+        vx_mps: track.velocity_mps.x,
+        vy_mps: track.velocity_mps.y,
+        covariance: [
+            c[0][0], c[0][1], c[0][2], c[0][3], c[1][1], c[1][2], c[1][3], c[2][2], c[2][3], c[3][3],
+        ],
+        heading_rad: track.heading_rad,
+        heading_sigma_rad: track.heading_sigma_rad,
+        height_m: track.height_m,
+        height_sigma_m: track.height_sigma_m,
+        points: track.points,
+        confirmed: track.confirmed,
+        aabb_m: [lo.x, lo.y, lo.z, hi.x, hi.y, hi.z],
+        obb: [m.x, m.y, m.z, h.x, h.y, h.z, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]],
+        ..TrackRow::default()
+    }
 }

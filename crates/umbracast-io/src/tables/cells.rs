@@ -136,7 +136,9 @@ impl Row for TrackRow {
             see(plain(name), Cell::F64(value));
         }
         see(plain("heading_rad"), Cell::F64(&mut self.heading_rad));
+        see(plain("heading_sigma_rad"), Cell::F64(&mut self.heading_sigma_rad));
         see(plain("height_m"), Cell::F64(&mut self.height_m));
+        see(plain("height_sigma_m"), Cell::F64(&mut self.height_sigma_m));
         see(plain("points"), Cell::U32(&mut self.points));
         see(plain("confirmed"), Cell::Bool(&mut self.confirmed));
         for (name, value) in AABB.into_iter().zip(&mut self.aabb_m) {
