@@ -3,7 +3,7 @@
 use umbracast::blockage::{Blockage, Caster};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
-use umbracast::track::Track;
+use umbracast::track::{Observed, Track};
 use umbracast::{Config, STEP_S};
 
 /// One access point at 1 m at the origin; bodies of 0.56 m turned towards it, of exactly known size and heading.
@@ -40,11 +40,18 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         confirmed: true,
         aabb,
         obb: Obb::from_aabb(&aabb),
-        observed: [(0, position_m)].into(),
+        observed: [Observed { time_ns: 0, position_m, velocity_mps }].into(),
     };
     let mean = |s: usize| position_m + velocity_mps * (STEP_S * (s + 1) as f64);
     let steps = std::array::from_fn(|s| Gaussian2 { mean_m: mean(s), ..Gaussian2::default() });
-    (track, Forecast { track: id, steps, coupling: Coupling { state: covariance, acceleration_psd: 0.0 } })
+    (
+        track,
+        Forecast {
+            track: id,
+            steps,
+            coupling: Coupling { state: covariance, acceleration_psd: [[0.0; 2]; 2] },
+        },
+    )
 }
 
 fn cast(config: &Config, people: Vec<(Track, Forecast)>) -> Vec<Blockage> {

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use super::body::{BodySize, UprightBody};
 use super::caster::{heading_at, position_at};
 use crate::config::BlockageConfig;
-use crate::forecast::{Coupling, Forecast};
+use crate::forecast::Forecast;
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
 use crate::track::Track;
@@ -126,9 +126,9 @@ impl Ways {
     fn draw(&mut self, config: &BlockageConfig, samples: usize, track: &Track, forecast: &Forecast) {
         let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ track.id.wrapping_mul(0x9E37_79B9_7F4A_7C15));
         let mut normal = || random.sample::<f64, _>(StandardNormal);
-        let root = cholesky(&forecast.coupling);
+        let state_root = root(&forecast.coupling.state);
         // A constant acceleration over each step with the step's share of the white one.
-        let kick_mps2 = (forecast.coupling.acceleration_psd / STEP_S).max(0.0).sqrt();
+        let kick_root_mps2 = root(&forecast.coupling.acceleration_psd.map(|row| row.map(|psd| psd / STEP_S)));
         self.positions_m.resize((STEPS + 1) * samples, DVec2::ZERO);
         self.ahead.resize((STEPS + 1) * samples, DVec2::X);
         self.height_m.clear();
@@ -137,14 +137,16 @@ impl Ways {
             std::array::from_fn(|s| (position_at(track, forecast, s), heading_at(track, forecast, s)));
         for k in 0..samples {
             let z = [normal(), normal(), normal(), normal()];
-            let e: [f64; 4] = std::array::from_fn(|r| (0..=r).map(|c| root[r][c] * z[c]).sum());
+            let e: [f64; 4] = std::array::from_fn(|r| (0..=r).map(|c| state_root[r][c] * z[c]).sum());
             let (mut offset, mut drift) = (DVec2::new(e[0], e[1]), DVec2::new(e[2], e[3]));
             let turn = config.heading_sigma_deg.to_radians() * normal();
             self.height_m.push((track.height_m + config.height_sigma_m * normal()).max(0.5));
             self.girth.push((1.0 + config.size_sigma_share * normal()).clamp(0.5, 1.8));
             for (s, &(mean_m, heading_rad)) in means.iter().enumerate() {
                 if s > 0 {
-                    let kick = DVec2::new(normal(), normal()) * kick_mps2;
+                    let z = [normal(), normal()];
+                    let [[xx, _], [xy, yy]] = kick_root_mps2;
+                    let kick = DVec2::new(xx * z[0], xy * z[0] + yy * z[1]);
                     offset += drift * STEP_S + kick * (0.5 * STEP_S * STEP_S);
                     drift += kick * STEP_S;
                 }
@@ -164,11 +166,10 @@ impl Ways {
     }
 }
 
-/// Lower Cholesky factor of the state's covariance; a direction without variance gets none.
-fn cholesky(coupling: &Coupling) -> [[f64; 4]; 4] {
-    let a = &coupling.state;
-    let mut l = [[0.0; 4]; 4];
-    for r in 0..4 {
+/// Lower Cholesky factor of a covariance; a direction without variance gets none.
+fn root<const N: usize>(a: &[[f64; N]; N]) -> [[f64; N]; N] {
+    let mut l = [[0.0; N]; N];
+    for r in 0..N {
         for c in 0..=r {
             let rest = a[r][c] - (0..c).map(|i| l[r][i] * l[c][i]).sum::<f64>();
             l[r][c] = if r == c {

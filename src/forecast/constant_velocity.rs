@@ -8,7 +8,7 @@ use crate::track::Track;
 
 /// Carries a track's state on. `acceleration_psd` is the unforeseen acceleration's, m^2/s^3, each axis.
 pub fn forecast(track: &Track, acceleration_psd: f64) -> Forecast {
-    let coupling = Coupling { state: track.covariance, acceleration_psd };
+    let coupling = Coupling { state: track.covariance, acceleration_psd: alike(acceleration_psd) };
     let steps = std::array::from_fn(|i| {
         let ahead_s = (i + 1) as f64 * STEP_S;
         position_at(track.position_m, track.velocity_mps, &coupling, ahead_s)
@@ -16,17 +16,22 @@ pub fn forecast(track: &Track, acceleration_psd: f64) -> Forecast {
     Forecast { track: track.id, steps, coupling }
 }
 
+/// A spectral density that is the same along every axis, as [`Coupling`] has it.
+pub fn alike(density: f64) -> [[f64; 2]; 2] {
+    [[density, 0.0], [0.0, density]]
+}
+
 /// The position `ahead_s` seconds from now. With P the state's covariance and q the acceleration's density:
 /// `P_pp + t (P_pv + P_vp) + t^2 P_vv + q t^3 / 3` (white acceleration, integrated twice).
 pub fn position_at(position_m: DVec2, velocity_mps: DVec2, coupling: &Coupling, ahead_s: f64) -> Gaussian2 {
     let (p, t) = (&coupling.state, ahead_s);
     let carried = |i: usize, j: usize| p[i][j] + t * (p[i][j + 2] + p[i + 2][j]) + t * t * p[i + 2][j + 2];
-    let unforeseen_m2 = coupling.acceleration_psd * t.powi(3) / 3.0;
+    let unforeseen = |i: usize, j: usize| coupling.acceleration_psd[i][j] * t.powi(3) / 3.0;
     Gaussian2 {
         mean_m: position_m + velocity_mps * t,
-        xx_m2: carried(0, 0) + unforeseen_m2,
-        xy_m2: carried(0, 1),
-        yy_m2: carried(1, 1) + unforeseen_m2,
+        xx_m2: carried(0, 0) + unforeseen(0, 0),
+        xy_m2: carried(0, 1) + unforeseen(0, 1),
+        yy_m2: carried(1, 1) + unforeseen(1, 1),
     }
 }
 
@@ -61,7 +66,7 @@ mod tests {
         // White acceleration in slices of 2 ms on a state drawn from its covariance.
         const SLICE_S: f64 = 0.002;
         const WALKERS: usize = 20_000;
-        let coupling = Coupling { state: STATE, acceleration_psd: 0.2 };
+        let coupling = Coupling { state: STATE, acceleration_psd: alike(0.2) };
         let mut rng = Pcg64::seed_from_u64(7);
         let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
         let l = cholesky();
@@ -72,7 +77,7 @@ mod tests {
             let state: [f64; 4] = std::array::from_fn(|i| (0..4).map(|k| l[i][k] * z[k]).sum());
             let (mut p, mut v) = (DVec2::new(state[0], state[1]), DVec2::new(state[2], state[3]));
             for _ in 0..(ahead_s / SLICE_S) as usize {
-                let push = DVec2::new(draw(), draw()) * (coupling.acceleration_psd * SLICE_S).sqrt();
+                let push = DVec2::new(draw(), draw()) * (coupling.acceleration_psd[0][0] * SLICE_S).sqrt();
                 p += (v + push * 0.5) * SLICE_S;
                 v += push;
             }
@@ -88,7 +93,7 @@ mod tests {
 
     #[test]
     fn walks_straight_on() {
-        let coupling = Coupling { state: STATE, acceleration_psd: 0.0 };
+        let coupling = Coupling { state: STATE, acceleration_psd: alike(0.0) };
         let ahead = position_at(DVec2::new(1.0, 2.0), DVec2::new(-1.0, 0.5), &coupling, 0.4);
         assert!(ahead.mean_m.abs_diff_eq(DVec2::new(0.6, 2.2), 1e-12));
     }

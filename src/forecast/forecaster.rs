@@ -10,7 +10,7 @@ use super::lstm::OBSERVED_DISPLACEMENTS;
 use super::{Forecast, Gaussian2, Weights, constant_velocity};
 use crate::config::{ForecastConfig, ForecastMethod, Rollout};
 use crate::geometry::DVec2;
-use crate::track::{OBSERVED, Track};
+use crate::track::{OBSERVED, Observed, Track};
 use crate::{Error, STEP_NS};
 
 /// Foresees.
@@ -75,7 +75,7 @@ impl Forecaster {
         });
         for ((&i, foreseen), walked_m) in full.iter().zip(&foreseen).zip(&walked_m) {
             let mut position =
-                Gaussian2 { mean_m: tracks[i].observed[OBSERVED - 1].1, ..Gaussian2::default() };
+                Gaussian2 { mean_m: tracks[i].observed[OBSERVED - 1].position_m, ..Gaussian2::default() };
             for ((step, displacement), &v) in forecasts[i].steps.iter_mut().zip(foreseen).zip(walked_m) {
                 position = moved(&position, v, displacement);
                 *step = position;
@@ -96,17 +96,18 @@ fn moved(position: &Gaussian2, v: DVec2, displacement: &Gaussian2) -> Gaussian2 
 
 /// Metres a frame of 100 ms, oldest first, whatever the time between the positions was. `None` while there are
 /// fewer than ten of them, or when their times do not rise.
-fn displacements_m(observed: &VecDeque<(i64, DVec2)>) -> Option<[DVec2; OBSERVED_DISPLACEMENTS]> {
+fn displacements_m(observed: &VecDeque<Observed>) -> Option<[DVec2; OBSERVED_DISPLACEMENTS]> {
     let mut displacements = [DVec2::ZERO; OBSERVED_DISPLACEMENTS];
     if observed.len() != OBSERVED {
         return None;
     }
     for (i, displacement) in displacements.iter_mut().enumerate() {
-        let ((from_ns, from_m), (to_ns, to_m)) = (observed[i], observed[i + 1]);
-        if to_ns <= from_ns {
+        let (from, to) = (&observed[i], &observed[i + 1]);
+        if to.time_ns <= from.time_ns {
             return None;
         }
-        *displacement = (to_m - from_m) * (STEP_NS as f64 / (to_ns - from_ns) as f64);
+        let per_frame = STEP_NS as f64 / (to.time_ns - from.time_ns) as f64;
+        *displacement = (to.position_m - from.position_m) * per_frame;
     }
     Some(displacements)
 }
@@ -114,7 +115,7 @@ fn displacements_m(observed: &VecDeque<(i64, DVec2)>) -> Option<[DVec2; OBSERVED
 /// A draw depends on the seed, the track and the frame alone: neither on the other tracks nor on the frames
 /// before.
 fn generator(seed: u64, track: &Track) -> Pcg64 {
-    let time_ns = track.observed.back().map_or(0, |&(time_ns, _)| time_ns);
+    let time_ns = track.observed.back().map_or(0, |last| last.time_ns);
     let key = [seed, track.id, time_ns as u64].into_iter().fold(0, |key, word| mixed(key ^ word));
     Pcg64::seed_from_u64(key)
 }
@@ -143,10 +144,14 @@ mod tests {
     use crate::forecast::lstm::tests::small_network;
     use crate::geometry::{Aabb, DMat3, DVec3, Obb};
 
+    fn seen(time_ns: i64, position_m: DVec2) -> Observed {
+        Observed { time_ns, position_m, velocity_mps: DVec2::X }
+    }
+
     /// A track that has walked along `way_m` up to and with frame `frame`.
     fn track(id: u64, way_m: &[DVec2], frame: usize) -> Track {
         let observed = (frame.saturating_sub(OBSERVED - 1)..=frame)
-            .map(|k| ((k as i64 + 1) * STEP_NS, way_m[k]))
+            .map(|k| seen((k as i64 + 1) * STEP_NS, way_m[k]))
             .collect::<VecDeque<_>>();
         Track {
             id,
@@ -191,7 +196,8 @@ mod tests {
         assert_eq!(alone[0], among_others[1]);
         assert_ne!(among_others[0].steps, among_others[1].steps);
         let later = Track { observed: track(7, &way, 15).observed, ..track(7, &way, 15) };
-        let shifted = later.observed.iter().map(|&(time_ns, p)| (time_ns + STEP_NS, p)).collect();
+        let shifted =
+            later.observed.iter().map(|o| Observed { time_ns: o.time_ns + STEP_NS, ..*o }).collect();
         assert_ne!(alone[0].steps, forecasts(&mut one, &[Track { observed: shifted, ..later }])[0].steps);
         let mut two = forecaster(ForecastMethod::Lstm, Rollout::Draw, 2);
         assert_ne!(alone[0].steps, forecasts(&mut two, &[track(7, &way, 15)])[0].steps);
@@ -246,7 +252,7 @@ mod tests {
     #[test]
     fn displacements_are_scaled_to_a_frame() {
         let observed = |period_ns: i64| -> VecDeque<_> {
-            (0..OBSERVED as i64).map(|k| (k * period_ns, DVec2::new(k as f64, 0.0))).collect()
+            (0..OBSERVED as i64).map(|k| seen(k * period_ns, DVec2::new(k as f64, 0.0))).collect()
         };
         assert_eq!(displacements_m(&observed(STEP_NS)).unwrap()[4], DVec2::new(1.0, 0.0));
         assert_eq!(displacements_m(&observed(2 * STEP_NS)).unwrap()[4], DVec2::new(0.5, 0.0));

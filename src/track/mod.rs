@@ -44,6 +44,17 @@ pub struct Track {
     pub aabb: Aabb,
     /// The person's oriented box, at `position_m`.
     pub obb: Obb,
-    /// The last positions with their times, oldest first, this frame's last: at most [`OBSERVED`].
-    pub observed: VecDeque<(i64, DVec2)>,
+    /// The last states, oldest first, this frame's last: at most [`OBSERVED`].
+    pub observed: VecDeque<Observed>,
+}
+
+/// A track's state at a frame of the observation window, as the filter held it then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observed {
+    /// The frame's.
+    pub time_ns: i64,
+    /// Position.
+    pub position_m: DVec2,
+    /// Velocity.
+    pub velocity_mps: DVec2,
 }

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use super::height::Height;
 use super::kalman::{Filter, Mat2, State};
 use super::visibility::{Body, View};
-use super::{OBSERVED, Track};
+use super::{OBSERVED, Observed, Track};
 use crate::config::{Boxes, TrackConfig};
 use crate::detect::{Detection, Prior};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
@@ -51,7 +51,7 @@ pub(super) struct Person {
     obb: Obb,
     /// Averaged extent along x and y.
     extent_m: DVec2,
-    observed: VecDeque<(i64, DVec2)>,
+    observed: VecDeque<Observed>,
 }
 
 impl Person {
@@ -141,7 +141,7 @@ impl Person {
         if self.observed.len() == OBSERVED {
             self.observed.pop_front();
         }
-        self.observed.push_back((time_ns, position_m));
+        self.observed.push_back(Observed { time_ns, position_m, velocity_mps });
         let (aabb, obb) = self.boxes(config, &state);
         Track {
             id: self.id,

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, VecDeque};
 use umbracast::blockage::Caster;
 use umbracast::forecast::{Coupling, Forecast, Forecaster, Gaussian2, Weights, constant_velocity};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
-use umbracast::track::{OBSERVED, Track};
+use umbracast::track::{OBSERVED, Observed, Track};
 use umbracast::{Config, Error, STEP_S, STEPS};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
@@ -96,7 +96,8 @@ pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, conf
 pub fn constant_velocity_steps(row: &PeopleRow, acceleration_psd_m2ps3: f64) -> [Gaussian2; STEPS] {
     let at = |i| {
         let (p, v) = (DVec2::new(row.x_m, row.y_m), DVec2::new(row.vx_mps, row.vy_mps));
-        let coupling = Coupling { acceleration_psd: acceleration_psd_m2ps3, ..CERTAIN };
+        let coupling =
+            Coupling { acceleration_psd: constant_velocity::alike(acceleration_psd_m2ps3), ..CERTAIN };
         constant_velocity::position_at(p, v, &coupling, (i + 1) as f64 * STEP_S)
     };
     std::array::from_fn(at)
@@ -108,7 +109,7 @@ pub fn forecast_of(row: &TrackRow) -> [Gaussian2; STEPS] {
 }
 
 /// What is known has no spread.
-const CERTAIN: Coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd: 0.0 };
+const CERTAIN: Coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd: [[0.0; 2]; 2] };
 
 /// A track with the true state of its person. Its heading follows the velocity as the tracker's does; below
 /// `heading_speed_mps` the track's own is held.
@@ -141,16 +142,21 @@ fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow) -> (Tra
 /// A track with its own forecast and the spread that the forecaster gave it.
 fn with_own_future(own: &TrackRow, acceleration_psd: f64) -> (Track, Forecast) {
     let track = track_of(own);
-    let coupling = Coupling { state: track.covariance, acceleration_psd };
+    let coupling =
+        Coupling { state: track.covariance, acceleration_psd: constant_velocity::alike(acceleration_psd) };
     (track, Forecast { track: own.track, steps: forecast_of(own), coupling })
 }
 
 /// A person of the truth as the tracker would see him if it made no error.
 fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb)) -> Track {
     let first = row.frame.saturating_sub(OBSERVED as u64 - 1);
-    let observed: VecDeque<(i64, DVec2)> = (first..=row.frame)
+    let observed: VecDeque<Observed> = (first..=row.frame)
         .filter_map(|frame| truth.person(frame, row.person))
-        .map(|then| (then.time_ns, DVec2::new(then.x_m, then.y_m)))
+        .map(|then| Observed {
+            time_ns: then.time_ns,
+            position_m: DVec2::new(then.x_m, then.y_m),
+            velocity_mps: DVec2::new(then.vx_mps, then.vy_mps),
+        })
         .collect();
     Track {
         id: u64::from(row.person),
@@ -306,7 +312,7 @@ mod tests {
         let said = true_future(&index, &run, &matching, &config).of_tracks(&instances, &matching);
         assert!(said[0].p[0] > 0.0 && said[0].p[0] < 0.5, "{:?}", said[0].p);
         let (_, forecast) = with_own_future(&run.tracks[1], 0.2);
-        assert_eq!((forecast.coupling.state[1][1], forecast.coupling.acceleration_psd), (4.0, 0.2));
+        assert_eq!((forecast.coupling.state[1][1], forecast.coupling.acceleration_psd[1][1]), (4.0, 0.2));
     }
 
     #[test]
