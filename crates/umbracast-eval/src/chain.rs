@@ -8,6 +8,7 @@ use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
 use umbracast_io::rows::{self, PeopleLinkRow, PeopleRow};
 use umbracast_sim::crowd::{self, Crowd, Preset};
 use umbracast_sim::scene::{Scene, SceneFrame};
+use umbracast_sim::sensor::Sensors;
 
 use crate::ladder::{self, SceneLadder};
 use crate::scene::{SceneRun, SceneTruth};
@@ -111,19 +112,8 @@ pub fn drawn_scenes(presets: &[Preset], scenes: usize, people: usize, first_seed
 /// # Errors
 /// A setting that cannot work.
 pub fn run(spec: &Spec, progress: impl Fn(Progress) + Sync) -> Result<Vec<SceneResult>, Error> {
-    let Some(first) = spec.configs.first() else {
-        return Err(Error::new("modes: expected one at least, found none"));
-    };
-    if let Some(other) = spec.configs.iter().find(|config| config.site != first.site) {
-        let (mode, site) = (other.mode.name(), &other.site.name);
-        return Err(Error::new(format!("site: expected the same for every mode, found {site} for {mode}")));
-    }
-    let empty = empty_frames(&first.site)?;
-    let scene = |(index, scene_spec): (usize, &SceneSpec)| {
-        let told = |frames_done, frames| progress(Progress { scene: index, frames_done, frames });
-        run_scene(spec, index, scene_spec, &empty, &told)
-    };
-    spec.scenes.par_iter().enumerate().map(scene).collect()
+    let chain = Chain::new(spec)?;
+    (0..spec.scenes.len()).into_par_iter().map(|index| chain.scene(index, &progress)).collect()
 }
 
 /// The frames of the hall without people.
@@ -140,45 +130,71 @@ pub fn empty_frames(site: &Site) -> Result<Vec<Frame>, Error> {
     Ok(std::iter::from_fn(|| assembler.pop()).collect())
 }
 
-fn run_scene(
-    spec: &Spec,
-    index: usize,
-    scene_spec: &SceneSpec,
-    empty: &[Frame],
-    progress: &impl Fn(u64, u64),
-) -> Result<SceneResult, Error> {
-    let site = &spec.configs[0].site;
-    let mut scene = Scene::new(scene_spec.crowd(), site, scene_spec.seed)?;
-    let mut assembler = Assembler::new(site)?;
-    let mut health = Health::default();
-    let mut lanes = Vec::new();
-    for config in &spec.configs {
-        let mut pipeline = Pipeline::new(config, spec.weights.as_ref())?;
-        empty.iter().for_each(|frame| pipeline.learn_empty(frame));
-        lanes.push(Lane { pipeline, rows: SceneRun::default(), health: Health::default() });
+/// What all scenes share: the hall as the sensors see it, with nobody in it.
+#[derive(Debug)]
+pub struct Chain<'a> {
+    spec: &'a Spec,
+    sensors: Sensors,
+    empty: Vec<Frame>,
+}
+
+impl<'a> Chain<'a> {
+    /// Traces the hall.
+    ///
+    /// # Errors
+    /// No mode, modes with different sites, a sensor that cannot be simulated.
+    pub fn new(spec: &'a Spec) -> Result<Self, Error> {
+        let Some(first) = spec.configs.first() else {
+            return Err(Error::new("modes: expected one at least, found none"));
+        };
+        if let Some(other) = spec.configs.iter().find(|config| config.site != first.site) {
+            let (mode, site) = (other.mode.name(), &other.site.name);
+            return Err(Error::new(format!(
+                "site: expected the same for every mode, found {site} for {mode}"
+            )));
+        }
+        Ok(Self { spec, sensors: Sensors::new(&first.site, TEST_SEEDS)?, empty: empty_frames(&first.site)? })
     }
-    let number = index as u32;
-    let mut truth = SceneTruth::default();
-    while let Some(frame) = scene.next_frame() {
-        note_truth(number, &frame, &mut truth);
-        push(&mut assembler, &frame.packets, &mut health);
+
+    /// Runs and scores one scene of the specification; `progress` is called after each frame.
+    ///
+    /// # Errors
+    /// A setting that cannot work.
+    pub fn scene(&self, index: usize, progress: impl Fn(Progress)) -> Result<SceneResult, Error> {
+        let (spec, scene_spec, site) = (self.spec, &self.spec.scenes[index], &self.spec.configs[0].site);
+        let mut scene = Scene::in_hall(scene_spec.crowd(), site, &self.sensors, scene_spec.seed);
+        let mut assembler = Assembler::new(site)?;
+        let mut health = Health::default();
+        let mut lanes = Vec::new();
+        for config in &spec.configs {
+            let mut pipeline = Pipeline::new(config, spec.weights.as_ref())?;
+            self.empty.iter().for_each(|frame| pipeline.learn_empty(frame));
+            lanes.push(Lane { pipeline, rows: SceneRun::default(), health: Health::default() });
+        }
+        let number = index as u32;
+        let mut truth = SceneTruth::default();
+        while let Some(frame) = scene.next_frame() {
+            note_truth(number, &frame, &mut truth);
+            push(&mut assembler, &frame.packets, &mut health);
+            let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
+            lanes.iter_mut().for_each(|lane| lane.step(number, &closed));
+            progress(Progress { scene: index, frames_done: frame.index + 1, frames: scene.frames() });
+        }
+        assembler.finish();
         let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
         lanes.iter_mut().for_each(|lane| lane.step(number, &closed));
-        progress(frame.index + 1, scene.frames());
+        let mode_run = |(lane, config)| lane_run(lane, config, &health);
+        let runs: Vec<ModeRun> = lanes.iter().zip(&spec.configs).map(mode_run).collect();
+        let (weights, walkers) = (spec.weights.as_ref(), Some(scene.walkers()));
+        let score = score_scene(number, &scene_spec.group, &truth, &runs, weights, walkers)?;
+        let kept =
+            (spec.keep == Some(index)).then(|| (truth, lanes.into_iter().map(|lane| lane.rows).collect()));
+        let ladder = spec.ladder.then(|| {
+            let scene = Scene::truth_only(scene_spec.crowd(), site, scene_spec.seed);
+            ladder::climb(scene, site, scene_spec.seed)
+        });
+        Ok(SceneResult { score, ladder, kept })
     }
-    assembler.finish();
-    let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
-    lanes.iter_mut().for_each(|lane| lane.step(number, &closed));
-    let mode_run = |(lane, config)| lane_run(lane, config, &health);
-    let runs: Vec<ModeRun> = lanes.iter().zip(&spec.configs).map(mode_run).collect();
-    let score =
-        score_scene(number, &scene_spec.group, &truth, &runs, spec.weights.as_ref(), Some(scene.walkers()))?;
-    let kept = (spec.keep == Some(index)).then(|| (truth, lanes.into_iter().map(|lane| lane.rows).collect()));
-    let ladder = spec.ladder.then(|| {
-        let scene = Scene::truth_only(scene_spec.crowd(), site, scene_spec.seed);
-        ladder::climb(scene, site, scene_spec.seed)
-    });
-    Ok(SceneResult { score, ladder, kept })
 }
 
 /// One mode's pipeline and what it has said.

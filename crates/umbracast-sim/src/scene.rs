@@ -55,8 +55,15 @@ impl Scene {
     /// # Errors
     /// A sensor that cannot be simulated.
     pub fn new(crowd: Crowd, site: &Site, seed: u64) -> Result<Self, Error> {
-        let sensors = Sensors::new(site, stream(seed, "sensors", 0).next_u64())?;
-        Ok(Self { sensors: Some(sensors), ..Self::truth_only(crowd, site, seed) })
+        Ok(Self::in_hall(crowd, site, &Sensors::new(site, seed)?, seed))
+    }
+
+    /// The same scene as [`Scene::new`] makes, in a hall that is traced already: `sensors` are those of the site,
+    /// whatever their seed.
+    pub fn in_hall(crowd: Crowd, site: &Site, sensors: &Sensors, seed: u64) -> Self {
+        let mut sensors = sensors.clone();
+        sensors.restart(stream(seed, "sensors", 0).next_u64());
+        Self { sensors: Some(sensors), ..Self::truth_only(crowd, site, seed) }
     }
 
     /// The same people without sensors: no packets and no returns, for training and the ladder of oracles.
@@ -157,6 +164,20 @@ mod tests {
         assert_eq!(frames[4].links.len(), 2 * site.access_points.len());
         let arrived = |k: usize| frames[k].people[1].arrived;
         assert!(!arrived(8) && arrived(9) && frames[19].people.len() == 2);
+    }
+
+    #[test]
+    fn a_hall_traced_once_serves_every_scene() {
+        let site = Config::default().site;
+        let sensors = Sensors::new(&site, 1).unwrap();
+        let packets = |scene: &mut Scene| scene.next_frame().map(|frame| frame.packets);
+        for seed in [7, 8] {
+            let mut alone = Scene::new(crowd(), &site, seed).unwrap();
+            assert!(
+                packets(&mut alone) == packets(&mut Scene::in_hall(crowd(), &site, &sensors, seed)),
+                "{seed}"
+            );
+        }
     }
 
     #[test]

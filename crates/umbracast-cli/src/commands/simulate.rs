@@ -13,6 +13,7 @@ use umbracast_io::recording::RecordingWriter;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables::TableWriter;
 use umbracast_sim::scene::Scene;
+use umbracast_sim::sensor::Sensors;
 
 use crate::args::{Common, Simulate};
 use crate::progress::bar;
@@ -33,6 +34,7 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let watch = Stopwatch::start();
     record_empty(&config, &args.out.join("empty.mcap"), args.clouds)?;
+    let sensors = Sensors::new(&config.site, TEST_SEED)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut people = TableWriter::<PeopleRow>::create(&args.out, &names, args.csv)?;
     let mut links = TableWriter::<PeopleLinkRow>::create(&args.out, &names, args.csv)?;
@@ -43,7 +45,7 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
         for some in numbered.chunks(rayon::current_num_threads()) {
             let truths: Vec<SceneTruth> = some
                 .par_iter()
-                .map(|&(number, scene)| record_scene(&config, args, number, scene, &progress))
+                .map(|&(number, scene)| record_scene(&config, &sensors, args, number, scene, &progress))
                 .collect::<Result<_, _>>()?;
             for truth in truths {
                 frames += truth.people.last().map_or(0, |row| row.frame + 1);
@@ -74,13 +76,14 @@ fn record_empty(config: &Config, path: &Path, clouds: bool) -> Result<(), Error>
 
 fn record_scene(
     config: &Config,
+    sensors: &Sensors,
     args: &Simulate,
     number: usize,
     spec: &SceneSpec,
     progress: &ProgressBar,
 ) -> Result<SceneTruth, Error> {
     let path = args.out.join(format!("scene-{number:04}.mcap"));
-    let mut scene = Scene::new(spec.crowd(), &config.site, spec.seed)?;
+    let mut scene = Scene::in_hall(spec.crowd(), &config.site, sensors, spec.seed);
     let mut writer = Recorder::create(&path, config, args.clouds)?;
     let mut all = SceneTruth::default();
     while let Some(frame) = scene.next_frame() {
