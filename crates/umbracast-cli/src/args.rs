@@ -91,12 +91,15 @@ pub struct Replay {
     /// Frames a second of trajectories whose file does not say.
     #[arg(long, value_name = "HZ")]
     pub fps: Option<f64>,
-    /// Unit of PeTrack text: m or cm.
-    #[arg(long, default_value = "m")]
-    pub unit: Unit,
+    /// Unit of PeTrack text, m or cm; default: what the file says, else m.
+    #[arg(long)]
+    pub unit: Option<Unit>,
     /// Smoothing of the trajectories, standard deviation in seconds; 0 for none.
     #[arg(long, default_value_t = 0.12, value_name = "S")]
     pub smooth: f64,
+    /// Of a longer recording replay the middle, so many seconds.
+    #[arg(long, value_name = "S")]
+    pub seconds: Option<f64>,
 }
 
 /// `demo`

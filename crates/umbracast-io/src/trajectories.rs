@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | TrajNet++ | `{"track": {"f", "p", "x", "y"}}` | `fps` of the scenes is the rate of a person's rows, whatever the frame numbers step by |
 //! | CSV | columns `t_s,id,x_m,y_m[,height_m]` in any order | `t_s` |
-//! | CSV of PedPy and Madras | columns `frame,id,x/m,y/m[,z/m]` (`t/s` is rounded and not read) | `fps` to be given |
+//! | CSV of PedPy and Madras | columns `frame,id,x/m,y/m[,z/m]` | the slope of `t/s`, which is rounded, over `frame`, or `fps` to be given |
 //! | PeTrack | `id frame x y [z]`, blanks or tabs, `#` comments | `# framerate:` or `fps` to be given |
 
 use std::collections::BTreeMap;
@@ -225,14 +225,14 @@ fn csv_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
     };
     let (id, x, y) = (needed(&["id"])?, needed(&["x_m", "x/m"])?, needed(&["y_m", "y/m"])?);
     let height = column(&["height_m", "z/m"]);
-    let (time, fps) = match (column(&["t_s"]), column(&["frame"]), options.fps) {
-        (Some(time), _, _) => (time, 1.0),
-        (None, Some(frame), Some(fps)) => (frame, rate(fps, "fps")?),
-        (None, Some(_), None) => return Err(missing_rate("a column of frame numbers")),
-        (None, None, _) => (needed(&["t_s"])?, 1.0),
+    let (time, rounded) = match (column(&["t_s"]), column(&["frame"])) {
+        (Some(time), _) => (time, None),
+        (None, Some(frame)) => (frame, column(&["t/s"])),
+        (None, None) => (needed(&["t_s"])?, None),
     };
 
     let mut rows = Vec::new();
+    let mut clock = Vec::new();
     for (line, text) in lines {
         let cells: Vec<&str> = text.split(',').map(str::trim).collect();
         if cells.len() != columns.len() {
@@ -244,6 +244,9 @@ fn csv_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
             Some(cell) => Some(number(cell, "height", line)?),
             None => None,
         };
+        if let Some(rounded) = rounded {
+            clock.push([number(cells[time], "frame", line)?, number(cells[rounded], "t/s", line)?]);
+        }
         rows.push(Row {
             line,
             id: whole(cells[id], "id", line)?,
@@ -253,7 +256,26 @@ fn csv_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
             height_m,
         });
     }
-    Ok(seconds(rows, fps))
+    if columns[time] == "t_s" {
+        return Ok(rows);
+    }
+    let fps = options.fps.or_else(|| clock_rate(&clock));
+    Ok(seconds(rows, rate(fps.ok_or_else(|| missing_rate("a column of frame numbers"))?, "fps")?))
+}
+
+/// Frames a second from frame numbers beside times that are rounded to tenths: the slope of the line through
+/// them, to the nearest whole rate where it is that near (cameras have whole ones).
+fn clock_rate(clock: &[[f64; 2]]) -> Option<f64> {
+    let n = clock.len() as f64;
+    let mean = |k: usize| clock.iter().map(|pair| pair[k]).sum::<f64>() / n;
+    let (frame, time) = (mean(0), mean(1));
+    let along: f64 = clock.iter().map(|pair| (pair[0] - frame) * (pair[1] - time)).sum();
+    let across: f64 = clock.iter().map(|pair| (pair[1] - time).powi(2)).sum();
+    let spread: f64 = clock.iter().map(|pair| (pair[0] - frame).powi(2)).sum();
+    // Over a second of frames or less, rounding to tenths hides the rate.
+    let fps = (along > 0.0 && across / n > 0.1).then(|| spread / along)?;
+    let whole = fps.round();
+    Some(if whole > 0.0 && (fps / whole - 1.0).abs() < 0.01 { whole } else { fps })
 }
 
 fn petrack_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
@@ -325,6 +347,38 @@ fn people(mut rows: Vec<Row>) -> Result<Vec<RecordedPerson>, Error> {
         });
     }
     Ok(people)
+}
+
+/// The middle of the area that recorded people walk on, metres; `None` without people.
+pub fn middle_m(people: &[RecordedPerson]) -> Option<[f64; 2]> {
+    let along = |axis: usize| {
+        let places = people.iter().flat_map(|person| person.samples.iter().map(move |sample| sample[axis]));
+        places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+    };
+    let middle = [along(1), along(2)].map(|(low, high)| 0.5 * (low + high));
+    middle.iter().all(|m| m.is_finite()).then_some(middle)
+}
+
+/// Moves everybody.
+pub fn shift(people: &mut [RecordedPerson], by_m: [f64; 2]) {
+    for sample in people.iter_mut().flat_map(|person| &mut person.samples) {
+        sample[1] += by_m[0];
+        sample[2] += by_m[1];
+    }
+}
+
+/// Keeps the middle `seconds` of a recording that is longer, and who is there then.
+pub fn keep_middle(people: &mut Vec<RecordedPerson>, seconds: f64) {
+    let times = || people.iter().flat_map(|person| person.samples.iter().map(|sample| sample[0]));
+    let (first_s, last_s) =
+        (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+    let spare_s = (0.5 * (last_s - first_s - seconds)).max(0.0);
+    // A microsecond of room: frame times are rounded.
+    let kept = first_s + spare_s - 1e-6..=last_s - spare_s + 1e-6;
+    for person in people.iter_mut() {
+        person.samples.retain(|sample| kept.contains(&sample[0]));
+    }
+    people.retain(|person| !person.samples.is_empty());
 }
 
 /// A wrong unit or rate shows in the speeds.

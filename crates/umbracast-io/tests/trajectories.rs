@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use umbracast_io::trajectories::{Options, RecordedPerson, Unit, parse, read};
+use umbracast_io::trajectories::{Options, RecordedPerson, Unit, keep_middle, middle_m, parse, read, shift};
 use umbracast_sim::crowd::{Recorded, replay};
 
 /// A folder or file of the real data; prints that the test skips where there is none.
@@ -56,6 +56,40 @@ fn csv_columns_are_found_by_name() {
     assert!(refused(madras).contains("frames per second"));
     let people = parse(madras, Options { fps: Some(10.0), unit: None }, "file").unwrap();
     assert_eq!(people[0].samples[1], [0.3, -2.201, 5.107]);
+}
+
+#[test]
+fn the_rate_of_frame_numbers_beside_rounded_times_is_found() {
+    // 30 frames a second, times rounded up to tenths, as in the Madras set.
+    let rows: String = (2..92)
+        .map(|f| format!("{f},{:.4},1,{},0,1.8\n", f64::from((f - 2) / 3 + 1) * 0.1, 0.02 * f64::from(f)))
+        .collect();
+    let people = parse_plain(&format!("frame,t/s,id,x/m,y/m,z/m\n{rows}")).unwrap();
+    let samples = &people[0].samples;
+    assert!((samples[89][0] - samples[0][0] - 89.0 / 30.0).abs() < 1e-9, "{:?}", samples[89]);
+}
+
+#[test]
+fn a_long_recording_keeps_its_middle_and_a_shifted_one_its_shape() {
+    let person = |id: i64, from: i32, to: i32| RecordedPerson {
+        id,
+        samples: (from..=to).map(|k| [f64::from(k) * 0.1, f64::from(k), 2.0]).collect(),
+        height_m: None,
+    };
+    let mut people = vec![person(1, 0, 100), person(2, 0, 20), person(3, 60, 100)];
+    keep_middle(&mut people, 4.0);
+    assert_eq!(people.iter().map(|p| p.id).collect::<Vec<_>>(), [1, 3]);
+    assert_eq!((people[0].samples[0], people[0].samples.len()), ([3.0, 30.0, 2.0], 41));
+    assert_eq!(people[1].samples.len(), 11, "who is there then, as long as he is");
+    let whole = people.clone();
+    keep_middle(&mut people, 100.0);
+    assert_eq!(people, whole);
+
+    assert_eq!(middle_m(&people), Some([50.0, 2.0]));
+    shift(&mut people, [-50.0, -2.0]);
+    assert_eq!(middle_m(&people), Some([0.0, 0.0]));
+    assert_eq!(people[0].samples[0], [3.0, -20.0, 0.0]);
+    assert_eq!(middle_m(&[]), None);
 }
 
 #[test]
@@ -134,7 +168,8 @@ fn real_files_hold_the_people_their_readmes_count() {
         ("circle_antipode/circle-10m-64-1xx.txt", centimetres, 64, Some(16.96)),
         ("pedpy/traj_UNI_CORR_500_01.txt", without, 148, Some(75.52)),
         ("pedpy/030_c_56_h0.txt", without, 75, Some(64.76)),
-        ("madras/Topview_1A.csv", fps(10.0), 85, Some(29.6)),
+        // 30 frames a second: its own times say so, and people sway once in 42 frames, not in 4.2 s.
+        ("madras/Topview_1A.csv", without, 85, Some(296.0 / 30.0)),
         ("trajnetpp/biwi_hotel.ndjson", without, 263, None),
         ("trajnetpp/lcas.ndjson", without, 304, None),
     ] {

@@ -16,5 +16,5 @@ pub fn run(args: &Demo, common: &Common) -> Result<Ending, Error> {
         .collect::<Result<Vec<Config>, _>>()?;
     let seed = args.crowd.seed.unwrap_or(TEST_SEED);
     let scenes = chain::drawn_scenes(&[args.crowd.preset], 1, args.crowd.people, seed);
-    evaluate::in_memory(configs, setup::weights(None)?, scenes, Some(&args.out), common)
+    evaluate::in_memory(configs, setup::weights(None)?, (scenes, Vec::new()), Some(&args.out), common)
 }

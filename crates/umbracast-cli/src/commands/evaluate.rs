@@ -5,7 +5,7 @@ use std::path::Path;
 
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Health};
-use umbracast_eval::chain::{self, SceneSpec, Spec};
+use umbracast_eval::chain::{self, Spec};
 use umbracast_eval::labels;
 use umbracast_eval::pooled::{self, Scores, pool};
 use umbracast_eval::report::{self, Context, Kept};
@@ -34,11 +34,10 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
         }
         (None, ..) => {
             let seed = args.seed.unwrap_or(TEST_SEED);
-            let scenes = match args.trajectories.is_empty() {
-                true => {
-                    chain::drawn_scenes(&args.preset, args.scenes.unwrap_or(1) as usize, args.people, seed)
-                }
-                false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed, None)?,
+            let scenes = args.scenes.unwrap_or(1) as usize;
+            let told = match args.trajectories.is_empty() {
+                true => (chain::drawn_scenes(&args.preset, scenes, args.people, seed), Vec::new()),
+                false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed)?,
             };
             let configs = args
                 .mode
@@ -46,7 +45,7 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
                 .map(|&mode| setup::config(mode, args.site.site.as_deref()))
                 .collect::<Result<Vec<Config>, _>>()?;
             let weights = setup::weights(args.weights.as_deref())?;
-            in_memory(configs, weights, scenes, args.out.as_deref(), common)
+            in_memory(configs, weights, told, args.out.as_deref(), common)
         }
     }
 }
@@ -55,7 +54,7 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
 pub fn in_memory(
     configs: Vec<Config>,
     weights: Weights,
-    scenes: Vec<SceneSpec>,
+    (scenes, told): crowds::Told,
     out: Option<&Path>,
     common: &Common,
 ) -> Result<Ending, Error> {
@@ -80,7 +79,7 @@ pub fn in_memory(
         truth,
         run: &runs[best],
     });
-    show(&scores, &spec.configs, kept, out, common)
+    show(&scores, &spec.configs, kept, &told, out, common)
 }
 
 /// Scores the tables of a run against those of its truth, scene by scene.
@@ -120,7 +119,7 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
         truth,
         run,
     });
-    show(&scores, std::slice::from_ref(&config), kept, args.out.as_deref(), common)
+    show(&scores, std::slice::from_ref(&config), kept, &[], args.out.as_deref(), common)
 }
 
 /// Stage 1 against people labelled by hand.
@@ -174,21 +173,25 @@ fn about_run(dir: &Path) -> Result<AboutRun, Error> {
         .map_err(|e| Error::new(format!("expected what `run` writes, found: {e}")).within(path.display()))
 }
 
-/// Scores to stdout, the report into a folder where one is given.
+/// Scores to stdout, below them what was `told` of the scenes; the report into a folder where one is given.
 fn show(
     scores: &Scores,
     configs: &[Config],
     kept: Option<Kept>,
+    told: &[String],
     out: Option<&Path>,
     common: &Common,
 ) -> Result<Ending, Error> {
     match common.json {
         true => say::text(&report::to_json(scores)),
-        false => say::text(&report::to_text(scores)),
+        false => {
+            say::text(&report::to_text(scores));
+            told.iter().for_each(say::line);
+        }
     }
     if let Some(folder) = out {
         let arguments: Vec<String> = std::env::args().skip(1).collect();
-        let command = format!("umbracast {}", arguments.join(" "));
+        let command = [&[format!("umbracast {}", arguments.join(" "))], told].concat().join("\n");
         let explanations: Vec<(String, String)> = scores
             .groups
             .iter()

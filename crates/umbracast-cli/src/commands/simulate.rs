@@ -25,10 +25,10 @@ use crate::{Ending, crowds};
 pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     let config = setup::config(Mode::Default, args.site.site.as_deref())?;
     let seed = args.crowd.seed.unwrap_or(TEST_SEED);
-    let scenes = if args.trajectories.is_empty() {
-        chain::drawn_scenes(&[args.crowd.preset], args.scenes as usize, args.crowd.people, seed)
-    } else {
-        crowds::recorded_scenes(&args.trajectories, &args.replay, seed, None)?
+    let (preset, count) = (args.crowd.preset, args.scenes as usize);
+    let (scenes, told) = match args.trajectories.is_empty() {
+        true => (chain::drawn_scenes(&[preset], count, args.crowd.people, seed), Vec::new()),
+        false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed)?,
     };
     setup::make_dir(&args.out)?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
@@ -58,7 +58,10 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     people.finish()?;
     links.finish()?;
     progress.finish_and_clear();
-    let summary = RunJson::new("simulate", &watch).with("scenes", scenes.len()).with("frames", frames);
+    let summary = RunJson::new("simulate", &watch)
+        .with("scenes", scenes.len())
+        .with("frames", frames)
+        .with("told", &told);
     summary.write(&args.out)?;
     let (count, folder, wall_s) = (scenes.len(), args.out.display(), watch.seconds());
     summary.print(common, &format!("{count} scenes, {frames} frames in {folder}: {wall_s:.1} s"));
