@@ -27,7 +27,7 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         max_m: (position_m + DVec2::splat(0.25)).extend(1.7),
     };
     let obb = Obb::from_aabb(&aabb);
-    Detection { position_m, z_m: 0.9, time_ns, points: 30, top_m: 1.7, aabb, obb }
+    Detection { position_m, z_m: 0.9, time_ns, points: 30, whole: true, top_m: 1.7, aabb, obb }
 }
 
 /// The site without anything that could hide somebody.
@@ -141,6 +141,25 @@ fn a_pair_half_a_metre_apart_is_two_tracks_in_default_and_one_in_hdl() {
             assert_eq!(all[49].len(), expected, "{} seed {seed}", mode.name());
         }
     }
+}
+
+#[test]
+fn pieces_of_a_person_keep_a_track_and_start_none() {
+    let config = Config::for_mode(Mode::Default).track;
+    let followed = |first_piece: u64| {
+        let mut tracker = Tracker::new(&config, &open_site());
+        let mut tracks = Vec::new();
+        for index in 0..30 {
+            let frame = frame(index);
+            let seen = detection(DVec2::new(0.1 * index as f64, 0.0), frame.time_ns);
+            let piece = Detection { whole: index < first_piece, ..seen };
+            tracker.update(&frame, &[piece], &mut tracks);
+        }
+        tracks.into_iter().filter(|track| track.confirmed).collect::<Vec<_>>()
+    };
+    let [kept] = &followed(10)[..] else { panic!("expected one track") };
+    assert!(kept.position_m.distance(DVec2::new(2.9, 0.0)) < 0.1, "{}", kept.position_m);
+    assert_eq!(followed(0), []);
 }
 
 #[test]

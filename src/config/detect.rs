@@ -170,6 +170,8 @@ pub struct MeasureConfig {
     pub shift_m: f64,
     /// Full or upright.
     pub obb_axes: ObbAxes,
+    /// Points that do not look like a person count where one is expected within this distance; 0: nowhere.
+    pub expected_m: f64,
     /// Least points of a person.
     pub points_min: usize,
     /// Most points of a person.

@@ -26,6 +26,8 @@ pub struct TrackConfig {
     pub noise_floor_m: f64,
     /// Measurement noise that falls with the square root of the points, one axis.
     pub noise_per_point_m: f64,
+    /// The same as `noise_floor_m` where only a piece of a person is seen.
+    pub piece_noise_m: f64,
     /// A new track's position variance as a multiple of the measurement's.
     pub birth_variance_per_noise: f64,
     /// A new track's velocity, one standard deviation of an axis.

@@ -15,6 +15,8 @@ const CROWD_M: f64 = 0.7;
 pub struct Part {
     /// Indices of its points, ascending.
     pub points: Cluster,
+    /// True for pieces that were joined to a person because one is expected there.
+    pub expected: bool,
     sum_m: DVec2,
     top_m: f64,
 }
@@ -23,7 +25,7 @@ impl Part {
     fn new(moved_m: &[DVec3], points: Cluster) -> Self {
         let sum_m = points.iter().map(|&i| moved_m[i as usize].truncate()).sum();
         let top_m = points.iter().map(|&i| moved_m[i as usize].z).fold(0.0, f64::max);
-        Self { points, sum_m, top_m }
+        Self { points, expected: false, sum_m, top_m }
     }
 
     fn mean_m(&self) -> DVec2 {
@@ -107,13 +109,54 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
         if i == j || !is_one_person(&parts[i], &parts[j], priors, config) {
             continue;
         }
-        let gone = Part { points: Vec::new(), sum_m: DVec2::ZERO, top_m: 0.0 };
-        let part = std::mem::replace(&mut parts[j], gone);
-        parts[i].points.extend(part.points);
-        parts[i].sum_m += part.sum_m;
-        parts[i].top_m = parts[i].top_m.max(part.top_m);
+        join(parts, i, j);
         into[j] = i;
     }
+    tidy(parts);
+}
+
+/// Joins what is left of each expected person whose body is nowhere: legs where the beams pass below the hips, or
+/// the few points that others let through. Without an expected person such pieces are nobody.
+pub fn join_pieces(parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
+    let people: Vec<&Prior> = priors.iter().filter(|prior| prior.confirmed).collect();
+    let reach_m = |prior: &Prior| config.limb_m + prior.position_sigma_m.min(config.limb_m);
+    let nearest = |part: &Part| {
+        let apart_m = |k: usize| people[k].position_m.distance(part.mean_m());
+        let near = (0..people.len()).filter(|&k| apart_m(k) < reach_m(people[k]));
+        near.min_by(|&a, &b| apart_m(a).total_cmp(&apart_m(b)))
+    };
+    let is_piece = |part: &Part, person: &Prior| {
+        part.points.len() < config.points_min || part.top_m < config.limb_top_share * person.height_m
+    };
+    let who: Vec<Option<usize>> = parts.iter().map(nearest).collect();
+    let mut has_body = vec![false; people.len()];
+    for (part, &who) in parts.iter().zip(&who) {
+        if let Some(k) = who {
+            has_body[k] |= !is_piece(part, people[k]);
+        }
+    }
+    let mut pieces: Vec<Option<usize>> = vec![None; people.len()];
+    for (i, who) in who.into_iter().enumerate() {
+        let Some(k) = who.filter(|&k| !has_body[k]) else { continue };
+        match pieces[k] {
+            Some(first) => join(parts, first, i),
+            None => (pieces[k], parts[i].expected) = (Some(i), true),
+        }
+    }
+    tidy(parts);
+}
+
+/// Moves the points of part `j` to part `i`.
+fn join(parts: &mut [Part], i: usize, j: usize) {
+    let points = std::mem::take(&mut parts[j].points);
+    parts[i].points.extend(points);
+    let (sum_m, top_m) = (parts[j].sum_m, parts[j].top_m);
+    parts[i].sum_m += sum_m;
+    parts[i].top_m = parts[i].top_m.max(top_m);
+}
+
+/// Drops what was joined to others.
+fn tidy(parts: &mut Vec<Part>) {
     parts.retain(|part| !part.points.is_empty());
     parts.iter_mut().for_each(|part| part.points.sort_unstable());
 }
@@ -252,6 +295,19 @@ mod tests {
         let close = [body(0.0, 0.0), body(0.35, 0.0)].concat();
         assert_eq!(people(&close, &[]), 1);
         assert_eq!(people(&close, &[prior(0.0, 0.0), prior(0.4, 0.0)]), 2);
+    }
+
+    #[test]
+    fn two_legs_become_one_person_where_one_is_expected_and_stay_pieces_elsewhere() {
+        let config = Config::default().detect.split.evidence;
+        let leg = |y: f64| (0..8).map(move |i| DVec3::new(0.0, y, 0.05 * f64::from(i)));
+        let points_m: Vec<DVec3> = leg(-0.3).chain(leg(0.3)).collect();
+        let legs = || vec![Part::new(&points_m, (0..8).collect()), Part::new(&points_m, (8..16).collect())];
+        let (mut known, mut unknown) = (legs(), legs());
+        join_pieces(&mut known, &[prior(0.1, 0.0)], &config);
+        join_pieces(&mut unknown, &[prior(3.0, 0.0)], &config);
+        assert!(known.len() == 1 && known[0].expected && known[0].points.len() == 16);
+        assert!(unknown.len() == 2 && !unknown[0].expected);
     }
 
     #[test]

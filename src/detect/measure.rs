@@ -27,7 +27,7 @@ impl Measurer {
         }
     }
 
-    /// One detection a cluster that has a person's size.
+    /// One detection a cluster that has a person's size, or lies where a person is expected.
     pub fn detections(
         &mut self,
         points: &[Point],
@@ -38,8 +38,9 @@ impl Measurer {
         detections.clear();
         for cluster in clusters {
             let aabb = Aabb::around(cluster.iter().map(|&i| points[i as usize].position_m));
-            if self.has_size_of_person(cluster.len(), &aabb) {
-                detections.push(self.detection(points, cluster, priors, aabb));
+            let whole = self.has_size_of_person(cluster.len(), &aabb);
+            if whole || self.is_expected(&aabb, priors) {
+                detections.push(self.detection(points, cluster, priors, aabb, whole));
             }
         }
     }
@@ -57,7 +58,25 @@ impl Measurer {
             && aabb.max_m.z < c.top_max_m
     }
 
-    fn detection(&self, points: &[Point], cluster: &[u32], priors: &[Prior], aabb: Aabb) -> Detection {
+    /// True for what may be a part of somebody who is expected there.
+    fn is_expected(&self, aabb: &Aabb, priors: &[Prior]) -> bool {
+        let c = &self.config;
+        let (size_m, middle_m) = (aabb.size_m(), aabb.center_m().truncate());
+        let near = |prior: &Prior| {
+            let reach_m = c.expected_m + prior.position_sigma_m.min(c.expected_m);
+            prior.confirmed && prior.position_m.distance(middle_m) < reach_m
+        };
+        size_m.truncate().length() < c.diagonal_max_m && aabb.max_m.z < c.top_max_m && priors.iter().any(near)
+    }
+
+    fn detection(
+        &self,
+        points: &[Point],
+        cluster: &[u32],
+        priors: &[Prior],
+        aabb: Aabb,
+        whole: bool,
+    ) -> Detection {
         let n = cluster.len() as f64;
         let of = || cluster.iter().map(|&i| &points[i as usize]);
         let mean_m: DVec3 = of().map(|p| p.position_m).sum::<DVec3>() / n;
@@ -73,6 +92,7 @@ impl Measurer {
             z_m,
             time_ns: first_ns + late_ns / cluster.len() as i64,
             points: cluster.len() as u32,
+            whole,
             top_m: aabb.max_m.z,
             aabb,
             obb: obb(of().map(|p| p.position_m), mean_m, self.config.obb_axes),

@@ -59,6 +59,8 @@ pub struct Detection {
     pub time_ns: i64,
     /// How many points.
     pub points: u32,
+    /// False for points that do not look like a person, but lie where one is expected: legs, a head behind others.
+    pub whole: bool,
     /// Highest point above the floor.
     pub top_m: f64,
     /// Box along the site's axes.

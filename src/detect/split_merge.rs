@@ -57,8 +57,11 @@ impl Clusterer {
                     evidence::split(&self.moved_m, priors, component, &self.split.evidence, &mut self.parts);
                 }
                 evidence::merge(&mut self.parts, priors, &self.split.evidence);
-                let whole = self.parts.drain(..).map(|part| part.points);
-                clusters.extend(whole.filter(|c| c.len() >= self.cluster.points_min));
+                evidence::join_pieces(&mut self.parts, priors, &self.split.evidence);
+                // What too few points show counts only where somebody is expected.
+                let all =
+                    self.parts.drain(..).filter(|p| p.expected || p.points.len() >= self.cluster.points_min);
+                clusters.extend(all.map(|part| part.points));
             }
         }
         let first = |cluster: &Cluster| {

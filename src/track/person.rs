@@ -56,7 +56,7 @@ pub(super) struct Person {
 
 impl Person {
     pub(super) fn born(config: &TrackConfig, id: u64, detection: &Detection, time_ns: i64) -> Self {
-        let variance = noise(config, detection.points)[0][0];
+        let variance = noise(config, detection)[0][0];
         let mut person = Self {
             id,
             filter: Filter::new(config, detection.position_m, detection.z_m, variance),
@@ -89,7 +89,7 @@ impl Person {
         time_ns: i64,
         step_s: f64,
     ) {
-        self.filter.correct(detection.position_m, detection.z_m, noise(config, detection.points));
+        self.filter.correct(detection.position_m, detection.z_m, noise(config, detection));
         let there = self.existence * config.hit_ratio;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.hits += 1;
@@ -204,8 +204,9 @@ impl Person {
 }
 
 /// Covariance of a detection's position: part of its error falls with the number of points.
-pub(super) fn noise(config: &TrackConfig, points: u32) -> Mat2 {
-    let variance = config.noise_floor_m.powi(2) + config.noise_per_point_m.powi(2) / f64::from(points.max(1));
+pub(super) fn noise(config: &TrackConfig, detection: &Detection) -> Mat2 {
+    let floor_m = if detection.whole { config.noise_floor_m } else { config.piece_noise_m };
+    let variance = floor_m.powi(2) + config.noise_per_point_m.powi(2) / f64::from(detection.points.max(1));
     [[variance, 0.0], [0.0, variance]]
 }
 

@@ -108,6 +108,9 @@ impl Tracker {
         let now: Vec<State> = self.people.iter().map(|p| p.filter.state()).collect();
         let cost = |p: usize, d: usize| {
             let (person, detection) = (&self.people[p], detections[d]);
+            if !detection.whole && !person.confirmed {
+                return FORBIDDEN;
+            }
             // Nobody walks at 10 m/s: spares most pairs the rest.
             let reach_m = self.config.gate_m + 10.0 * seconds(last_ns, time_ns);
             if now[p].position_m().distance(detection.position_m) > reach_m {
@@ -164,7 +167,7 @@ impl Tracker {
         for (d, detection) in detections.iter().enumerate() {
             let taken = given.contains(&Some(d));
             let near = |place: &DVec2| place.distance(detection.position_m) <= self.config.birth_radius_m;
-            if taken || places.iter().any(near) {
+            if taken || !detection.whole || places.iter().any(near) {
                 continue;
             }
             let mut person = Person::born(&self.config, self.next_id, detection, time_ns);
@@ -193,7 +196,7 @@ fn pair_cost(config: &TrackConfig, person: &Person, after_s: f64, seen: f64, det
     let mut spread = state.position_covariance();
     let mut spread_z = person.filter.vertical.map(|z| z.P[0][0]);
     if config.gate_on == GateOn::Innovation {
-        let noise = noise(config, detection.points);
+        let noise = noise(config, detection);
         spread = plus(spread, noise);
         spread_z = spread_z.map(|z| z + noise[0][0]);
     }
