@@ -1,8 +1,10 @@
 //! Every implementation of stage 3 against `testdata/blockage/scenes.toml`, whose answers were computed by hand.
 
 use serde::Deserialize;
+use umbracast::Config;
 use umbracast::blockage::algorithm1::{PersonBox, cast_step};
-use umbracast::blockage::body::{BodySize, UprightBody};
+use umbracast::blockage::body::{self, Posture};
+use umbracast::config::{ArmsConfig, BodyConfig, SliceConfig};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 #[derive(Deserialize)]
@@ -79,19 +81,36 @@ fn algorithm_1_on_oriented_boxes() {
 
 #[test]
 fn trunk_and_head() {
-    let size =
-        BodySize { trunk_depth_m: 0.26, trunk_width_m: 0.56, shoulder_share: 0.82, head_diameter_m: 0.2 };
     for scene in corpus() {
-        let body = |p: &Person| {
-            UprightBody::new(&size, p.position_m, DVec2::from_angle(p.yaw_deg.to_radians()), p.size_m.z)
-        };
         let people = &scene.people;
         let blocked = |q: usize| {
             let ue_m = people[q].position_m.extend(0.5 * people[q].size_m.z);
-            let hit = |p: usize| body(&people[p]).hit(scene.access_point_m, ue_m).is_some();
-            (0..people.len()).any(|p| p != q && hit(p))
+            let hit = |p: &Person| {
+                let ahead = DVec2::from_angle(p.yaw_deg.to_radians());
+                let posture = Posture::standing(p.position_m, ahead, p.size_m.z);
+                body::blocks(&trunk_and_head_of(p.size_m.z), &posture, scene.access_point_m, ue_m)
+            };
+            (0..people.len()).any(|p| p != q && hit(&people[p]))
         };
         let found: Vec<bool> = (0..people.len()).map(blocked).collect();
         assert_eq!(found, scene.body, "{}: {}", scene.name, scene.why);
+    }
+}
+
+/// A trunk of 0.26 x 0.56 m up to .82 of the height with a head of 0.2 m; the arms are within the trunk.
+fn trunk_and_head_of(height_m: f64) -> BodyConfig {
+    let slice = |top: f64, depth_m: f64, width_m: f64| SliceConfig {
+        top,
+        half_depth: 0.5 * depth_m / height_m,
+        half_width: 0.5 * width_m / height_m,
+        ahead: 0.0,
+    };
+    let body = Config::default().blockage.body;
+    let arms = ArmsConfig { shoulder_out: 0.0, elbow_out: 0.0, hand_out: 0.0, ..body.arms };
+    BodyConfig {
+        slices: vec![slice(0.82, 0.26, 0.56), slice(1.0, 0.2, 0.2)],
+        sway: 0.0,
+        reach: 0.5,
+        arms: ArmsConfig { upper_radius: 0.01, fore_radius: 0.01, ..arms },
     }
 }

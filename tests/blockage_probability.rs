@@ -1,10 +1,13 @@
 //! The sampled probability against answers known in closed form.
 
 use umbracast::blockage::{Blockage, Caster};
+use umbracast::config::{ArmsConfig, SliceConfig};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
 use umbracast::track::{Observed, Track};
-use umbracast::{Config, STEP_S};
+use umbracast::{Config, STEP_S, STEPS};
+
+const HEIGHT_M: f64 = 1.75;
 
 /// One access point at 1 m at the origin; bodies of 0.56 m turned towards it, of exactly known size and heading.
 fn config(samples: usize) -> Config {
@@ -15,15 +18,27 @@ fn config(samples: usize) -> Config {
     config.blockage.size_sigma_share = 0.0;
     config.blockage.height_sigma_m = 0.0;
     config.blockage.heading_sigma_deg = 0.0;
-    config.blockage.trunk_width_m = 0.56;
-    config.blockage.trunk_depth_m = 0.26;
+    let share = |half_m: f64| half_m / HEIGHT_M;
+    let slice = SliceConfig { top: 1.0, half_depth: share(0.13), half_width: share(0.28), ahead: 0.0 };
+    config.blockage.body.slices = vec![slice];
+    config.blockage.body.sway = 0.0;
+    // Arms within the trunk.
+    config.blockage.body.arms = ArmsConfig {
+        shoulder_out: 0.0,
+        elbow_out: 0.0,
+        hand_out: 0.0,
+        upper_radius: 0.01,
+        fore_radius: 0.01,
+        still_share: 1.0,
+        ..config.blockage.body.arms
+    };
     config
 }
 
 fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -> (Track, Forecast) {
     let aabb = Aabb {
         min_m: position_m.extend(0.0) - DVec3::new(0.25, 0.25, 0.0),
-        max_m: position_m.extend(1.75) + DVec3::new(0.25, 0.25, 0.0),
+        max_m: position_m.extend(HEIGHT_M) + DVec3::new(0.25, 0.25, 0.0),
     };
     let mut covariance = [[0.0; 4]; 4];
     (0..4).for_each(|i| covariance[i][i] = variance[i]);
@@ -34,7 +49,7 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         covariance,
         heading_rad: 0.0,
         heading_sigma_rad: 0.0,
-        height_m: 1.75,
+        height_m: HEIGHT_M,
         height_sigma_m: 0.0,
         points: 30,
         confirmed: true,
@@ -112,4 +127,44 @@ fn standing_still_a_window_is_no_likelier_than_now() {
     let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.01, 0.01, 0.0, 0.0]);
     let b = cast(&config(512), vec![near, user])[1];
     assert_eq!(b.p[8], b.p_now);
+}
+
+#[test]
+fn onset_and_duration_bracket_when_a_walker_enters_and_leaves_the_ray() {
+    // As above, in the way from step 4 on, and out of it 0.28 m beyond the ray: at step 10, too late to be told.
+    let walker = |y_m: f64| person(1, DVec2::new(4.0, y_m), DVec2::new(0.0, -1.0), [0.0; 4]);
+    let user = || person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
+    let coming = cast(&config(4), vec![walker(0.65), user()])[1];
+    assert_eq!((coming.onset_s, coming.duration_s), ([Some(4.0 * STEP_S); 3], [None; 3]));
+    // 0.05 m before the ray it takes four steps to come out of it.
+    let there = cast(&config(4), vec![walker(0.05), user()])[1];
+    assert_eq!((there.onset_s, there.duration_s), ([None; 3], [Some(4.0 * STEP_S); 3]));
+}
+
+#[test]
+fn who_comes_no_sooner_than_the_last_step_has_no_onset() {
+    let walker = person(1, DVec2::new(4.0, 2.0), DVec2::new(0.0, -1.0), [0.0; 4]);
+    let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
+    let found = cast(&config(4), vec![walker, user])[1];
+    assert_eq!((found.onset_s, found.p[STEPS - 1]), ([None; 3], 0.0));
+}
+
+#[test]
+fn arms_that_swing_make_a_walker_seen_from_the_side_block_sooner() {
+    // He walks across the ray towards it and is 0.33 m away, with a trunk 0.13 m deep: a hand may be in the way.
+    let mut config = config(256);
+    config.blockage.body.arms = Config::default().blockage.body.arms;
+    config.site.access_points[0].position_m[2] = 0.7;
+    let p_now = |still_share: f64, speed_mps: f64| {
+        let mut config = config.clone();
+        config.blockage.body.arms.still_share = still_share;
+        let (mut track, forecast) = person(1, DVec2::new(4.0, 0.33), DVec2::new(0.0, -speed_mps), [0.0; 4]);
+        track.heading_rad = -std::f64::consts::FRAC_PI_2;
+        let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
+        cast(&config, vec![(track, forecast), user])[1].p_now
+    };
+    let (swinging, some, standing) = (p_now(0.0, 1.2), p_now(0.5, 1.2), p_now(0.0, 0.0));
+    assert!(swinging > 0.2 && swinging < 0.9, "{swinging}");
+    assert!(some > 0.3 * swinging && some < 0.7 * swinging, "{some} of {swinging}");
+    assert_eq!(standing, 0.0);
 }

@@ -1,19 +1,139 @@
-//! What a ray meets: an upright body made of two elliptic cylinders, a trunk up to the shoulders and a head.
-//! One box to the top of the head does far worse (the report's ladder): above the shoulders there is only a head.
+//! What a ray meets: an upright body of a few numbers, a stack of elliptic slices with two arms that swing. One
+//! box to the top of the head does far worse (the report's ladder): above the shoulders there is only a head.
+//!
+//! All sizes are shares of the standing height (`config/default.toml`); nothing here knows the simulator's meshes.
 
+use std::f64::consts::PI;
+
+use crate::config::{ArmsConfig, BodyConfig};
 use crate::geometry::{DVec2, DVec3};
 
-/// The sizes of a body, shares of its height where they scale with it.
+/// The hip joint above the floor, share of the height. Gait goes by speed over it (Boulic and Thalmann 1990).
+const HIP_SHARE: f64 = 0.53;
+/// From this speed over hip height (1/s) on the trunk's sway is all there.
+const FULL_SWAY_HZ: f64 = 0.5;
+/// Gaits are known up to here: 2 m/s.
+const FASTEST_HZ: f64 = 2.0;
+/// Stride over sqrt(speed x height), sqrt(s), by the same source.
+const STRIDE: f64 = 0.98;
+
+/// How one body stands or walks at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodySize {
-    /// Trunk front to back, metres.
-    pub trunk_depth_m: f64,
-    /// Trunk with hanging arms side to side, metres.
-    pub trunk_width_m: f64,
-    /// Top of the shoulders, share of the standing height. The trunk's cylinder reaches down to the floor.
-    pub shoulder_share: f64,
-    /// Head, metres.
-    pub head_diameter_m: f64,
+pub struct Posture {
+    /// Ground point of the axis.
+    pub position_m: DVec2,
+    /// Unit vector of the heading.
+    pub ahead: DVec2,
+    /// Standing height.
+    pub height_m: f64,
+    /// Factor on every half axis and radius.
+    pub girth: f64,
+    /// 0 standing.
+    pub speed_mps: f64,
+    /// Since the right heel touched the floor; a stride is a full turn.
+    pub phase_rad: f64,
+    /// Factor on the swing of the arms: 0 for arms that hang still.
+    pub swing: f64,
+}
+
+impl Posture {
+    /// Of a body of usual girth that stands still.
+    pub fn standing(position_m: DVec2, ahead: DVec2, height_m: f64) -> Self {
+        Self { position_m, ahead, height_m, girth: 1.0, speed_mps: 0.0, phase_rad: 0.0, swing: 0.0 }
+    }
+
+    fn relative_speed_hz(&self) -> f64 {
+        (self.speed_mps / (HIP_SHARE * self.height_m)).min(FASTEST_HZ)
+    }
+}
+
+/// Length of a stride; the phase advances with the way walked.
+pub fn stride_m(speed_mps: f64, height_m: f64) -> f64 {
+    STRIDE * (speed_mps * height_m).sqrt()
+}
+
+/// True when the segment meets the body; touching counts.
+pub fn blocks(body: &BodyConfig, posture: &Posture, start_m: DVec3, end_m: DVec3) -> bool {
+    let local = |v: DVec3| {
+        let from_axis = v.truncate() - posture.position_m;
+        DVec3::new(posture.ahead.dot(from_axis), posture.ahead.perp_dot(from_axis), v.z)
+    };
+    let (start, end) = (local(start_m), local(end_m));
+    let h = posture.height_m;
+    let nearest_m2 = distance2_to_segment(DVec2::ZERO, start.truncate(), end.truncate());
+    if nearest_m2 > (body.reach * h * posture.girth.max(1.0)).powi(2) || start.z.min(end.z) > h {
+        return false;
+    }
+    let speed_hz = posture.relative_speed_hz();
+    // The trunk rides over the foot that stands: to the left while the left one does.
+    let sway_m = -body.sway * h * sway_share(speed_hz) * (posture.phase_rad - 0.2 * PI).sin();
+    let mut bottom_m = 0.0;
+    for slice in &body.slices {
+        let cylinder = EllipticCylinder {
+            center_m: DVec2::new(slice.ahead * h, sway_m),
+            ahead: DVec2::X,
+            half_depth_m: slice.half_depth * h * posture.girth,
+            half_width_m: slice.half_width * h * posture.girth,
+            bottom_m,
+            top_m: slice.top * h,
+        };
+        if cylinder.hit(start, end).is_some() {
+            return true;
+        }
+        bottom_m = cylinder.top_m;
+    }
+    let sway = DVec3::new(0.0, sway_m, 0.0);
+    arm_blocks(&body.arms, posture, speed_hz, -1.0, start - sway, end - sway)
+        || arm_blocks(&body.arms, posture, speed_hz, 1.0, start - sway, end - sway)
+}
+
+/// Sway rises with the speed and stays (the source's published codes jump where this bends).
+fn sway_share(speed_hz: f64) -> f64 {
+    if speed_hz < FULL_SWAY_HZ { 4.0 * speed_hz * (1.0 - speed_hz) } else { 1.0 }
+}
+
+/// An arm of two rods; `side` is 1 on the left. It swings against the leg of its side, and farther ahead than back
+/// because the elbow bends.
+fn arm_blocks(
+    arms: &ArmsConfig,
+    posture: &Posture,
+    speed_hz: f64,
+    side: f64,
+    start: DVec3,
+    end: DVec3,
+) -> bool {
+    let h = posture.height_m;
+    let wave = side * posture.phase_rad.cos();
+    let swing = posture.swing * speed_hz;
+    let elbow_ahead = swing * arms.elbow_swing * wave;
+    let hand_ahead = swing * (arms.hand_ahead + arms.hand_swing * wave);
+    let at = |ahead: f64, out: f64, up: f64| DVec3::new(ahead, side * out, up) * h;
+    let shoulder = at(0.0, arms.shoulder_out, arms.shoulder_up);
+    let elbow = at(elbow_ahead, arms.elbow_out, arms.elbow_up);
+    let hand = at(hand_ahead, arms.hand_out, arms.hand_up);
+    let touches = |a: DVec3, b: DVec3, radius: f64| {
+        distance2_of_segments(start, end, a, b) <= (radius * h * posture.girth).powi(2)
+    };
+    touches(shoulder, elbow, arms.upper_radius) || touches(elbow, hand, arms.fore_radius)
+}
+
+/// Square of the distance of a point to a segment.
+pub(super) fn distance2_to_segment(point: DVec2, start: DVec2, end: DVec2) -> f64 {
+    let along = end - start;
+    let t = ((point - start).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    point.distance_squared(start + along * t)
+}
+
+/// Square of the smallest distance between the segments p and q.
+fn distance2_of_segments(p_start: DVec3, p_end: DVec3, q_start: DVec3, q_end: DVec3) -> f64 {
+    let (d, e, r) = (p_end - p_start, q_end - q_start, p_start - q_start);
+    let (a, b, c) = (d.dot(d).max(f64::MIN_POSITIVE), d.dot(e), e.dot(e).max(f64::MIN_POSITIVE));
+    let (f, g) = (d.dot(r), e.dot(r));
+    let parallel = a * c - b * b;
+    let on_p = if parallel > 0.0 { ((b * g - c * f) / parallel).clamp(0.0, 1.0) } else { 0.0 };
+    let on_q = ((b * on_p + g) / c).clamp(0.0, 1.0);
+    let on_p = ((b * on_q - f) / a).clamp(0.0, 1.0);
+    (r + d * on_p - e * on_q).length_squared()
 }
 
 /// An upright cylinder with an elliptic base.
@@ -71,81 +191,79 @@ impl EllipticCylinder {
     }
 }
 
-/// Trunk and head of one person.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UprightBody {
-    /// From the floor to the shoulders, arms included.
-    pub trunk: EllipticCylinder,
-    /// From the shoulders to the vertex.
-    pub head: EllipticCylinder,
-}
-
-impl UprightBody {
-    /// A body that stands at `position_m`, looks along `ahead` (unit) and is `height_m` tall.
-    pub fn new(size: &BodySize, position_m: DVec2, ahead: DVec2, height_m: f64) -> Self {
-        let shoulder_m = size.shoulder_share * height_m;
-        let part = |depth_m: f64, width_m: f64, bottom_m: f64, top_m: f64| EllipticCylinder {
-            center_m: position_m,
-            ahead,
-            half_depth_m: 0.5 * depth_m,
-            half_width_m: 0.5 * width_m,
-            bottom_m,
-            top_m,
-        };
-        Self {
-            trunk: part(size.trunk_depth_m, size.trunk_width_m, 0.0, shoulder_m),
-            head: part(size.head_diameter_m, size.head_diameter_m, shoulder_m, height_m),
-        }
-    }
-
-    /// Where along the segment the body is first met, a fraction from 0 to 1.
-    pub fn hit(&self, start_m: DVec3, end_m: DVec3) -> Option<f64> {
-        match (self.trunk.hit(start_m, end_m), self.head.hit(start_m, end_m)) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Config;
 
-    const SIZE: BodySize =
-        BodySize { trunk_depth_m: 0.26, trunk_width_m: 0.56, shoulder_share: 0.82, head_diameter_m: 0.2 };
-
-    fn blocked(offset_y_m: f64, height_m: f64) -> bool {
-        let body = UprightBody::new(&SIZE, DVec2::new(5.0, 0.0), DVec2::X, 1.75);
-        let start = DVec3::new(0.0, offset_y_m, height_m);
-        body.hit(start, start + DVec3::new(10.0, 0.0, 0.0)).is_some()
+    fn body() -> BodyConfig {
+        Config::default().blockage.body
     }
 
-    #[test]
-    fn trunk_is_as_wide_as_it_says_and_ends_at_the_shoulders() {
-        assert!(blocked(0.279, 1.0) && !blocked(0.281, 1.0));
-        assert!(blocked(0.279, 1.434) && !blocked(0.279, 1.436));
+    fn posture(phase_rad: f64) -> Posture {
+        let standing = Posture::standing(DVec2::new(5.0, 0.0), DVec2::X, 1.75);
+        Posture { speed_mps: 1.0, swing: 1.0, phase_rad, ..standing }
+    }
+
+    /// A level ray across the body, `ahead_m` before its axis.
+    fn blocked_across(posture: &Posture, ahead_m: f64, height_m: f64) -> bool {
+        let x_m = posture.position_m.x + ahead_m;
+        blocks(&body(), posture, DVec3::new(x_m, -3.0, height_m), DVec3::new(x_m, 3.0, height_m))
+    }
+
+    /// A level ray along the way, `left_m` beside the axis.
+    fn blocked_along(posture: &Posture, left_m: f64, height_m: f64) -> bool {
+        blocks(&body(), posture, DVec3::new(0.0, left_m, height_m), DVec3::new(10.0, left_m, height_m))
     }
 
     #[test]
     fn above_the_shoulders_there_is_only_a_head() {
-        assert!(blocked(0.099, 1.6) && !blocked(0.101, 1.6));
-        assert!(!blocked(0.0, 1.751));
+        let standing = Posture { speed_mps: 0.0, ..posture(0.0) };
+        assert!(blocked_along(&standing, 0.2, 1.3) && !blocked_along(&standing, 0.2, 1.6));
+        assert!(blocked_along(&standing, 0.0, 1.7) && !blocked_along(&standing, 0.0, 1.76));
     }
 
     #[test]
-    fn a_turned_body_shows_its_depth() {
-        let body = UprightBody::new(&SIZE, DVec2::new(5.0, 0.0), DVec2::Y, 1.75);
-        let ray = |y: f64| (DVec3::new(0.0, y, 1.0), DVec3::new(10.0, y, 1.0));
-        let (start, end) = ray(0.129);
-        assert!(body.hit(start, end).is_some());
-        let (start, end) = ray(0.131);
-        assert!(body.hit(start, end).is_none());
+    fn hands_of_a_walker_are_ahead_of_him_once_a_stride_each_and_of_a_standing_one_never() {
+        let reaches = |posture: &Posture| blocked_across(posture, 0.35, 0.44 * 1.75);
+        let phases = (0..16).map(|k| f64::from(k) * PI / 8.0);
+        let ahead: Vec<bool> = phases.map(|phase| reaches(&posture(phase))).collect();
+        assert!(ahead[0] && ahead[8] && !ahead[4] && !ahead[12], "{ahead:?}");
+        assert!(!reaches(&Posture { speed_mps: 0.0, ..posture(0.0) }));
+        assert!(!reaches(&Posture { swing: 0.0, ..posture(0.0) }));
     }
 
     #[test]
-    fn a_vertical_ray_and_one_that_ends_before_the_body() {
-        let body = UprightBody::new(&SIZE, DVec2::new(5.0, 0.0), DVec2::X, 1.75);
-        assert_eq!(body.hit(DVec3::new(5.0, 0.05, 3.0), DVec3::new(5.0, 0.05, 0.0)), Some(1.25 / 3.0));
-        assert_eq!(body.hit(DVec3::new(0.0, 0.0, 1.0), DVec3::new(4.8, 0.0, 1.0)), None);
+    fn the_trunk_rides_over_the_foot_that_stands() {
+        // The right foot stands in the first half of the stride, the left one in the second.
+        let side = |phase: f64, left_m: f64| blocked_along(&posture(phase), left_m, 0.95 * 1.75);
+        assert!(side(1.7 * PI, 0.07) && !side(0.7 * PI, 0.07) && side(0.7 * PI, -0.07));
+    }
+
+    #[test]
+    fn a_ray_that_ends_before_the_body_or_passes_above_it_is_clear() {
+        let standing = Posture { speed_mps: 0.0, ..posture(0.0) };
+        let clear = |start: DVec3, end: DVec3| !blocks(&body(), &standing, start, end);
+        assert!(clear(DVec3::new(0.0, 0.0, 1.0), DVec3::new(4.8, 0.0, 1.0)));
+        assert!(clear(DVec3::new(0.0, 0.0, 2.0), DVec3::new(10.0, 0.0, 1.8)));
+        assert!(!clear(DVec3::new(5.0, 0.0, 3.0), DVec3::new(5.0, 0.0, 0.1)), "straight down");
+    }
+
+    #[test]
+    fn distance_of_segments_against_many_points_on_both() {
+        let at = |i: u32| f64::from(i) / 200.0;
+        let p = [DVec3::new(0.0, 0.0, 0.0), DVec3::new(1.0, 0.5, 0.2)];
+        for q in [
+            [DVec3::new(0.2, 0.9, 0.1), DVec3::new(0.9, -0.4, 1.0)],
+            [DVec3::new(2.0, 1.0, 0.0), DVec3::new(3.0, 1.5, 0.2)],
+            [DVec3::new(-1.0, 0.3, 0.0), DVec3::new(-0.4, 0.3, 0.5)],
+        ] {
+            let points = (0..=200).flat_map(|i| (0..=200).map(move |j| (i, j)));
+            let nearest = points
+                .map(|(i, j)| p[0].lerp(p[1], at(i)).distance_squared(q[0].lerp(q[1], at(j))))
+                .fold(f64::INFINITY, f64::min);
+            let found = distance2_of_segments(p[0], p[1], q[0], q[1]);
+            assert!((found - nearest).abs() < 1e-3 && found <= nearest + 1e-12, "{found}, {nearest}");
+        }
     }
 }

@@ -2,7 +2,6 @@
 
 use super::Blockage;
 use super::algorithm1::{self, PersonBox};
-use super::body::BodySize;
 use super::probability::Sampler;
 use crate::config::{BlockageConfig, BlockageMethod, BoxKind};
 use crate::forecast::Forecast;
@@ -82,33 +81,29 @@ impl Caster {
                 p_now: f64::from(u8::from(now[i])),
                 blocked: windows[i],
                 p: windows[i].map(|b| f64::from(u8::from(b))),
+                onset_s: [None; 3],
+                duration_s: [None; 3],
             }));
         }
     }
 
     /// Our way: bodies on sampled ways, a probability and a threshold.
     fn cast_samples(&mut self, people: &[(&Track, &Forecast)], blockages: &mut Vec<Blockage>) {
-        let size = BodySize {
-            trunk_depth_m: self.config.trunk_depth_m,
-            trunk_width_m: self.config.trunk_width_m,
-            shoulder_share: self.config.shoulder_share,
-            head_diameter_m: self.config.head_diameter_m,
-        };
         self.sampler.draw(&self.config, people);
         for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
             for (person, (track, _)) in people.iter().enumerate() {
-                let (p_now, p) = self.sampler.probabilities(&size, &self.ue, ap_m, person);
-                let mut blocked = [false; STEPS];
-                for w in 0..STEPS {
-                    blocked[w] = p[w] >= self.config.threshold[w];
-                }
+                let chances = self.sampler.chances(&self.config, &self.ue, ap_m, person);
+                let blocked_now = chances.p_now >= self.config.threshold_now;
+                let (p, none) = (chances.p, [None; 3]);
                 blockages.push(Blockage {
                     access_point,
                     track: track.id,
-                    blocked_now: p_now >= self.config.threshold_now,
-                    p_now,
-                    blocked,
+                    blocked_now,
+                    p_now: chances.p_now,
+                    blocked: std::array::from_fn(|w| p[w] >= self.config.threshold[w]),
                     p,
+                    onset_s: if blocked_now { none } else { chances.onset_s },
+                    duration_s: if blocked_now { chances.clear_s } else { none },
                 });
             }
         }

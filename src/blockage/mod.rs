@@ -2,6 +2,7 @@
 
 pub mod body;
 pub mod algorithm1;
+mod draws;
 pub mod probability;
 pub mod caster;
 
@@ -24,4 +25,9 @@ pub struct Blockage {
     pub blocked: [bool; STEPS],
     /// The same as a probability; never falls with w. 0 or 1 where the method is binary.
     pub p: [f64; STEPS],
+    /// 10, 50 and 90 % quantiles of the time until a link in sight now is blocked, seconds, in whole steps. `None`
+    /// where it lies beyond the last step, where the link is blocked now, and where the method is binary.
+    pub onset_s: [Option<f64>; 3],
+    /// The same of the time until a link blocked now is clear. `None` where the link is in sight now as well.
+    pub duration_s: [Option<f64>; 3],
 }

@@ -1,13 +1,13 @@
 //! The probability that a link is blocked, now and within each window: everybody's way is sampled together
-//! from the forecast's joint distribution, with body sizes and headings, and rays are cast in every sample.
-//! Steps of a window, and links that share a blocker, hang together as they do in reality.
+//! from the forecast's joint distribution, with body sizes, headings and the phase of the gait, and rays are cast in
+//! every sample. Steps of a window, and links that share a blocker, hang together as they do in reality.
 
-use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
-use rand_pcg::Pcg64Mcg;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
-use super::body::{BodySize, UprightBody};
+use super::body::{self, Posture, distance2_to_segment};
 use super::caster::{heading_at, position_at};
+use super::draws::Draws;
 use crate::config::BlockageConfig;
 use crate::forecast::Forecast;
 use crate::geometry::{DVec2, DVec3};
@@ -15,95 +15,148 @@ use crate::site::Ue;
 use crate::track::Track;
 use crate::{STEP_S, STEPS};
 
-/// Nobody's body reaches farther from its axis than this, metres.
-const REACH_M: f64 = 0.6;
+/// Below this speed a velocity says little about where somebody faces.
+const FACES_FROM_MPS: f64 = 0.3;
+/// Quantiles of times that are told.
+const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
+
+/// What the samples say of one link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chances {
+    /// That it is blocked now.
+    pub p_now: f64,
+    /// Index w - 1: that it is blocked at any of steps 1..=w.
+    pub p: [f64; STEPS],
+    /// Quantiles of the time until it is blocked, over the samples in which it is in sight now.
+    pub onset_s: [Option<f64>; 3],
+    /// Quantiles of the time until it is clear, over the samples in which it is blocked now.
+    pub clear_s: [Option<f64>; 3],
+}
 
 /// Samples of all people in one frame.
 #[derive(Debug, Default)]
 pub struct Sampler {
     samples: usize,
+    /// By track: what a person's samples are made of, drawn once.
+    draws: BTreeMap<u64, Draws>,
     people: Vec<Ways>,
-    blocked: Vec<bool>,
+    /// By sample: bit s set where the link is blocked at step s.
+    blocked: Vec<u16>,
 }
 
 /// Samples of one person. Positions of step s, sample k at `s * samples + k`; step 0 is now.
 #[derive(Debug, Default)]
 struct Ways {
     positions_m: Vec<DVec2>,
-    /// Unit vector of the heading, the same indices.
-    ahead: Vec<DVec2>,
-    /// By sample.
-    height_m: Vec<f64>,
-    /// By sample: factor on the trunk's width and depth.
-    girth: Vec<f64>,
+    /// By step: the heading's unit vector, to be turned by the sample's `turn`.
+    ahead: [DVec2; STEPS + 1],
+    traits: Vec<Traits>,
     /// By step: middle of the samples and how far the farthest lies from it.
     center_m: [DVec2; STEPS + 1],
     spread_m: [f64; STEPS + 1],
     height_max_m: f64,
+    reach_m: f64,
+}
+
+/// What stays through the steps of a sample.
+#[derive(Debug, Clone, Copy)]
+struct Traits {
+    turn: DVec2,
+    height_m: f64,
+    girth: f64,
+    speed_mps: f64,
+    phase_rad: f64,
+    phase_step_rad: f64,
+    swing: f64,
 }
 
 impl Sampler {
     /// Draws everybody's ways. A person's draws depend on the seed, the track and nothing else, so the samples
     /// of one frame and the next differ only by what the tracks learned.
     pub fn draw(&mut self, config: &BlockageConfig, people: &[(&Track, &Forecast)]) {
-        self.samples = config.samples.max(1);
+        self.samples = config.samples;
         self.people.resize_with(people.len(), Ways::default);
+        self.draws.retain(|&id, _| people.iter().any(|(track, _)| track.id == id));
         for (ways, (track, forecast)) in self.people.iter_mut().zip(people) {
-            ways.draw(config, self.samples, track, forecast);
+            let draws = self
+                .draws
+                .entry(track.id)
+                .or_insert_with(|| Draws::new(config.samples, config.seed, track.id));
+            ways.fill(config, draws, track, forecast);
         }
     }
 
-    /// Probability that the link of `person` is blocked now, and within each window.
-    pub fn probabilities(
-        &mut self,
-        size: &BodySize,
-        ue: &Ue,
-        ap_m: DVec3,
-        person: usize,
-    ) -> (f64, [f64; STEPS]) {
-        let n = self.samples;
-        let share = |blocked: &[bool]| blocked.iter().filter(|&&b| b).count() as f64 / n as f64;
+    /// What becomes of the link of `person`.
+    pub fn chances(&mut self, config: &BlockageConfig, ue: &Ue, ap_m: DVec3, person: usize) -> Chances {
         self.blocked.clear();
-        self.blocked.resize(n, false);
-        self.mark(size, ue, ap_m, person, 0);
-        let p_now = share(&self.blocked);
-        self.blocked.fill(false);
-        let mut p = [0.0; STEPS];
-        for step in 1..=STEPS {
-            self.mark(size, ue, ap_m, person, step);
-            p[step - 1] = share(&self.blocked);
+        self.blocked.resize(self.samples, 0);
+        for step in 0..=STEPS {
+            self.mark(config, ue, ap_m, person, step);
         }
-        (p_now, p)
+        let blocked = &self.blocked;
+        let share =
+            |steps: u16| blocked.iter().filter(|&&at| at & steps != 0).count() as f64 / blocked.len() as f64;
+        // Steps after now until the bits are no longer zero; 16 where they never are.
+        let first = |bits: u16| bits.trailing_zeros();
+        let onsets = blocked.iter().filter(|&&at| at & 1 == 0).map(|&at| first(at));
+        let clears = blocked.iter().filter(|&&at| at & 1 == 1).map(|&at| first(!at & ALL_STEPS));
+        Chances {
+            p_now: share(1),
+            p: std::array::from_fn(|w| share((1 << (w + 2)) - 2)),
+            onset_s: quantiles_s(onsets),
+            clear_s: quantiles_s(clears),
+        }
     }
 
-    /// Marks the samples whose link is blocked at `step`; those marked already stay so.
-    fn mark(&mut self, size: &BodySize, ue: &Ue, ap_m: DVec3, person: usize, step: usize) {
+    /// Sets the bit of `step` in the samples whose link is blocked then.
+    fn mark(&mut self, config: &BlockageConfig, ue: &Ue, ap_m: DVec3, person: usize, step: usize) {
         let q = &self.people[person];
         let ap = ap_m.truncate();
-        let reach_m = REACH_M + ue.forward_m.abs() + ue.left_m.abs();
+        let ue_reach_m = ue.forward_m.abs() + ue.left_m.abs();
         for (other, p) in self.people.iter().enumerate() {
             if other == person || !may_block(ap_m, ue, q, p, step) {
                 continue;
             }
+            let reach_m = p.reach_m + ue_reach_m;
             for (k, blocked) in self.blocked.iter_mut().enumerate() {
                 let i = step * self.samples + k;
                 let (at_p, at_q) = (p.positions_m[i], q.positions_m[i]);
-                // Whoever stands beyond the UE cannot be in the way.
-                if *blocked || at_p.distance_squared(ap) > (at_q.distance(ap) + reach_m).powi(2) {
+                // Already blocked by another, or nobody near the segment seen from above.
+                if *blocked & (1 << step) != 0 || distance2_to_segment(at_p, ap, at_q) > reach_m * reach_m {
                     continue;
                 }
-                let heading_rad = q.ahead[i].to_angle();
-                let ue_m = ue.on_body(at_q, heading_rad, q.height_m[k]);
-                let girth = p.girth[k];
-                let size = BodySize {
-                    trunk_depth_m: size.trunk_depth_m * girth,
-                    trunk_width_m: size.trunk_width_m * girth,
-                    ..*size
-                };
-                *blocked = UprightBody::new(&size, at_p, p.ahead[i], p.height_m[k]).hit(ap_m, ue_m).is_some();
+                let heading_rad = || q.ahead[step].rotate(q.traits[k].turn).to_angle();
+                let facing_rad = if ue_reach_m > 0.0 { heading_rad() } else { 0.0 };
+                let ue_m = ue.on_body(at_q, facing_rad, q.traits[k].height_m);
+                if body::blocks(&config.body, &p.posture(step, k, at_p), ap_m, ue_m) {
+                    *blocked |= 1 << step;
+                }
             }
         }
     }
+}
+
+/// Bits of now and all steps.
+const ALL_STEPS: u16 = (1 << (STEPS + 1)) - 1;
+
+/// Of times given in steps; `None` where a quantile lies beyond the last step, or over nothing.
+fn quantiles_s(steps: impl Iterator<Item = u32>) -> [Option<f64>; 3] {
+    let mut counts = [0_usize; STEPS + 1];
+    let mut total = 0;
+    for step in steps {
+        total += 1;
+        if let Some(count) = counts.get_mut(step as usize) {
+            *count += 1;
+        }
+    }
+    LEVELS.map(|level| {
+        let mut sum = 0;
+        let reached = |step: &usize| {
+            sum += counts[*step];
+            sum > 0 && sum as f64 >= level * total as f64
+        };
+        (0..=STEPS).find(reached).map(|step| step as f64 * STEP_S)
+    })
 }
 
 /// False where no sample of `p` can stand in the way of any sample of `q`: seen from above it is too far from
@@ -112,7 +165,7 @@ fn may_block(ap_m: DVec3, ue: &Ue, q: &Ways, p: &Ways, step: usize) -> bool {
     let (start, end) = (ap_m.truncate(), q.center_m[step]);
     let along = end - start;
     let t = ((p.center_m[step] - start).dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
-    let reach = REACH_M + ue.forward_m.abs() + ue.left_m.abs() + p.spread_m[step] + q.spread_m[step];
+    let reach = p.reach_m + ue.forward_m.abs() + ue.left_m.abs() + p.spread_m[step] + q.spread_m[step];
     if p.center_m[step].distance_squared(start + along * t) > reach * reach {
         return false;
     }
@@ -123,45 +176,87 @@ fn may_block(ap_m: DVec3, ue: &Ue, q: &Ways, p: &Ways, step: usize) -> bool {
 }
 
 impl Ways {
-    fn draw(&mut self, config: &BlockageConfig, samples: usize, track: &Track, forecast: &Forecast) {
-        let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ track.id.wrapping_mul(0x9E37_79B9_7F4A_7C15));
-        let mut normal = || random.sample::<f64, _>(StandardNormal);
+    fn fill(&mut self, config: &BlockageConfig, draws: &Draws, track: &Track, forecast: &Forecast) {
+        let samples = config.samples;
         let state_root = root(&forecast.coupling.state);
         // A constant acceleration over each step with the step's share of the white one.
         let kick_root_mps2 = root(&forecast.coupling.acceleration_psd.map(|row| row.map(|psd| psd / STEP_S)));
         self.positions_m.resize((STEPS + 1) * samples, DVec2::ZERO);
-        self.ahead.resize((STEPS + 1) * samples, DVec2::X);
-        self.height_m.clear();
-        self.girth.clear();
-        let means: [(DVec2, f64); STEPS + 1] =
-            std::array::from_fn(|s| (position_at(track, forecast, s), heading_at(track, forecast, s)));
+        self.traits.clear();
+        let means: [DVec2; STEPS + 1] = std::array::from_fn(|s| position_at(track, forecast, s));
+        self.ahead = std::array::from_fn(|s| DVec2::from_angle(heading_at(track, forecast, s)));
+        let velocity = track.velocity_mps;
         for k in 0..samples {
-            let z = [normal(), normal(), normal(), normal()];
-            let e: [f64; 4] = std::array::from_fn(|r| (0..=r).map(|c| state_root[r][c] * z[c]).sum());
+            let e: [f64; 4] =
+                std::array::from_fn(|r| (0..=r).map(|c| state_root[r][c] * draws.state[c][k]).sum());
             let (mut offset, mut drift) = (DVec2::new(e[0], e[1]), DVec2::new(e[2], e[3]));
-            let turn = config.heading_sigma_deg.to_radians() * normal();
-            self.height_m.push((track.height_m + config.height_sigma_m * normal()).max(0.5));
-            self.girth.push((1.0 + config.size_sigma_share * normal()).clamp(0.5, 1.8));
-            for (s, &(mean_m, heading_rad)) in means.iter().enumerate() {
+            self.traits.push(Traits::new(config, draws, k, track, velocity, drift));
+            for (s, &mean_m) in means.iter().enumerate() {
                 if s > 0 {
-                    let z = [normal(), normal()];
+                    let [x, y] = &draws.kicks[s - 1];
                     let [[xx, _], [xy, yy]] = kick_root_mps2;
-                    let kick = DVec2::new(xx * z[0], xy * z[0] + yy * z[1]);
+                    let kick = DVec2::new(xx * x[k], xy * x[k] + yy * y[k]);
                     offset += drift * STEP_S + kick * (0.5 * STEP_S * STEP_S);
                     drift += kick * STEP_S;
                 }
                 self.positions_m[s * samples + k] = mean_m + offset;
-                self.ahead[s * samples + k] = DVec2::from_angle(heading_rad + turn);
             }
         }
-        self.height_max_m = self.height_m.iter().fold(0.0, |a, &b| a.max(b));
+        self.height_max_m = self.traits.iter().fold(0.0, |a, b| a.max(b.height_m));
+        let girth_max = self.traits.iter().fold(1.0, |a: f64, b| a.max(b.girth));
+        self.reach_m = config.body.reach * self.height_max_m * girth_max;
         for s in 0..=STEPS {
-            let center = means[s].0;
+            let center = means[s];
             self.center_m[s] = center;
             self.spread_m[s] = self.positions_m[s * samples..(s + 1) * samples]
                 .iter()
                 .fold(0.0_f64, |a, p| a.max(p.distance_squared(center)))
                 .sqrt();
+        }
+    }
+
+    fn posture(&self, step: usize, k: usize, position_m: DVec2) -> Posture {
+        let t = &self.traits[k];
+        Posture {
+            position_m,
+            ahead: self.ahead[step].rotate(t.turn),
+            height_m: t.height_m,
+            girth: t.girth,
+            speed_mps: t.speed_mps,
+            phase_rad: t.phase_rad + step as f64 * t.phase_step_rad,
+            swing: t.swing,
+        }
+    }
+}
+
+impl Traits {
+    fn new(
+        config: &BlockageConfig,
+        draws: &Draws,
+        k: usize,
+        track: &Track,
+        velocity: DVec2,
+        drift: DVec2,
+    ) -> Self {
+        let height_sigma_m = track.height_sigma_m.hypot(config.height_sigma_m);
+        let height_m = (track.height_m + height_sigma_m * draws.height[k]).max(0.5);
+        let speed_mps = (velocity + drift).length();
+        let trunk_rad = config.heading_sigma_deg.to_radians();
+        let turn_rad = if velocity.length() > FACES_FROM_MPS {
+            // Who walks faces where he goes: an error of the velocity is one of the heading.
+            velocity.perp_dot(drift) / velocity.length_squared() + trunk_rad * draws.heading[k]
+        } else {
+            track.heading_sigma_rad.hypot(trunk_rad) * draws.heading[k]
+        };
+        let stride_m = body::stride_m(speed_mps, height_m);
+        Self {
+            turn: DVec2::from_angle(turn_rad),
+            height_m,
+            girth: (1.0 + config.size_sigma_share * draws.girth[k]).clamp(0.5, 1.8),
+            speed_mps,
+            phase_rad: TAU * draws.phase[k],
+            phase_step_rad: if stride_m > 0.0 { TAU * speed_mps * STEP_S / stride_m } else { 0.0 },
+            swing: if draws.swing[k] < config.body.arms.still_share { 0.0 } else { 1.0 },
         }
     }
 }
@@ -182,4 +277,17 @@ fn root<const N: usize>(a: &[[f64; N]; N]) -> [[f64; N]; N] {
         }
     }
     l
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_count_those_who_come_later_than_the_last_step() {
+        // Of ten, one at step 2, five at step 4, the rest never.
+        let steps = [2, 4, 4, 4, 4, 4, 16, 16, 16, 16];
+        assert_eq!(quantiles_s(steps.into_iter()), [Some(0.2), Some(0.4), None]);
+        assert_eq!(quantiles_s([].into_iter()), [None; 3]);
+    }
 }

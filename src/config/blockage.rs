@@ -16,15 +16,9 @@ pub struct BlockageConfig {
     pub samples: usize,
     /// Seed of the samples.
     pub seed: u64,
-    /// Trunk front to back.
-    pub trunk_depth_m: f64,
-    /// Trunk with arms side to side.
-    pub trunk_width_m: f64,
-    /// Top of the shoulders as a share of the height.
-    pub shoulder_share: f64,
-    /// Head.
-    pub head_diameter_m: f64,
-    /// One standard deviation of the trunk's width and depth, as a share of them.
+    /// What a ray meets.
+    pub body: BodyConfig,
+    /// One standard deviation of the girth, as a share of it.
     pub size_sigma_share: f64,
     /// One standard deviation of the height.
     pub height_sigma_m: f64,
@@ -34,6 +28,64 @@ pub struct BlockageConfig {
     pub threshold_now: f64,
     /// A link counts as blocked within window w at `threshold[w - 1]`.
     pub threshold: [f64; STEPS],
+}
+
+/// An upright body. All sizes are shares of the standing height.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyConfig {
+    /// Elliptic cylinders from the floor up.
+    pub slices: Vec<SliceConfig>,
+    /// Side to side, half of the way that the trunk sways as it walks.
+    pub sway: f64,
+    /// No part of the body is farther from its axis.
+    pub reach: f64,
+    /// Left and right alike.
+    pub arms: ArmsConfig,
+}
+
+/// One elliptic cylinder of a body, from the top of the one below.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SliceConfig {
+    /// Upper end.
+    pub top: f64,
+    /// Half axis front to back.
+    pub half_depth: f64,
+    /// Half axis side to side.
+    pub half_width: f64,
+    /// Its middle ahead of the body axis.
+    pub ahead: f64,
+}
+
+/// An arm: rods from the shoulder to the elbow and on to the middle of the hand.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArmsConfig {
+    /// Above the floor.
+    pub shoulder_up: f64,
+    /// Away from the axis.
+    pub shoulder_out: f64,
+    /// Above the floor.
+    pub elbow_up: f64,
+    /// Away from the axis.
+    pub elbow_out: f64,
+    /// Above the floor.
+    pub hand_up: f64,
+    /// Away from the axis.
+    pub hand_out: f64,
+    /// Of the upper arm.
+    pub upper_radius: f64,
+    /// Of forearm and hand.
+    pub fore_radius: f64,
+    /// How far the elbow swings to either side, for a speed of one hip height a second.
+    pub elbow_swing: f64,
+    /// How far ahead the hand is in the middle of its swing, for the same speed.
+    pub hand_ahead: f64,
+    /// How far the hand swings to either side of that, for the same speed.
+    pub hand_swing: f64,
+    /// Share of people who walk without swinging their arms.
+    pub still_share: f64,
 }
 
 /// How a link is judged.

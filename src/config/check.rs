@@ -22,9 +22,6 @@ pub(super) fn check(config: &Config) -> Result<(), Error> {
         ("track.noise_floor_m", track.noise_floor_m),
         ("track.height_sigma_m", track.height_sigma_m),
         ("track.box_average_s", track.box_average_s),
-        ("blockage.trunk_depth_m", blockage.trunk_depth_m),
-        ("blockage.trunk_width_m", blockage.trunk_width_m),
-        ("blockage.head_diameter_m", blockage.head_diameter_m),
         ("site.hall.length_m", config.site.hall.length_m),
         ("site.hall.width_m", config.site.hall.width_m),
         ("site.hall.height_m", config.site.hall.height_m),
@@ -33,6 +30,15 @@ pub(super) fn check(config: &Config) -> Result<(), Error> {
         if value.is_nan() || value <= 0.0 {
             return Err(Error::new(format!("{key}: expected more than 0, found {value}")));
         }
+    }
+    let mut bottom = 0.0;
+    for slice in &blockage.body.slices {
+        if !(slice.top > bottom && slice.half_depth > 0.0 && slice.half_width > 0.0) {
+            return Err(Error::new(format!(
+                "blockage.body.slices: expected half axes above 0 and a top above {bottom}, found {slice:?}"
+            )));
+        }
+        bottom = slice.top;
     }
     if blockage.samples == 0 {
         return Err(Error::new("blockage.samples: expected 1 or more, found 0"));
@@ -61,6 +67,10 @@ mod tests {
             ("[detect.cluster]\nradius_m = 0.0", "detect.cluster.radius_m"),
             ("[track]\nheight_sigma_m = nan", "track.height_sigma_m"),
             ("[blockage]\nsamples = 0", "blockage.samples"),
+            (
+                "[blockage.body]\nslices = [{ top = 0.0, half_depth = 0.1, half_width = 0.1, ahead = 0.0 }]",
+                "blockage.body.slices",
+            ),
             ("[blockage]\nthreshold = [0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.5]", "blockage.threshold"),
             ("[site]\nsensors = []", "site.sensors"),
         ] {

@@ -10,7 +10,7 @@ mod check;
 
 use serde::{Deserialize, Serialize};
 
-pub use blockage::{BlockageConfig, BlockageMethod, BoxKind};
+pub use blockage::{ArmsConfig, BlockageConfig, BlockageMethod, BodyConfig, BoxKind, SliceConfig};
 pub use detect::{
     BackgroundConfig, BackgroundMethod, ClusterConfig, DetectConfig, EvidenceConfig, MeasureConfig,
     MergeMean, ObbAxes, PositionMethod, SplitConfig, SplitMethod,

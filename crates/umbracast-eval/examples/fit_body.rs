@@ -1,109 +1,184 @@
-//! Fits the few numbers of the predictor's body on tuning scenes: which trunk and head, put at people's true
-//! places and headings, agree best with the mesh truth about who is blocked? Prints every improvement and, at
-//! the end, the lines for `config/default.toml`.
+//! Fits the predictor's body on recorded tuning scenes: which few numbers, put at people's true places and headings
+//! with a gait of unknown phase, make the truth about who is blocked most likely? Prints every improvement and, at
+//! the end, the tables for `config/default.toml`.
 //!
-//! `cargo run --release -p umbracast-eval --example fit_body -- 12`
+//! `cargo run --release -p umbracast-eval --example fit_body -- SIMULATED...`, directories that `umbracast simulate`
+//! wrote with tuning seeds (docs/CONVENTIONS.md).
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::path::Path;
 
 use rayon::prelude::*;
-use umbracast::Config;
-use umbracast::blockage::body::{BodySize, UprightBody};
+use umbracast::blockage::body::{self, Posture};
+use umbracast::config::{BlockageConfig, BodyConfig};
 use umbracast::geometry::{DVec2, DVec3};
-use umbracast_eval::chain::CIRCLE_M;
-use umbracast_sim::crowd::{Preset, circle_crossing};
-use umbracast_sim::scene::Scene;
+use umbracast::{Config, Error};
+use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
+use umbracast_io::tables;
 
-/// Tuning seeds only (docs/CONVENTIONS.md).
-const FIRST_SEED: u64 = 100_000;
+/// Every so many frames; what lies between looks alike.
+const EVERY: u64 = 3;
+/// Who is farther than this from the segment, seen from above, is left out.
+const NEAR_M: f64 = 0.6;
+/// Postures tried of each body: phases of the gait, girths.
+const POSTURES: usize = 12;
+/// Middles of 12 equal shares of a standard normal distribution, mixed against the phases.
+const NORMAL: [f64; POSTURES] =
+    [0.10, -1.73, 0.55, -0.32, 1.15, -0.81, -0.10, 1.73, -0.55, 0.32, -1.15, 0.81];
 
-/// One link in one frame: the ray, the others, and whether it was blocked.
+/// One link in one frame: the ray, those near it, and whether it was blocked.
 struct Case {
-    access_point_m: DVec3,
+    access_point: u32,
+    start_m: DVec3,
     ue_m: DVec3,
-    others: Vec<(DVec2, DVec2, f64)>,
+    near: Vec<PeopleRow>,
     blocked: bool,
 }
 
-fn cases(preset: Preset, seed: u64, config: &Config) -> Vec<Case> {
-    let crowd = circle_crossing(preset, 10, CIRCLE_M, seed);
-    let mut scene = Scene::truth_only(crowd, &config.site, seed);
-    let mut cases = Vec::new();
-    while let Some(frame) = scene.next_frame() {
-        let state = |person: u32| frame.people.iter().find(|p| p.person == person).map(|p| p.state);
-        for link in frame.links.iter().filter(|_| frame.index % 3 == 0) {
-            let Some(own) = state(link.person) else { continue };
-            let others = frame.people.iter().filter(|p| p.person != link.person);
-            cases.push(Case {
-                access_point_m: config.site.access_points[link.access_point].position(),
-                ue_m: config.site.ue.on_body(own.position_m, own.heading_rad, own.height_m),
-                others: others
-                    .map(|p| (p.state.position_m, DVec2::from_angle(p.state.heading_rad), p.state.height_m))
-                    .collect(),
-                blocked: link.blocked,
-            });
-        }
-    }
-    cases
-}
-
-fn f1(size: &BodySize, cases: &[Case]) -> f64 {
-    let count = |case: &Case| {
-        let hit = |&(at_m, ahead, height_m): &(DVec2, DVec2, f64)| {
-            UprightBody::new(size, at_m, ahead, height_m).hit(case.access_point_m, case.ue_m).is_some()
-        };
-        match (case.others.iter().any(hit), case.blocked) {
-            (true, true) => [1, 0],
-            (false, false) => [0, 0],
-            _ => [0, 1],
-        }
-    };
-    let [hits, errors] =
-        cases.par_iter().map(count).reduce(|| [0, 0], |a: [u64; 2], b| [a[0] + b[0], a[1] + b[1]]);
-    2.0 * hits as f64 / (2 * hits + errors) as f64
-}
-
-fn main() {
-    let scenes: u64 = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(12);
+fn main() -> Result<(), Error> {
     let config = Config::default();
-    let all: Vec<Case> = (0..scenes)
-        .into_par_iter()
-        .flat_map_iter(|i| {
-            let preset = [Preset::Orca03, Preset::Orca06][(i % 2) as usize];
-            cases(preset, FIRST_SEED + i, &config)
-        })
-        .collect();
-    let mut best = BodySize {
-        trunk_depth_m: config.blockage.trunk_depth_m,
-        trunk_width_m: config.blockage.trunk_width_m,
-        shoulder_share: config.blockage.shoulder_share,
-        head_diameter_m: config.blockage.head_diameter_m,
-    };
-    let mut score = f1(&best, &all);
-    println!("{} links, start {score:.4}", all.len());
-    let fields: [fn(&mut BodySize) -> &mut f64; 4] = [
-        |b| &mut b.trunk_depth_m,
-        |b| &mut b.trunk_width_m,
-        |b| &mut b.shoulder_share,
-        |b| &mut b.head_diameter_m,
-    ];
-    for step in [0.04, 0.02, 0.01] {
-        let mut improved = true;
-        while improved {
-            improved = false;
-            for field in fields {
-                for change in [step, -step] {
-                    let mut trial = best;
-                    *field(&mut trial) += change;
-                    let value = f1(&trial, &all);
-                    if value > score {
-                        (best, score, improved) = (trial, value, true);
-                        println!("{score:.4} {best:?}");
-                    }
+    let mut cases = Vec::new();
+    for directory in std::env::args().skip(1) {
+        cases.extend(cases_of(Path::new(&directory), &config)?);
+    }
+    let mut best = config.blockage.body.clone();
+    let start = loss(&best, &config.blockage, &cases);
+    println!(
+        "{} links, {start:.5}; F1 by access point {:.4?}",
+        cases.len(),
+        f1(&best, &config.blockage, &cases)
+    );
+    let mut least = start;
+    let count = fields(&mut best).len();
+    let mut steps = vec![0.008; count];
+    while steps.iter().any(|&step| step > 0.001) {
+        for i in 0..count {
+            let mut moved = false;
+            for change in [steps[i], -steps[i]] {
+                let mut trial = best.clone();
+                *fields(&mut trial)[i].1 += change;
+                let value = loss(&trial, &config.blockage, &cases);
+                if value < least {
+                    (best, least, moved) = (trial, value, true);
+                    let (name, field) = &fields(&mut best)[i];
+                    println!("{least:.5} {name} = {field:.4}");
+                    break;
                 }
             }
+            steps[i] *= if moved { 1.5 } else { 0.5 };
         }
     }
-    println!("trunk_depth_m = {:.2}", best.trunk_depth_m);
-    println!("trunk_width_m = {:.2}", best.trunk_width_m);
-    println!("shoulder_share = {:.2}", best.shoulder_share);
-    println!("head_diameter_m = {:.2}", best.head_diameter_m);
+    println!("F1 by access point {:.4?}", f1(&best, &config.blockage, &cases));
+    for slice in &best.slices {
+        println!(
+            "  {{ top = {:.3}, half_depth = {:.3}, half_width = {:.3}, ahead = {:.3} }},",
+            slice.top, slice.half_depth, slice.half_width, slice.ahead
+        );
+    }
+    for (name, value) in fields(&mut best).into_iter().filter(|(name, _)| !name.starts_with("slice")) {
+        println!("{name} = {value:.4}");
+    }
+    Ok(())
+}
+
+/// What may be turned.
+fn fields(body: &mut BodyConfig) -> Vec<(String, &mut f64)> {
+    let mut all: Vec<(String, &mut f64)> = Vec::new();
+    let last = body.slices.len() - 1;
+    for (i, slice) in body.slices.iter_mut().enumerate() {
+        if i < last {
+            all.push((format!("slice {i} top"), &mut slice.top));
+        }
+        all.push((format!("slice {i} half_depth"), &mut slice.half_depth));
+        all.push((format!("slice {i} half_width"), &mut slice.half_width));
+        all.push((format!("slice {i} ahead"), &mut slice.ahead));
+    }
+    let arms = &mut body.arms;
+    let named: [(&str, &mut f64); 12] = [
+        ("sway", &mut body.sway),
+        ("shoulder_up", &mut arms.shoulder_up),
+        ("shoulder_out", &mut arms.shoulder_out),
+        ("elbow_up", &mut arms.elbow_up),
+        ("elbow_out", &mut arms.elbow_out),
+        ("hand_up", &mut arms.hand_up),
+        ("hand_out", &mut arms.hand_out),
+        ("upper_radius", &mut arms.upper_radius),
+        ("fore_radius", &mut arms.fore_radius),
+        ("elbow_swing", &mut arms.elbow_swing),
+        ("hand_ahead", &mut arms.hand_ahead),
+        ("hand_swing", &mut arms.hand_swing),
+    ];
+    all.extend(named.map(|(name, value)| (name.to_owned(), value)));
+    all
+}
+
+fn cases_of(directory: &Path, config: &Config) -> Result<Vec<Case>, Error> {
+    let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let mut people: BTreeMap<(u32, u64), Vec<PeopleRow>> = BTreeMap::new();
+    for row in tables::read::<PeopleRow>(directory, &names)? {
+        people.entry((row.scene, row.frame)).or_default().push(row);
+    }
+    let mut cases = Vec::new();
+    for link in tables::read::<PeopleLinkRow>(directory, &names)? {
+        let Some(all) = people.get(&(link.scene, link.frame)).filter(|_| link.frame % EVERY == 0) else {
+            continue;
+        };
+        let Some(own) = all.iter().find(|p| p.person == link.person) else { continue };
+        let start_m = config.site.access_points[link.access_point as usize].position();
+        let ue_m = config.site.ue.on_body(DVec2::new(own.x_m, own.y_m), own.heading_rad, own.height_m);
+        let (from, to) = (start_m.truncate(), ue_m.truncate());
+        let near = |p: &&PeopleRow| {
+            let at = DVec2::new(p.x_m, p.y_m);
+            let t = ((at - from).dot(to - from) / to.distance_squared(from)).clamp(0.0, 1.0);
+            p.person != own.person && at.distance(from.lerp(to, t)) < NEAR_M
+        };
+        let near: Vec<PeopleRow> = all.iter().filter(near).copied().collect();
+        if !near.is_empty() {
+            cases.push(Case { access_point: link.access_point, start_m, ue_m, near, blocked: link.blocked });
+        }
+    }
+    Ok(cases)
+}
+
+/// Chance that the link is blocked.
+fn probability(body: &BodyConfig, config: &BlockageConfig, case: &Case) -> f64 {
+    let hits = (0..POSTURES).filter(|&k| {
+        case.near.iter().any(|p| {
+            let turns = (k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person);
+            let posture = Posture {
+                girth: 1.0 + config.size_sigma_share * NORMAL[(k + p.person as usize) % POSTURES],
+                speed_mps: p.vx_mps.hypot(p.vy_mps),
+                phase_rad: TAU * turns,
+                swing: 1.0,
+                ..Posture::standing(DVec2::new(p.x_m, p.y_m), DVec2::from_angle(p.heading_rad), p.height_m)
+            };
+            body::blocks(body, &posture, case.start_m, case.ue_m)
+        })
+    });
+    hits.count() as f64 / POSTURES as f64
+}
+
+/// Mean negative logarithm of what was said of the truth; nothing is said to be certain.
+fn loss(body: &BodyConfig, config: &BlockageConfig, cases: &[Case]) -> f64 {
+    let of = |case: &Case| {
+        let p = 0.01 + 0.98 * probability(body, config, case);
+        -(if case.blocked { p } else { 1.0 - p }).ln()
+    };
+    let losses: Vec<f64> = cases.par_iter().map(of).collect();
+    losses.iter().sum::<f64>() / cases.len() as f64
+}
+
+/// At one half, for each access point.
+fn f1(body: &BodyConfig, config: &BlockageConfig, cases: &[Case]) -> Vec<f64> {
+    let mut counts: BTreeMap<u32, [u64; 2]> = BTreeMap::new();
+    for case in cases {
+        let count = counts.entry(case.access_point).or_default();
+        match (probability(body, config, case) >= 0.5, case.blocked) {
+            (true, true) => count[0] += 1,
+            (false, false) => {}
+            _ => count[1] += 1,
+        }
+    }
+    counts.values().map(|[hits, errors]| 2.0 * *hits as f64 / (2 * hits + errors) as f64).collect()
 }

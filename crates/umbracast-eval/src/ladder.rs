@@ -6,7 +6,7 @@
 
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use umbracast::blockage::body::{BodySize, EllipticCylinder, UprightBody};
+use umbracast::blockage::body::EllipticCylinder;
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb, slab};
 use umbracast::{STEP_S, STEPS, Site};
 use umbracast_sim::body::{PersonState, Walker};
@@ -77,8 +77,10 @@ const fn noisy(name: &'static str, position_m: f64, velocity_mps: f64) -> Oracle
 
 const BOX_M: [f64; 2] = [0.28, 0.46];
 const CYLINDER_M: [f64; 2] = [0.30, 0.50];
-const TRUNK_AND_HEAD: BodySize =
-    BodySize { trunk_depth_m: 0.26, trunk_width_m: 0.56, shoulder_share: 0.82, head_diameter_m: 0.20 };
+const TRUNK_M: [f64; 2] = [0.26, 0.56];
+const HEAD_M: [f64; 2] = [0.20, 0.20];
+/// Top of the shoulders, share of the height.
+const SHOULDER_SHARE: f64 = 0.82;
 /// Error of the height in the noisy rungs.
 const HEIGHT_ERROR_M: f64 = 0.03;
 /// How much of an error is still there a frame later.
@@ -196,7 +198,7 @@ enum Shape {
     Aabb(Aabb),
     Obb(Obb),
     Cylinder(EllipticCylinder),
-    Upright(UprightBody),
+    TrunkAndHead([EllipticCylinder; 2]),
     Mesh(BodyMesh),
 }
 
@@ -206,7 +208,7 @@ impl Shape {
             Self::Aabb(aabb) => slab::hit_aabb(aabb, start, end).is_some(),
             Self::Obb(obb) => slab::hit_obb(obb, start, end).is_some(),
             Self::Cylinder(cylinder) => cylinder.hit(start, end).is_some(),
-            Self::Upright(body) => body.hit(start, end).is_some(),
+            Self::TrunkAndHead(parts) => parts.iter().any(|part| part.hit(start, end).is_some()),
             Self::Mesh(mesh) => mesh.blocks(triangles, start, end),
         }
     }
@@ -295,7 +297,14 @@ impl Play<'_> {
     }
 
     fn shape(&self, body: Body, now: usize, walker: usize, state: &PersonState) -> Shape {
-        let ahead = DVec2::from_angle(state.heading_rad);
+        let cylinder = |[depth_m, width_m]: [f64; 2], bottom_m: f64, top_m: f64| EllipticCylinder {
+            center_m: state.position_m,
+            ahead: DVec2::from_angle(state.heading_rad),
+            half_depth_m: depth_m / 2.0,
+            half_width_m: width_m / 2.0,
+            bottom_m,
+            top_m,
+        };
         match body {
             Body::Aabb => Shape::Aabb(self.moments[now].boxes[walker].moved_by(state.position_m)),
             Body::Obb => Shape::Obb(Obb {
@@ -303,16 +312,11 @@ impl Play<'_> {
                 half_m: DVec3::new(BOX_M[0], BOX_M[1], state.height_m) / 2.0,
                 site_from_box: DMat3::from_rotation_z(state.heading_rad),
             }),
-            Body::Cylinder => Shape::Cylinder(EllipticCylinder {
-                center_m: state.position_m,
-                ahead,
-                half_depth_m: CYLINDER_M[0] / 2.0,
-                half_width_m: CYLINDER_M[1] / 2.0,
-                bottom_m: 0.0,
-                top_m: state.height_m,
-            }),
+            Body::Cylinder => Shape::Cylinder(cylinder(CYLINDER_M, 0.0, state.height_m)),
             Body::TrunkAndHead => {
-                Shape::Upright(UprightBody::new(&TRUNK_AND_HEAD, state.position_m, ahead, state.height_m))
+                let shoulder_m = SHOULDER_SHARE * state.height_m;
+                let head = cylinder(HEAD_M, shoulder_m, state.height_m);
+                Shape::TrunkAndHead([cylinder(TRUNK_M, 0.0, shoulder_m), head])
             }
             Body::UprightMesh => {
                 let mut mesh = BodyMesh::new();

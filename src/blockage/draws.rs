@@ -1,0 +1,96 @@
+//! The random numbers behind a person's samples, spread evenly: in every coordinate each sample has a share of the
+//! distribution to itself (Latin hypercube), so few samples do for many independent ones.
+
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::STEPS;
+
+/// By coordinate, then by sample: standard normal, or even in (0, 1) where said.
+#[derive(Debug)]
+pub(super) struct Draws {
+    pub(super) state: [Vec<f64>; 4],
+    pub(super) kicks: [[Vec<f64>; 2]; STEPS],
+    pub(super) height: Vec<f64>,
+    pub(super) girth: Vec<f64>,
+    pub(super) heading: Vec<f64>,
+    /// Even.
+    pub(super) phase: Vec<f64>,
+    /// Even.
+    pub(super) swing: Vec<f64>,
+}
+
+impl Draws {
+    /// Those of a track: by seed and id alone.
+    pub(super) fn new(samples: usize, seed: u64, track: u64) -> Self {
+        let mut random = Pcg64Mcg::seed_from_u64(seed ^ track.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        let (even, normal) = (even(samples), normal(samples));
+        let mut shuffled = |values: &[f64]| shuffled(values, &mut random);
+        Self {
+            state: std::array::from_fn(|_| shuffled(&normal)),
+            kicks: std::array::from_fn(|_| std::array::from_fn(|_| shuffled(&normal))),
+            height: shuffled(&normal),
+            girth: shuffled(&normal),
+            heading: shuffled(&normal),
+            phase: shuffled(&even),
+            swing: shuffled(&even),
+        }
+    }
+}
+
+fn shuffled(values: &[f64], random: &mut impl Rng) -> Vec<f64> {
+    let mut values = values.to_vec();
+    values.shuffle(random);
+    values
+}
+
+/// Middles of n equal shares of (0, 1).
+fn even(n: usize) -> Vec<f64> {
+    (0..n).map(|k| (k as f64 + 0.5) / n as f64).collect()
+}
+
+/// The standard normal distribution's quantiles at those middles, its density added up from the left.
+fn normal(n: usize) -> Vec<f64> {
+    const STEP: f64 = 1e-3;
+    const FIRST: f64 = -6.0;
+    let density = |z: f64| (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+    let (mut z, mut below) = (FIRST, 0.0);
+    even(n)
+        .into_iter()
+        .map(|share| {
+            while below < share && z < -FIRST {
+                below += STEP * density(z + 0.5 * STEP);
+                z += STEP;
+            }
+            z
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normal_draws_are_the_quantiles_of_tables() {
+        // Phi^-1 of 0.25 and 0.75; of 0.05, 0.15, ...
+        assert!(normal(2).iter().zip([-0.6745, 0.6745]).all(|(z, known)| (z - known).abs() < 2e-3));
+        let ten = normal(10);
+        assert!((ten[0] + 1.6449).abs() < 2e-3 && (ten[9] - 1.6449).abs() < 2e-3, "{ten:?}");
+    }
+
+    #[test]
+    fn every_coordinate_has_each_quantile_once_in_an_order_of_its_own() {
+        let draws = Draws::new(64, 1, 7);
+        let sorted = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        assert_eq!(sorted(&draws.state[0]), sorted(&draws.kicks[8][1]));
+        assert_ne!(draws.state[0], draws.state[1]);
+        assert_ne!(draws.state[0], Draws::new(64, 1, 8).state[0]);
+        assert_eq!(draws.phase, Draws::new(64, 1, 7).phase);
+    }
+}
