@@ -128,6 +128,8 @@ pub struct EvidenceConfig {
     pub expected_halves_m: f64,
     /// A point or part nearer than this to an expected person may be that person.
     pub expected_m: f64,
+    /// A part that ends below this height is legs, no whole person.
+    pub whole_top_m: f64,
     /// Each half needs as many points.
     pub points_min: usize,
     /// Parts whose means are nearer than this are one person.

@@ -1,6 +1,7 @@
 //! One person more, or one fewer? A cluster is split as long as its parts lie farther apart than the halves of one
 //! body, and parts nearer than two bodies can stand become one. Where people are expected moves both thresholds.
 
+use super::guided::owners;
 use super::{Cluster, Prior};
 use crate::config::EvidenceConfig;
 use crate::geometry::{DVec2, DVec3};
@@ -62,9 +63,11 @@ pub fn split(
     let mut people = means(moved_m, cluster, expected_m)
         .filter(|people| are_people(people, config.expected_halves_m, config))
         .unwrap_or_else(|| vec![whole.clone()]);
-    // k against k + 1: the longest part gives way to its two halves, and all find their places anew.
+    // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
+    // are never counted: two of them may be one person or two.
     while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
         && are_people(&more, config.halves_m, config)
+        && more.iter().all(|part| part.top_m >= config.whole_top_m)
     {
         people = more;
     }
@@ -115,35 +118,41 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
     tidy(parts);
 }
 
-/// Joins what is left of each expected person whose body is nowhere: legs where the beams pass below the hips, or
-/// the few points that others let through. Without an expected person such pieces are nobody.
-pub fn join_pieces(parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
+/// Gives the points of pieces to the expected people whose bodies are nowhere: legs where the beams pass below the
+/// hips, or the few points that others let through. Without an expected person such pieces are nobody.
+pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
     let people: Vec<&Prior> = priors.iter().filter(|prior| prior.confirmed).collect();
-    let reach_m = |prior: &Prior| config.limb_m + prior.position_sigma_m.min(config.limb_m);
-    let nearest = |part: &Part| {
-        let apart_m = |k: usize| people[k].position_m.distance(part.mean_m());
-        let near = (0..people.len()).filter(|&k| apart_m(k) < reach_m(people[k]));
-        near.min_by(|&a, &b| apart_m(a).total_cmp(&apart_m(b)))
+    let off_m = |part: &Part, k: usize| people[k].position_m.distance(part.mean_m());
+    let is_near = |part: &Part, k: usize| {
+        off_m(part, k) < config.limb_m + people[k].position_sigma_m.min(config.limb_m)
     };
-    let is_piece = |part: &Part, person: &Prior| {
-        part.points.len() < config.points_min || part.top_m < config.limb_top_share * person.height_m
-    };
-    let who: Vec<Option<usize>> = parts.iter().map(nearest).collect();
+    let (bodies, pieces): (Vec<Part>, Vec<Part>) = parts.drain(..).partition(|part| !is_piece(part, config));
     let mut has_body = vec![false; people.len()];
-    for (part, &who) in parts.iter().zip(&who) {
-        if let Some(k) = who {
-            has_body[k] |= !is_piece(part, people[k]);
+    for body in &bodies {
+        let near = (0..people.len()).filter(|&k| is_near(body, k));
+        if let Some(k) = near.min_by(|&a, &b| off_m(body, a).total_cmp(&off_m(body, b))) {
+            has_body[k] = true;
         }
     }
-    let mut pieces: Vec<Option<usize>> = vec![None; people.len()];
-    for (i, who) in who.into_iter().enumerate() {
-        let Some(k) = who.filter(|&k| !has_body[k]) else { continue };
-        match pieces[k] {
-            Some(first) => join(parts, first, i),
-            None => (pieces[k], parts[i].expected) = (Some(i), true),
+    let (near, far): (Vec<Part>, Vec<Part>) =
+        pieces.into_iter().partition(|piece| (0..people.len()).any(|k| !has_body[k] && is_near(piece, k)));
+    let points: Cluster = near.into_iter().flat_map(|piece| piece.points).collect();
+    let mut own = vec![Cluster::new(); people.len()];
+    for (&i, owner) in points.iter().zip(owners(moved_m, &points, &people)) {
+        if let Some(k) = owner.filter(|&k| !has_body[k]) {
+            own[k].push(i);
         }
     }
-    tidy(parts);
+    parts.extend(bodies.into_iter().chain(far));
+    for mut points in own.into_iter().filter(|points| !points.is_empty()) {
+        points.sort_unstable();
+        parts.push(Part { expected: true, ..Part::new(moved_m, points) });
+    }
+}
+
+/// True for what may be somebody's leg or head, but does not look like a whole person.
+fn is_piece(part: &Part, config: &EvidenceConfig) -> bool {
+    part.points.len() < config.points_min || part.top_m < config.whole_top_m
 }
 
 /// Moves the points of part `j` to part `i`.
@@ -304,10 +313,16 @@ mod tests {
         let points_m: Vec<DVec3> = leg(-0.3).chain(leg(0.3)).collect();
         let legs = || vec![Part::new(&points_m, (0..8).collect()), Part::new(&points_m, (8..16).collect())];
         let (mut known, mut unknown) = (legs(), legs());
-        join_pieces(&mut known, &[prior(0.1, 0.0)], &config);
-        join_pieces(&mut unknown, &[prior(3.0, 0.0)], &config);
+        give_pieces(&points_m, &mut known, &[prior(0.1, 0.0)], &config);
+        give_pieces(&points_m, &mut unknown, &[prior(3.0, 0.0)], &config);
         assert!(known.len() == 1 && known[0].expected && known[0].points.len() == 16);
         assert!(unknown.len() == 2 && !unknown[0].expected);
+    }
+
+    #[test]
+    fn legs_without_bodies_are_not_counted() {
+        let leg = |y: f64| (0..8).map(move |i| DVec3::new(0.0, y, 0.05 * f64::from(i)));
+        assert_eq!(people(&leg(-0.3).chain(leg(0.3)).collect::<Vec<_>>(), &[]), 1);
     }
 
     #[test]

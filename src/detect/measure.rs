@@ -15,6 +15,7 @@ const WALKING_MPS: f64 = 0.3;
 #[derive(Debug)]
 pub struct Measurer {
     config: MeasureConfig,
+    whole_top_m: f64,
     sensors_m: Vec<DVec3>,
 }
 
@@ -23,6 +24,7 @@ impl Measurer {
     pub fn new(config: &DetectConfig, site: &Site) -> Self {
         Self {
             config: config.measure.clone(),
+            whole_top_m: config.split.evidence.whole_top_m,
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
         }
     }
@@ -38,8 +40,11 @@ impl Measurer {
         detections.clear();
         for cluster in clusters {
             let aabb = Aabb::around(cluster.iter().map(|&i| points[i as usize].position_m));
-            let whole = self.has_size_of_person(cluster.len(), &aabb);
-            if whole || self.is_expected(&aabb, priors) {
+            let expected = self.is_expected(&aabb, priors);
+            // Legs are somebody only where nobody is known.
+            let whole = self.has_size_of_person(cluster.len(), &aabb)
+                && !(expected && aabb.max_m.z < self.whole_top_m);
+            if whole || expected {
                 detections.push(self.detection(points, cluster, priors, aabb, whole));
             }
         }

@@ -8,6 +8,7 @@ pub mod voxel;
 pub mod background;
 pub mod cluster;
 pub mod dp_means;
+pub mod guided;
 pub mod evidence;
 pub mod split_merge;
 pub mod bias;

@@ -57,7 +57,7 @@ impl Clusterer {
                     evidence::split(&self.moved_m, priors, component, &self.split.evidence, &mut self.parts);
                 }
                 evidence::merge(&mut self.parts, priors, &self.split.evidence);
-                evidence::join_pieces(&mut self.parts, priors, &self.split.evidence);
+                evidence::give_pieces(&self.moved_m, &mut self.parts, priors, &self.split.evidence);
                 // What too few points show counts only where somebody is expected.
                 let all =
                     self.parts.drain(..).filter(|p| p.expected || p.points.len() >= self.cluster.points_min);
