@@ -84,6 +84,8 @@ pub struct Sensor {
     pub range_noise_m: f64,
     /// Share of returns that are lost (simulation).
     pub dropout: f64,
+    /// Seconds after which it falls silent for good (simulation); never, if left out.
+    pub lost_after_s: Option<f64>,
 }
 
 /// Yaw, pitch and roll in degrees.

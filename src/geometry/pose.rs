@@ -34,6 +34,12 @@ impl Pose {
         self.rotation * v
     }
 
+    /// This motion after another: `site_from_sensor.after(&sensor_from_body)` is `site_from_body`.
+    #[must_use]
+    pub fn after(&self, first: &Self) -> Self {
+        Self { rotation: self.rotation * first.rotation, translation_m: self.point(first.translation_m) }
+    }
+
     /// The motion back. The rotation is orthogonal, so it is transposed, never inverted.
     #[must_use]
     pub fn inverse(&self) -> Self {
@@ -58,5 +64,6 @@ mod tests {
         let pose = Pose::from_yaw_pitch_roll_deg(DVec3::new(1.0, -2.0, 3.0), 170.0, 35.0, -5.0);
         let p = DVec3::new(0.3, 0.4, -0.5);
         assert!((pose.inverse().point(pose.point(p)) - p).length() < 1e-12);
+        assert!((pose.inverse().after(&pose).point(p) - p).length() < 1e-12);
     }
 }

@@ -74,7 +74,7 @@ pub struct SiteArgs {
 /// Who walks.
 #[derive(Debug, Clone, Args)]
 pub struct CrowdArgs {
-    /// The crowd: orca-03, orca-06 or mixed.
+    /// The crowd: orca-03, orca-06, mixed or pairs.
     #[arg(long, default_value = "orca-03")]
     pub preset: Preset,
     /// People in a scene.
@@ -185,7 +185,7 @@ pub struct Evaluate {
     /// Simulate and run this many scenes of each preset in memory, and score them.
     #[arg(long, value_name = "N", conflicts_with = "dir", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: Option<u32>,
-    /// The crowds of --scenes: orca-03, orca-06, mixed; several with commas.
+    /// The crowds of --scenes: orca-03, orca-06, mixed, pairs; several with commas.
     #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
     pub preset: Vec<Preset>,
     /// Real walkers in place of a crowd; one scene a file.
@@ -250,7 +250,7 @@ pub struct Train {
     /// Seed of the first scene; 1 to 99999.
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     pub first_scene: u64,
-    /// The crowds, taken in turn: orca-03, orca-06, mixed.
+    /// The crowds, taken in turn: orca-03, orca-06, mixed, pairs.
     #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
     pub preset: Vec<Preset>,
     /// Seed of the first weights and of the windows.

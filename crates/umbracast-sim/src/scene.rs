@@ -50,7 +50,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A crowd with bodies in a hall with sensors.
+    /// A crowd with bodies in a hall with sensors, each of which works until the site lets it fall silent.
     ///
     /// # Errors
     /// A sensor that cannot be simulated.
@@ -63,6 +63,11 @@ impl Scene {
     pub fn in_hall(crowd: Crowd, site: &Site, sensors: &Sensors, seed: u64) -> Self {
         let mut sensors = sensors.clone();
         sensors.restart(stream(seed, "sensors", 0).next_u64());
+        for (number, sensor) in site.sensors.iter().enumerate() {
+            if let Some(seconds) = sensor.lost_after_s {
+                sensors.power(number, 0..(seconds * 1e9) as i64);
+            }
+        }
         Self { sensors: Some(sensors), ..Self::truth_only(crowd, site, seed) }
     }
 
@@ -178,6 +183,18 @@ mod tests {
                 "{seed}"
             );
         }
+    }
+
+    #[test]
+    fn a_sensor_that_the_site_loses_falls_silent_and_is_there_in_the_empty_hall() {
+        let mut site = Config::default().site;
+        site.sensors[1].lost_after_s = Some(0.15);
+        let mut scene = Scene::new(crowd(), &site, 7).unwrap();
+        let frames: Vec<SceneFrame> = (0..3).filter_map(|_| scene.next_frame()).collect();
+        let sent = |sensor: usize| -> Vec<usize> { frames.iter().map(|f| f.packets[sensor].len()).collect() };
+        assert!(sent(0).iter().all(|&packets| packets > 170), "{:?}", sent(0));
+        assert!(sent(1)[0] > 170 && (80..100).contains(&sent(1)[1]) && sent(1)[2] == 0, "{:?}", sent(1));
+        assert!(Scene::empty(&site, 7, 3).unwrap().iter().all(|packets| packets[1].len() > 170));
     }
 
     #[test]

@@ -22,6 +22,8 @@ pub(super) const SAMPLE_STEPS: usize = 10;
 pub(super) const MOST_ATTEMPTS: u64 = 100;
 /// Preferred speed of everybody.
 const PREFERRED_MPS: f32 = 1.0;
+/// Between the body axes of a pair: people who walk hand in hand or talk.
+const PAIR_GAP_M: f64 = 0.5;
 /// Start points lie on the circle within this, on each axis.
 const START_NOISE_M: f32 = 0.5;
 
@@ -35,6 +37,7 @@ pub fn circle_crossing(preset: Preset, people: usize, radius_m: f64, seed: u64) 
         Preset::Orca03 => (parameters(10.0, 5.0, 0.3, 1.0), 0.8),
         Preset::Orca06 => (parameters(4.0, 4.0, 0.6, 1.5), 2.0),
         Preset::Mixed => return mixed::crowd(people, radius_m, seed),
+        Preset::Pairs => return mixed::pairs(people.div_ceil(2), PAIR_GAP_M, radius_m, seed),
     };
     let mut attempt = 0;
     loop {

@@ -9,6 +9,7 @@ mod hall;
 mod view;
 mod raster;
 mod noise;
+mod survey;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -22,6 +23,7 @@ use self::hall::HallImage;
 use self::head::Head;
 use self::noise::Noise;
 use self::raster::Painter;
+pub use self::survey::{Seen, Survey};
 use self::view::{NOBODY, View};
 use crate::body::Walker;
 

@@ -31,6 +31,11 @@ impl Noise {
         }
     }
 
+    /// How many returns a surface gives a ray on the mean.
+    pub fn mean_returns(&self, range_m: f32) -> f64 {
+        if self.range_limits_m.contains(&range_m) { 1.0 - self.dropout } else { 0.0 }
+    }
+
     /// Another scene.
     pub fn reseed(&mut self, seed: u64) {
         self.seed = seed;

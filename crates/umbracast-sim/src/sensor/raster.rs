@@ -90,6 +90,11 @@ impl Painter {
         }
     }
 
+    /// Hangs the sensor elsewhere.
+    pub fn hang(&mut self, sensor_from_site: Pose) {
+        self.sensor_from_site = sensor_from_site;
+    }
+
     /// Draws a body, known as `person`, wherever it is nearer than what the view shows.
     pub fn draw(&mut self, walker: &Walker, person: u32, view: &mut View) {
         let Some(last) = view.image.columns.len().checked_sub(1) else { return };

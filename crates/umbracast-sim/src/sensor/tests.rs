@@ -244,6 +244,38 @@ fn a_lost_sensor_sends_nothing_more_and_one_that_starts_late_begins_within_a_tur
 }
 
 #[test]
+fn a_surveyed_body_gives_the_returns_that_it_gives_in_a_scene() {
+    let mut site = site();
+    site.sensors[0].dropout = 0.0;
+    site.sensors[1].dropout = 0.5;
+    let standing = |x: f64, y: f64| {
+        let positions_m = vec![DVec2::new(x, y); 21];
+        Walker::new(Trajectory { person: 0, start_ns: 0, positions_m, ..walker(0, 0.0, 1.0).trajectory }, 3)
+    };
+    let mut sensors = Sensors::new(&site, 0).unwrap();
+    let mut survey = Survey::new(&site, &sensors);
+    let body = standing(0.0, 0.0);
+    // In the open, behind a pillar for one sensor, under the sensor.
+    for (x, y) in [(0.0, 0.0), (-12.0, 12.0), (-15.5, 0.0), (3.0, -9.0)] {
+        let there = [standing(x, y)];
+        let rays = |sensor: &mut Simulated| {
+            let owner = sensor.look(0, &there).owner;
+            owner.iter().filter(|&&owner| owner != NOBODY).count() as f64
+        };
+        let expected: Vec<f64> = sensors.sensors.iter_mut().map(rays).collect();
+        let seen = survey.see(&body, DVec2::new(x, y), 0.0);
+        // A ray along a silhouette may fall to either side by rounding.
+        assert!((seen[0].returns - expected[0]).abs() <= 1.0, "{x} {y}: {seen:?}, {expected:?}");
+        assert!((seen[1].returns - 0.5 * expected[1]).abs() <= 0.5, "{x} {y}: {seen:?}, {expected:?}");
+        assert_eq!(seen, survey.see(&body, DVec2::new(x, y), 0.0), "nothing is left of the last look");
+    }
+    let [one, other] = [0.0, PI].map(|heading| survey.see(&body, DVec2::new(0.0, 5.0), heading));
+    assert!((one[0].returns - other[0].returns * 1.0).abs() < 0.3 * one[0].returns, "{one:?} {other:?}");
+    let (low_m, high_m) = one[0].span_m.unwrap();
+    assert!(low_m < 0.3 && (1.4..2.0).contains(&high_m), "{low_m} to {high_m}");
+}
+
+#[test]
 fn a_sensor_outside_the_hall_is_refused_with_its_name() {
     let mut site = site();
     site.sensors[1].position_m[0] = -17.5;

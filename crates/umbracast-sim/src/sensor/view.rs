@@ -9,7 +9,7 @@ use super::head::Head;
 pub const NOBODY: u32 = u32::MAX;
 
 /// True ranges along the reported directions, and whose body each pixel shows.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct View {
     /// Columns as a decoder gives them, with true ranges.
     pub image: RangeImage,

@@ -1,7 +1,7 @@
 //! What is really blocked: segments from access points to UEs against meshes and the hall.
 
 mod mesh;
-mod fixtures;
+pub mod fixtures;
 
 pub use mesh::BodyMesh;
 
