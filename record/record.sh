@@ -27,6 +27,13 @@ record orca-40-scenes umbracast evaluate --scenes 20 --preset orca-03,orca-06 --
 # The page holds baselines, error budget and ladder too.
 sed "s|$scratch|/tmp|g" "$scratch/orca/report.html" >record/orca-40-scenes.html
 
+# What the sensors see of a standing person, and the floor plan.
+record coverage umbracast coverage --step 0.25 --out "$scratch/coverage"
+cp "$scratch/coverage/coverage.svg" record/coverage.svg
+
+# Other heights, a lost sensor, more people, pairs.
+record sites record/sites.sh 20 hdl,paper,default
+
 # How fast: one scene of 10 people with two HDL-32E on one core, and a frame through every mode.
 record speed umbracast simulate --scenes 1 --threads 1 --out "$scratch/sim"
 for mode in default paper hdl; do

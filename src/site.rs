@@ -84,7 +84,7 @@ pub struct Sensor {
     pub range_noise_m: f64,
     /// Share of returns that are lost (simulation).
     pub dropout: f64,
-    /// Seconds after which it falls silent for good (simulation); never, if left out.
+    /// Seconds after which it falls silent for good (simulation); infinite or left out: never.
     pub lost_after_s: Option<f64>,
 }
 

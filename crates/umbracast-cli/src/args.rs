@@ -44,6 +44,10 @@ pub enum Command {
     Run(Run),
     /// Score every stage: a run against its truth, or freshly simulated scenes in memory.
     Evaluate(Evaluate),
+    /// Put the main figures of several reports into one table.
+    Compare(Compare),
+    /// Show where a person gives how many returns, and which places are blind.
+    Coverage(Coverage),
     /// Say what is in a file.
     Inspect(Inspect),
     /// Print the commented default configuration, or check a file.
@@ -208,6 +212,33 @@ pub struct Evaluate {
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
     /// Where the report goes.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// `compare`
+#[derive(Debug, Args)]
+pub struct Compare {
+    /// Folders that `evaluate --out` wrote.
+    #[arg(required = true, value_name = "DIR")]
+    pub reports: Vec<PathBuf>,
+}
+
+/// `coverage`
+#[derive(Debug, Args)]
+pub struct Coverage {
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// From place to place, metres.
+    #[arg(long, default_value_t = 0.5, value_name = "M")]
+    pub step: f64,
+    /// Standing height of the body, metres.
+    #[arg(long, default_value_t = 1.72, value_name = "M")]
+    pub height: f64,
+    /// Headings to average, each with a build of its own.
+    #[arg(long, default_value_t = 6, value_name = "N")]
+    pub headings: usize,
+    /// Where table (Parquet and CSV) and floor plan (SVG) go.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

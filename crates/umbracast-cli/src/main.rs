@@ -33,6 +33,8 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Run(args) => commands::run::run(&args, &cli.common),
         Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),
+        Command::Compare(args) => commands::compare::run(&args, &cli.common),
+        Command::Coverage(args) => commands::coverage::run(&args, &cli.common),
         Command::Inspect(args) => commands::inspect::run(&args, &cli.common),
         Command::Config(args) => commands::config::run(&args),
         #[cfg(feature = "train")]

@@ -156,6 +156,53 @@ fn a_recording_keeps_its_number() {
 }
 
 #[test]
+fn a_capture_among_recordings_is_refused_because_it_names_no_site() {
+    let folder = folder("mixed_inputs");
+    let sim = simulate(&folder, "0");
+    let capture = folder.join("lidar.pcap");
+    fs::write(&capture, b"never read").expect("writes");
+    let out = folder.join("out");
+    let message = ends_with(1, &["run", text(&capture), text(&sim), "--out", text(&out)]);
+    assert!(message.contains("lidar.pcap") && message.contains("--site"), "{message}");
+    assert!(!out.exists(), "refused before anything is written");
+}
+
+#[test]
+fn a_sensor_that_the_site_loses_is_counted_in_the_run_s_health() {
+    let folder = folder("lost_sensor");
+    let site = folder.join("lost.toml");
+    let sensors =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/sites/lost-sensor.toml"));
+    let sensors = sensors.expect("a site that ships").replace("lost_after_s = 14.0", "lost_after_s = 1.0");
+    fs::write(&site, sensors).expect("writes");
+    let (trajectories, sim, out) = (folder.join("crossing.csv"), folder.join("sim"), folder.join("out"));
+    fs::write(&trajectories, CROSSING).expect("writes");
+    let recorded =
+        ["simulate", "--trajectories", text(&trajectories), "--site", text(&site), "--out", text(&sim)];
+    done(&recorded);
+    let message = ends_with(3, &["run", text(&sim), "--out", text(&out)]);
+    assert!(message.contains("sensors_missing: 20"), "{message}");
+    let report = folder.join("report");
+    let scored = ["evaluate", text(&out), "--truth", text(&sim), "--out", text(&report)];
+    assert!(done(&scored).contains("sensors missing"), "the text tells of it");
+    assert!(done(&["compare", text(&report)]).contains("scans missing"));
+}
+
+#[test]
+fn coverage_writes_table_and_floor_plan_and_refuses_a_sensor_it_cannot_simulate() {
+    let folder = folder("coverage");
+    let out = folder.join("out");
+    let said = done(&["coverage", "--step", "4", "--headings", "1", "--out", text(&out)]);
+    assert!(said.contains("the whole floor") && said.contains("lidar_west alone"), "{said}");
+    let table = done(&["inspect", text(&out.join("coverage.parquet"))]);
+    assert!(table.contains("returns_lidar_east") && table.contains("static_blocked_side"), "{table}");
+    assert!(out.join("coverage.csv").is_file() && out.join("coverage.svg").is_file());
+    let clouds_only = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/sites/logictronix.toml");
+    let message = ends_with(1, &["coverage", "--site", clouds_only]);
+    assert!(message.contains("site.sensors.vlp16"), "{message}");
+}
+
+#[test]
 fn a_truncated_recording_gives_what_is_whole_and_code_3() {
     let folder = folder("truncated");
     let sim = simulate(&folder, "0");

@@ -23,3 +23,4 @@ pub mod labels;
 pub mod chain;
 pub mod pooled;
 pub mod report;
+pub mod coverage;

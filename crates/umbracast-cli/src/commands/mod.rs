@@ -1,6 +1,8 @@
 //! One module a command.
 
+pub mod compare;
 pub mod config;
+pub mod coverage;
 pub mod demo;
 pub mod evaluate;
 pub mod inspect;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use umbracast::forecast::Weights;
-use umbracast::{Config, Error, Frame, Health, Pipeline};
+use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
 use umbracast_eval::scene::SceneRun;
 use umbracast_io::rows::{self, LinkRow, TrackRow};
 use umbracast_io::tables::TableWriter;
@@ -32,17 +32,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let mut config = setup::config(args.mode, args.site.site.as_deref())?;
     // A recording brings its site with it; a file given goes before it.
     if args.site.site.is_none() {
-        for (number, input) in inputs.iter().enumerate() {
-            let Some(site) = input.site()? else { continue };
-            if number > 0 && site != config.site {
-                let (expected, found) = (&config.site.name, &site.name);
-                let story = format!(
-                    "site: expected {expected:?} as in the first recording, found another, {found:?}"
-                );
-                return Err(Error::new(story).within(format_args!("{input:?}")));
-            }
-            config.site = site;
-        }
+        config.site = recorded_site(&inputs)?.unwrap_or(config.site);
     }
     let weights = setup::weights(args.weights.as_deref())?;
     let (mut health, mut lost) = (Health::default(), Vec::new());
@@ -130,6 +120,32 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         return Ok(Ending::DataLost(format!("{health:?}")));
     }
     Ok(Ending::Done)
+}
+
+/// The site on which all inputs were recorded; none where none says so. Captures and clouds never say.
+fn recorded_site(inputs: &[Input]) -> Result<Option<Site>, Error> {
+    let mut first: Option<Site> = None;
+    for input in inputs {
+        let site = input.site()?;
+        if let (Some(first), Some(site)) = (&first, &site)
+            && site != first
+        {
+            let (expected, found) = (&first.name, &site.name);
+            let story =
+                format!("site: expected {expected:?} as in the first recording, found another, {found:?}");
+            return Err(Error::new(story).within(format_args!("{input:?}")));
+        }
+        first = first.or(site);
+    }
+    let silent = inputs.iter().find(|input| !matches!(input, Input::Recording(_)));
+    if let (Some(site), Some(silent)) = (&first, silent) {
+        let story = format!(
+            "expected --site, or recordings alone: a recording among the inputs names its site, {:?}, these name none",
+            site.name
+        );
+        return Err(Error::new(story).within(format_args!("{silent:?}")));
+    }
+    Ok(first)
 }
 
 /// A recording's own number, so that its rows meet its truth; else its place among the inputs.

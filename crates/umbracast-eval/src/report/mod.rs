@@ -2,11 +2,12 @@
 
 pub mod published;
 pub mod tables;
+pub mod compare;
 mod ladder_table;
 mod plot;
 mod figures;
 mod one_scene;
-mod html;
+pub(crate) mod html;
 
 use std::path::Path;
 
@@ -75,6 +76,7 @@ pub fn to_text(scores: &Scores) -> String {
     let mut shown = vec![tables::headline(group)];
     shown.extend((scores.groups.len() > 1).then(|| tables::presets(scores)));
     shown.extend([tables::tracking(group), tables::displacement(group)]);
+    shown.extend(tables::losses(group));
     shown.iter().map(Table::to_text).collect::<Vec<_>>().join("\n")
 }
 

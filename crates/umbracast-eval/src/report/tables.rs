@@ -27,12 +27,12 @@ pub struct Table {
 const SHORT_WINDOWS: [usize; 4] = [1, 3, 8, 9];
 
 impl Table {
-    pub(super) fn new(title: impl Into<String>, words: usize, header: &[&str]) -> Self {
+    pub(crate) fn new(title: impl Into<String>, words: usize, header: &[&str]) -> Self {
         let header = header.iter().map(|&name| name.to_owned()).collect();
         Self { title: title.into(), words, header, ..Self::default() }
     }
 
-    pub(super) fn noted(mut self, note: impl Into<String>) -> Self {
+    pub(crate) fn noted(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
@@ -270,6 +270,13 @@ pub fn health(group: &Group) -> Table {
     table.noted("Everything broken that a run met and skipped. All zero on clean input.")
 }
 
+/// What of it was not zero; none where nothing was skipped.
+pub fn losses(group: &Group) -> Option<Table> {
+    let mut table = health(group);
+    table.rows.retain(|row| row[1..].iter().any(|count| count != "0"));
+    (!table.rows.is_empty()).then(|| table.noted("Everything broken that a run met and skipped."))
+}
+
 fn with_scores(start: &[String], scores: &WindowScores) -> Vec<String> {
     let mut row = start.to_vec();
     let plain = [scores.base_rate, scores.accuracy, scores.precision, scores.recall];
@@ -287,7 +294,7 @@ fn with_interval(score: &Estimate) -> String {
 }
 
 /// A dash where it is not defined.
-pub(super) fn number(value: Option<f64>, digits: usize) -> String {
+pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
 }
 

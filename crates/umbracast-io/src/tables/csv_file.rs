@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use umbracast::Error;
 
-use super::{Cell, Row};
+use super::{Cell, Row, Values};
 
 /// An open CSV file.
 #[derive(Debug)]
@@ -49,6 +49,24 @@ impl CsvFile {
         let failed = |e| Error::new(format!("{}: cannot be written: {e}", self.path.display()));
         self.file.write_all(text.as_bytes()).map_err(failed)
     }
+}
+
+/// Writes a whole table whose columns are known at run time only.
+pub fn write_columns(path: &Path, columns: &[(String, Values)]) -> Result<(), Error> {
+    let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
+    let mut text = names.join(",") + "\n";
+    let cell = |values: &Values, row: usize| match values {
+        Values::F64(v) => v[row].to_string(),
+        Values::MaybeF64(v) => v[row].map_or(String::new(), |v| v.to_string()),
+        Values::U32(v) => v[row].to_string(),
+        Values::Bool(v) => v[row].to_string(),
+    };
+    for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
+        let cells: Vec<String> = columns.iter().map(|(_, values)| cell(values, row)).collect();
+        text += &(cells.join(",") + "\n");
+    }
+    let failed = |e| Error::new(format!("{}: cannot be written: {e}", path.display()));
+    std::fs::write(path, text).map_err(failed)
 }
 
 fn quoted(name: &str) -> String {

@@ -92,6 +92,51 @@ pub fn write<R: Row>(directory: &Path, access_points: &[String], csv: bool, rows
     writer.finish()
 }
 
+/// A column of a table whose columns depend on the site.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Measures.
+    F64(Vec<f64>),
+    /// Measures, null where there is none.
+    MaybeF64(Vec<Option<f64>>),
+    /// Counts.
+    U32(Vec<u32>),
+    /// Yes or no.
+    Bool(Vec<bool>),
+}
+
+impl Values {
+    /// Rows.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F64(v) => v.len(),
+            Self::MaybeF64(v) => v.len(),
+            Self::U32(v) => v.len(),
+            Self::Bool(v) => v.len(),
+        }
+    }
+
+    /// True without a row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Writes `directory/TABLE.parquet` and `directory/TABLE.csv` with columns that are known at run time only.
+///
+/// # Errors
+/// Columns of different lengths, or a file that cannot be written.
+pub fn write_columns(directory: &Path, table: &str, columns: &[(String, Values)]) -> Result<(), Error> {
+    let rows = columns.first().map_or(0, |(_, values)| values.len());
+    if let Some((name, values)) = columns.iter().find(|(_, values)| values.len() != rows) {
+        let found = values.len();
+        return Err(Error::new(format!("table {table}: column {name}: expected {rows} rows, found {found}")));
+    }
+    let path = directory.join(table);
+    parquet_file::write_columns(&path.with_extension("parquet"), table, columns)?;
+    csv_file::write_columns(&path.with_extension("csv"), columns)
+}
+
 /// Reads `directory/TABLE.parquet`.
 ///
 /// # Errors
@@ -132,6 +177,27 @@ mod tests {
 
     fn access_points() -> Vec<String> {
         vec!["side".into(), "centre, north".into()]
+    }
+
+    #[test]
+    fn columns_known_at_run_time_are_written_with_their_nulls() {
+        let directory = tempfile::tempdir().unwrap();
+        let columns = [
+            ("x_m".to_owned(), Values::F64(vec![0.5, -1.0])),
+            ("returns_a, b".to_owned(), Values::MaybeF64(vec![None, Some(2.25)])),
+            ("seeing".to_owned(), Values::U32(vec![1, u32::MAX])),
+            ("blocked".to_owned(), Values::Bool(vec![true, false])),
+        ];
+        write_columns(directory.path(), "coverage", &columns).unwrap();
+        let csv = std::fs::read_to_string(directory.path().join("coverage.csv")).unwrap();
+        let expected = "x_m,\"returns_a, b\",seeing,blocked\n0.5,,1,true\n-1,2.25,4294967295,false\n";
+        assert_eq!(csv, expected);
+        let described = describe(&directory.path().join("coverage.parquet")).unwrap();
+        assert_eq!(described.rows, 2);
+        assert!(described.columns.contains(&("returns_a, b".to_owned(), "DOUBLE".to_owned())));
+        let uneven = [columns[0].clone(), ("y_m".to_owned(), Values::F64(vec![1.0]))];
+        let message = write_columns(directory.path(), "uneven", &uneven).unwrap_err().to_string();
+        assert!(message.contains("y_m: expected 2 rows, found 1"), "{message}");
     }
 
     fn columns<R: Row>() -> Vec<String> {

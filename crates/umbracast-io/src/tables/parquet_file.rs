@@ -16,7 +16,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use umbracast::Error;
 
-use super::{Cell, Row};
+use super::{Cell, Row, Values};
 
 /// An open Parquet file.
 pub struct ParquetFile {
@@ -33,9 +33,13 @@ impl std::fmt::Debug for ParquetFile {
 
 impl ParquetFile {
     pub fn create<R: Row>(path: &Path, access_points: &[String]) -> Result<Self, Error> {
+        Self::open(path, access_points, R::TABLE, fields_of::<R>())
+    }
+
+    fn open(path: &Path, access_points: &[String], table: &str, fields: Vec<Field>) -> Result<Self, Error> {
         let failed = |e: &dyn std::fmt::Display| cannot_write(path, e);
         let file = File::create(path).map_err(|e| failed(&e))?;
-        let (schema, properties) = layout::<R>().map_err(|e| failed(&e))?;
+        let (schema, properties) = layout(table, fields).map_err(|e| failed(&e))?;
         let writer = SerializedFileWriter::new(file, schema, Arc::new(properties)).map_err(|e| failed(&e))?;
         Ok(Self { path: path.to_owned(), writer, access_points: access_points.to_vec() })
     }
@@ -61,6 +65,9 @@ impl ParquetFile {
                 (ColumnWriter::ByteArrayColumnWriter(w), Column::Text(v)) => w.write_batch(v, None, None)?,
                 (ColumnWriter::BoolColumnWriter(w), Column::Bool(v)) => w.write_batch(v, None, None)?,
                 (ColumnWriter::BoolColumnWriter(w), Column::MaybeBool(v, there)) => {
+                    w.write_batch(v, Some(there), None)?
+                }
+                (ColumnWriter::DoubleColumnWriter(w), Column::MaybeDouble(v, there)) => {
                     w.write_batch(v, Some(there), None)?
                 }
                 _ => return Err(ParquetError::General("schema and columns disagree".into())),
@@ -106,14 +113,46 @@ enum Column {
     Bool(Vec<bool>),
     /// The values that are there, and for each row 1 where one is.
     MaybeBool(Vec<bool>, Vec<i16>),
+    /// The same.
+    MaybeDouble(Vec<f64>, Vec<i16>),
 }
 
-fn layout<R: Row>() -> Result<(TypePtr, WriterProperties), ParquetError> {
+/// Writes a whole table whose columns are known at run time only.
+pub fn write_columns(path: &Path, table: &str, columns: &[(String, Values)]) -> Result<(), Error> {
+    let field = |(name, values): &(String, Values)| {
+        let (physical, logical, needed) = match values {
+            Values::F64(_) => (Physical::DOUBLE, None, Repetition::REQUIRED),
+            Values::MaybeF64(_) => (Physical::DOUBLE, None, Repetition::OPTIONAL),
+            Values::U32(_) => (Physical::INT32, unsigned(32), Repetition::REQUIRED),
+            Values::Bool(_) => (Physical::BOOLEAN, None, Repetition::REQUIRED),
+        };
+        (name.clone(), physical, logical, needed)
+    };
+    let mut file = ParquetFile::open(path, &[], table, columns.iter().map(field).collect())?;
+    let stored = |(_, values): &(String, Values)| match values {
+        Values::F64(v) => Column::Double(v.clone()),
+        Values::U32(v) => Column::Int32(v.iter().map(|v| v.cast_signed()).collect()),
+        Values::Bool(v) => Column::Bool(v.clone()),
+        Values::MaybeF64(v) => Column::MaybeDouble(
+            v.iter().flatten().copied().collect(),
+            v.iter().map(|v| i16::from(v.is_some())).collect(),
+        ),
+    };
+    let stored: Vec<Column> = columns.iter().map(stored).collect();
+    file.write_columns(&stored).map_err(|e| cannot_write(path, &e))?;
+    file.finish()
+}
+
+/// Name, stored as, means, may be null.
+type Field = (String, Physical, Option<LogicalType>, Repetition);
+
+fn unsigned(bits: i8) -> Option<LogicalType> {
+    Some(LogicalType::integer(bits, false))
+}
+
+fn fields_of<R: Row>() -> Vec<Field> {
     let mut fields = Vec::new();
-    let mut properties = WriterProperties::builder().set_compression(Compression::SNAPPY);
     R::default().visit(&mut |name, cell| {
-        let name = name.to_string();
-        let unsigned = |bits| Some(LogicalType::integer(bits, false));
         let (physical, logical) = match cell {
             Cell::U32(_) => (Physical::INT32, unsigned(32)),
             Cell::U64(_) => (Physical::INT64, unsigned(64)),
@@ -126,8 +165,13 @@ fn layout<R: Row>() -> Result<(TypePtr, WriterProperties), ParquetError> {
             Cell::MaybeBool(_) => Repetition::OPTIONAL,
             _ => Repetition::REQUIRED,
         };
-        fields.push((name, physical, logical, needed));
+        fields.push((name.to_string(), physical, logical, needed));
     });
+    fields
+}
+
+fn layout(table: &str, fields: Vec<Field>) -> Result<(TypePtr, WriterProperties), ParquetError> {
+    let mut properties = WriterProperties::builder().set_compression(Compression::SNAPPY);
     for (name, physical, ..) in &fields {
         if *physical == Physical::DOUBLE {
             let column = ColumnPath::from(name.as_str());
@@ -136,7 +180,7 @@ fn layout<R: Row>() -> Result<(TypePtr, WriterProperties), ParquetError> {
                 .set_column_encoding(column, Encoding::BYTE_STREAM_SPLIT);
         }
     }
-    let typed = |(name, physical, logical, needed): (String, Physical, Option<LogicalType>, Repetition)| {
+    let typed = |(name, physical, logical, needed): Field| {
         Type::primitive_type_builder(&name, physical)
             .with_logical_type(logical)
             .with_repetition(needed)
@@ -144,7 +188,7 @@ fn layout<R: Row>() -> Result<(TypePtr, WriterProperties), ParquetError> {
             .map(Arc::new)
     };
     let fields = fields.into_iter().map(typed).collect::<Result<Vec<_>, _>>()?;
-    let schema = Type::group_type_builder(R::TABLE).with_fields(fields).build()?;
+    let schema = Type::group_type_builder(table).with_fields(fields).build()?;
     Ok((Arc::new(schema), properties.build()))
 }
 

@@ -1,0 +1,192 @@
+//! The main figures of several reports side by side, read back from their `scores.json`.
+
+use serde::{Deserialize, Serialize};
+use umbracast::{Error, Mode};
+
+use super::tables::{Table, number};
+use crate::score::Predictor;
+
+/// One mode in one group of scenes of one report.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// The report's.
+    pub name: String,
+    /// The preset or the file replayed.
+    pub group: String,
+    /// How many scenes.
+    pub scenes: usize,
+    /// Whose run.
+    pub mode: Mode,
+    /// Share of persons in frames who are tracked.
+    pub recall: Option<f64>,
+    /// CLEAR.
+    pub mota: Option<f64>,
+    /// F1 of identities.
+    pub idf1: Option<f64>,
+    /// A scene.
+    pub switches: Option<f64>,
+    /// Root mean square of the 2-D error, metres.
+    pub position_m: Option<f64>,
+    /// The same of the velocity, metres a second.
+    pub velocity_mps: Option<f64>,
+    /// F1 at 300 ms by access point.
+    pub f1: Vec<(String, Option<f64>)>,
+    /// Scans of sensors that were not there.
+    pub scans_missing: u64,
+}
+
+/// What is read of a `scores.json`.
+#[derive(Deserialize)]
+struct Scores {
+    groups: Vec<Group>,
+}
+
+#[derive(Deserialize)]
+struct Group {
+    name: String,
+    scenes: usize,
+    links: Vec<Links>,
+    modes: Vec<Stage1>,
+}
+
+#[derive(Deserialize)]
+struct Links {
+    mode: Option<Mode>,
+    predictor: String,
+    access_point: String,
+    windows: Vec<Window>,
+}
+
+#[derive(Deserialize)]
+struct Window {
+    w: usize,
+    f1: Score,
+}
+
+#[derive(Deserialize)]
+struct Stage1 {
+    mode: Mode,
+    recall: Score,
+    mota: Score,
+    idf1: Score,
+    switches_per_scene: Score,
+    position_rmse_m: Score,
+    velocity_rmse_mps: Score,
+    health: Health,
+}
+
+#[derive(Deserialize)]
+struct Score {
+    value: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct Health {
+    sensors_missing: u64,
+}
+
+/// The rows of one report, in its order of groups and modes.
+///
+/// # Errors
+/// Something other than the scores of a report.
+pub fn rows(name: &str, scores_json: &[u8]) -> Result<Vec<Row>, Error> {
+    let scores: Scores = serde_json::from_slice(scores_json)
+        .map_err(|e| Error::new(format!("expected the scores of a report, found: {e}")))?;
+    let of_group =
+        |group: &Group| -> Vec<Row> { group.modes.iter().map(|scores| row(name, group, scores)).collect() };
+    Ok(scores.groups.iter().flat_map(of_group).collect())
+}
+
+fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
+    let own = |links: &&Links| links.mode == Some(scores.mode) && links.predictor == Predictor::Run.name();
+    let at_300_ms = |links: &Links| {
+        let f1 = links.windows.iter().find(|window| window.w == 3).and_then(|window| window.f1.value);
+        (links.access_point.clone(), f1)
+    };
+    Row {
+        name: name.to_owned(),
+        group: group.name.clone(),
+        scenes: group.scenes,
+        mode: scores.mode,
+        recall: scores.recall.value,
+        mota: scores.mota.value,
+        idf1: scores.idf1.value,
+        switches: scores.switches_per_scene.value,
+        position_m: scores.position_rmse_m.value,
+        velocity_mps: scores.velocity_rmse_mps.value,
+        f1: group.links.iter().filter(own).map(at_300_ms).collect(),
+        scans_missing: scores.health.sensors_missing,
+    }
+}
+
+/// One line a row; a column for each access point that any of them has.
+pub fn table(rows: &[Row]) -> Table {
+    let mut access_points: Vec<&str> = Vec::new();
+    for (name, _) in rows.iter().flat_map(|row| &row.f1) {
+        if !access_points.contains(&name.as_str()) {
+            access_points.push(name);
+        }
+    }
+    let header = [
+        "report",
+        "people",
+        "mode",
+        "scenes",
+        "recall",
+        "MOTA",
+        "IDF1",
+        "switches",
+        "position, m",
+        "velocity, m/s",
+    ];
+    let mut table = Table::new("Detection, tracking, and F1 of blockage within 300 ms", 3, &header);
+    table.header.extend(access_points.iter().map(|name| format!("F1 {name}")));
+    table.header.push("scans missing".to_owned());
+    for row in rows {
+        let mut cells = vec![row.name.clone(), row.group.clone(), row.mode.name().to_owned()];
+        cells.push(row.scenes.to_string());
+        cells.extend([row.recall, row.mota, row.idf1].map(|score| number(score, 3)));
+        cells.push(number(row.switches, 2));
+        cells.extend([row.position_m, row.velocity_mps].map(|score| number(score, 3)));
+        for name in &access_points {
+            let f1 = row.f1.iter().find(|(own, _)| own == name).and_then(|(_, f1)| *f1);
+            cells.push(number(f1, 3));
+        }
+        cells.push(row.scans_missing.to_string());
+        table.rows.push(cells);
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made::{link_row, track_row, truth_of};
+    use crate::pooled::pool;
+    use crate::report::to_json;
+    use crate::scene::SceneRun;
+    use crate::score::{ModeRun, score_scene};
+    use umbracast::Config;
+
+    #[test]
+    fn the_scores_that_a_report_writes_are_read_back_into_a_line_a_mode() {
+        let truth = truth_of(1, 40, |_, frame| frame >= 30);
+        let mut run = SceneRun::default();
+        for frame in 0..40 {
+            run.tracks.push(track_row(frame, 0, 0.0, 0.0));
+            run.links.push(link_row(frame, 0, frame >= 27));
+        }
+        let config = Config::for_mode(Mode::Default);
+        let health = umbracast::Health { sensors_missing: 12, ..umbracast::Health::default() };
+        let run = ModeRun { config: &config, rows: &run, health };
+        let scene = score_scene(0, "orca-03", &truth, &[run], None, None).unwrap();
+        let json = to_json(&pool(&[&scene], &["side".to_owned()]));
+        let rows = rows("lost", json.as_bytes()).unwrap();
+        assert_eq!((rows.len(), rows[0].scans_missing), (1, 12));
+        assert_eq!(rows[0].f1, [("side".to_owned(), Some(1.0))]);
+        let text = table(&rows).to_text();
+        let line = text.lines().last().unwrap();
+        assert!(line.starts_with("lost    orca-03  default") && text.contains("F1 side"), "{text}");
+        assert!(super::rows("lost", b"{}").unwrap_err().to_string().contains("groups"));
+    }
+}
