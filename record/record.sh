@@ -28,7 +28,7 @@ record orca-40-scenes umbracast evaluate --scenes 20 --preset orca-03,orca-06 --
 sed "s|$scratch|/tmp|g" "$scratch/orca/report.html" >record/orca-40-scenes.html
 
 # What the sensors see of a standing person, and the floor plan.
-record coverage umbracast coverage --step 0.25 --out "$scratch/coverage"
+record coverage umbracast coverage --out "$scratch/coverage"
 cp "$scratch/coverage/coverage.svg" record/coverage.svg
 
 # Other heights, a lost sensor, more people, pairs.
