@@ -15,18 +15,21 @@ const COARSE: Options = Options { step_m: 4.0, height_m: 1.72, headings: 4 };
 fn a_place_gives_the_returns_that_people_who_stand_there_have_in_scenes() {
     let site = site();
     let places = [(0.0, 0.0), (8.0, 4.0), (-8.0, 8.0), (0.0, -12.0), (12.0, 4.0)];
-    let stand = |(person, (x, y)): (u32, (f64, f64))| Trajectory {
+    // Everybody comes walking for a second, and then stands for one before the first frame.
+    let stand = |person: u32, place_m: DVec2, ahead: DVec2| Trajectory {
         person,
-        start_ns: 0,
+        start_ns: -2_000_000_000,
         step_ns: 10_000_000,
-        positions_m: vec![DVec2::new(x, y); 41],
+        positions_m: (0..240).map(|i| place_m - ahead * (1.0 - 0.01 * f64::from(i)).max(0.0)).collect(),
         arrived_ns: None,
         height_m: Some(1.72),
     };
     let mut simulated = [0.0; 5];
-    let (scenes, frames) = (12, 3);
+    let (scenes, frames) = (16, 2);
     for seed in 0..scenes {
-        let trajectories = (0..).zip(places).map(stand).collect();
+        let ahead = DVec2::from_angle(seed as f64 / scenes as f64 * TAU);
+        let trajectories =
+            (0..).zip(places).map(|(person, place)| stand(person, place.into(), ahead)).collect();
         let crowd = Crowd { trajectories, duration_ns: frames * STEP_NS };
         let mut scene = Scene::new(crowd, &site, seed).unwrap();
         while let Some(frame) = scene.next_frame() {
@@ -39,8 +42,8 @@ fn a_place_gives_the_returns_that_people_who_stand_there_have_in_scenes() {
     for ((x, y), simulated) in places.into_iter().zip(simulated) {
         let place = coverage.places.iter().find(|place| place.position_m == DVec2::new(x, y)).unwrap();
         let surveyed = place.all_returns();
-        // In the scenes everybody looks along x and is one of twelve builds.
-        assert!((surveyed / simulated - 1.0).abs() < 0.2, "({x}, {y}): {surveyed}, in scenes {simulated}");
+        // Other builds, and noise.
+        assert!((surveyed / simulated - 1.0).abs() < 0.12, "({x}, {y}): {surveyed}, in scenes {simulated}");
         assert!(surveyed > 15.0);
     }
 }
