@@ -49,23 +49,26 @@ impl Bootstrap {
         Self { draws: (0..RESAMPLES).map(|_| draw()).collect(), scenes }
     }
 
-    /// The middle 95 % of `score` over resamples of the scenes; `sums[i]` is scene i's. `None` with fewer than
-    /// two scenes, or where the score is undefined in some resample.
-    pub fn interval<T: Pooled>(&self, sums: &[T], score: impl Fn(&T) -> Option<f64>) -> Option<[f64; 2]> {
+    /// The sums of each resample of the scenes; `sums[i]` is scene i's. Empty with fewer than two scenes.
+    pub fn resampled<T: Pooled>(&self, sums: &[T]) -> Vec<T> {
         if self.scenes < 2 || sums.len() != self.scenes {
-            return None;
+            return Vec::new();
         }
-        let resampled = |times: &Vec<u32>| {
-            let pooled = sums.iter().zip(times).fold(T::default(), |all, (sum, &n)| match n {
+        let resample = |times: &Vec<u32>| {
+            sums.iter().zip(times).fold(T::default(), |all, (sum, &n)| match n {
                 0 => all,
                 n => all.plus(sum, u64::from(n)),
-            });
-            score(&pooled)
+            })
         };
-        let mut values = self.draws.iter().map(resampled).collect::<Option<Vec<f64>>>()?;
-        values.sort_unstable_by(f64::total_cmp);
-        Some([quantile(&values, 0.025), quantile(&values, 0.975)])
+        self.draws.iter().map(resample).collect()
     }
+}
+
+/// The middle 95 % of `score` over resamples. `None` without any, or where the score is undefined in some.
+pub fn interval<T>(resampled: &[T], score: impl Fn(&T) -> Option<f64>) -> Option<[f64; 2]> {
+    let mut values = resampled.iter().map(score).collect::<Option<Vec<f64>>>()?;
+    values.sort_unstable_by(f64::total_cmp);
+    (!values.is_empty()).then(|| [quantile(&values, 0.025), quantile(&values, 0.975)])
 }
 
 /// Of sorted values, by linear interpolation between neighbours.
@@ -84,29 +87,32 @@ mod tests {
         Counts { true_positive: hits, false_negative: misses, ..Counts::default() }
     }
 
+    fn interval_of(scenes: &[Counts], score: fn(&Counts) -> Option<f64>) -> Option<[f64; 2]> {
+        interval(&Bootstrap::new(scenes.len()).resampled(scenes), score)
+    }
+
     #[test]
     fn equal_scenes_leave_no_doubt() {
-        let interval = Bootstrap::new(5).interval(&[scene(3, 1); 5], Counts::recall).unwrap();
-        assert_eq!(interval, [0.75, 0.75]);
+        assert_eq!(interval_of(&[scene(3, 1); 5], Counts::recall), Some([0.75, 0.75]));
     }
 
     #[test]
     fn the_interval_is_that_of_the_binomial_when_scenes_are_all_or_nothing() {
         // 50 scenes of one instance each, half of them hit: recall is a mean of 50 coin flips, sd 0.0707.
         let scenes: Vec<Counts> = (0..50).map(|i| scene(i % 2, 1 - i % 2)).collect();
-        let [low, high] = Bootstrap::new(50).interval(&scenes, Counts::recall).unwrap();
+        let [low, high] = interval_of(&scenes, Counts::recall).unwrap();
         assert!((low - 0.36).abs() < 0.03 && (high - 0.64).abs() < 0.03, "{low} {high}");
     }
 
     #[test]
     fn one_scene_has_no_interval() {
-        assert_eq!(Bootstrap::new(1).interval(&[scene(3, 1)], Counts::recall), None);
+        assert_eq!(interval_of(&[scene(3, 1)], Counts::recall), None);
     }
 
     #[test]
     fn the_same_scenes_give_the_same_interval() {
         let scenes: Vec<Counts> = (0..7).map(|i| scene(i, 7 - i)).collect();
-        let twice = [0, 1].map(|_| Bootstrap::new(7).interval(&scenes, Counts::f1));
+        let twice = [0, 1].map(|_| interval_of(&scenes, Counts::f1));
         assert_eq!(twice[0], twice[1]);
     }
 }

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use umbracast::blockage::Caster;
+use umbracast::config::{BlockageConfig, BlockageMethod, BoxKind};
 use umbracast::forecast::{Coupling, Forecast, Forecaster, Gaussian2, Weights, constant_velocity};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use umbracast::track::{OBSERVED, Observed, Track};
@@ -28,6 +29,22 @@ pub fn constant_velocity_of_truth(truth: &TruthIndex, config: &Config) -> Said {
             .iter()
             .map(|track| constant_velocity::forecast(track, config.forecast.acceleration_psd_m2ps3))
             .collect();
+        caster.cast(&tracks, &forecasts, &mut blockages);
+        said.add(frame, &blockages);
+    }
+    said
+}
+
+/// Algorithm 1 of the paper on a run's tracks and forecasts, with boxes of this kind, whatever the mode's own
+/// stage 3 is: everything before it is the run's.
+pub fn algorithm_1(run: &SceneRun, config: &Config, person_box: BoxKind) -> Said {
+    let blockage =
+        BlockageConfig { method: BlockageMethod::Algorithm1, person_box, ..config.blockage.clone() };
+    let mut caster = Caster::new(&blockage, &config.site);
+    let (mut said, mut blockages) = (Said::default(), Vec::new());
+    for (frame, rows) in confirmed_by_frame(run) {
+        let ahead = |row: &&TrackRow| with_own_future(row, config.forecast.acceleration_psd_m2ps3);
+        let (tracks, forecasts): (Vec<Track>, Vec<Forecast>) = rows.iter().map(ahead).unzip();
         caster.cast(&tracks, &forecasts, &mut blockages);
         said.add(frame, &blockages);
     }
@@ -72,12 +89,8 @@ pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, conf
     let mut caster = Caster::new(&config.blockage, &config.site);
     let person_of: BTreeMap<(u64, u64), u32> =
         matching.iter().map(|(&(frame, person), &track)| ((frame, track), person)).collect();
-    let mut by_frame: BTreeMap<u64, Vec<&TrackRow>> = BTreeMap::new();
-    for row in run.tracks.iter().filter(|row| row.confirmed) {
-        by_frame.entry(row.frame).or_default().push(row);
-    }
     let (mut said, mut blockages) = (Said::default(), Vec::new());
-    for (&frame, rows) in &by_frame {
+    for (frame, rows) in confirmed_by_frame(run) {
         let ahead = |row: &&TrackRow| {
             let person = person_of.get(&(frame, row.track));
             match person.and_then(|&person| truth.person(frame, person)) {
@@ -106,6 +119,15 @@ pub fn constant_velocity_steps(row: &PeopleRow, acceleration_psd_m2ps3: f64) -> 
 /// The steps of a track's row.
 pub fn forecast_of(row: &TrackRow) -> [Gaussian2; STEPS] {
     row.steps.map(|[x, y, xx_m2, xy_m2, yy_m2]| Gaussian2 { mean_m: DVec2::new(x, y), xx_m2, xy_m2, yy_m2 })
+}
+
+/// What stage 3 gets: confirmed tracks, frame by frame.
+fn confirmed_by_frame(run: &SceneRun) -> BTreeMap<u64, Vec<&TrackRow>> {
+    let mut by_frame: BTreeMap<u64, Vec<&TrackRow>> = BTreeMap::new();
+    for row in run.tracks.iter().filter(|row| row.confirmed) {
+        by_frame.entry(row.frame).or_default().push(row);
+    }
+    by_frame
 }
 
 /// What is known has no spread.

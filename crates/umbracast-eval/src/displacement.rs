@@ -1,5 +1,6 @@
 //! Stage 2: how far forecasts end from where people went, and whether their spread is honest.
 
+use serde::{Deserialize, Serialize};
 use umbracast::geometry::DVec2;
 use umbracast::{STEPS, forecast::Gaussian2};
 
@@ -14,7 +15,7 @@ const CHI2_50: f64 = 1.386;
 const CHI2_90: f64 = 4.605;
 
 /// Errors of one step, added up.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepSums {
     /// Distances, metres.
     pub distance_m: f64,
@@ -29,7 +30,7 @@ pub struct StepSums {
 }
 
 /// Errors of all forecasts of a scene, added up.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Displacement {
     /// Persons at instants that count (whatever the links).
     pub instances: u64,

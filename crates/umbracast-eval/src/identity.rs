@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use umbracast::track::association::{FORBIDDEN, optimal};
 
 use crate::matching::{GATE_M, SceneFrame, apart_m};
@@ -11,7 +12,7 @@ use crate::matching::{GATE_M, SceneFrame, apart_m};
 pub const ALPHAS: usize = 19;
 
 /// What HOTA adds up at one threshold.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct HotaSums {
     /// Pairs at least as similar as the threshold.
     pub pairs: u64,

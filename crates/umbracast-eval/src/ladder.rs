@@ -87,7 +87,7 @@ const HEIGHT_ERROR_M: f64 = 0.03;
 const ERROR_KEPT: f64 = 0.9;
 
 /// One scene on the ladder: sums to be pooled.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SceneLadder {
     /// By rung, then by access point.
     pub rungs: Vec<Vec<LinkTally>>,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use umbracast::{Health, Mode, STEPS, Site};
 
-use crate::bootstrap::{Bootstrap, Pooled};
+use crate::bootstrap::{Bootstrap, Pooled, interval};
 use crate::chain::SceneResult;
 use crate::displacement::Displacement;
 use crate::ladder::{self, LadderRow, SceneLadder};
@@ -177,6 +177,14 @@ impl Scores {
     }
 }
 
+impl LinkScores {
+    /// True when both said yes and no alike, as far as counts tell.
+    pub fn same_counts(&self, other: &Self) -> bool {
+        let counts = |scores: &WindowScores| (scores.counts, scores.onset_counts);
+        self.windows.iter().map(counts).eq(other.windows.iter().map(counts))
+    }
+}
+
 impl Group {
     /// The scores of a predictor at an access point.
     pub fn link(&self, mode: Option<Mode>, predictor: Predictor, access_point: &str) -> Option<&LinkScores> {
@@ -239,18 +247,18 @@ fn windows(bootstrap: &Bootstrap, scenes: &[&LinkTally]) -> Vec<WindowScores> {
     let pooled = LinkTally::pooled(scenes);
     let of = |i: usize| {
         let (tally, leads) = (&pooled.windows[i], &pooled.leads[i]);
-        let all: Vec<Counts> = scenes.iter().map(|scene| scene.windows[i].all).collect();
-        let onset: Vec<Counts> = scenes.iter().map(|scene| scene.windows[i].onset).collect();
+        let all = Spread::of(bootstrap, scenes.iter().map(|scene| scene.windows[i].all));
+        let onset = Spread::of(bootstrap, scenes.iter().map(|scene| scene.windows[i].onset));
         WindowScores {
             w: i + 1,
             counts: tally.all,
             onset_counts: tally.onset,
-            base_rate: estimate(bootstrap, &all, Counts::base_rate),
-            accuracy: estimate(bootstrap, &all, Counts::accuracy),
-            precision: estimate(bootstrap, &all, Counts::precision),
-            recall: estimate(bootstrap, &all, Counts::recall),
-            f1: estimate(bootstrap, &all, Counts::f1),
-            onset_f1: estimate(bootstrap, &onset, Counts::f1),
+            base_rate: all.estimate(Counts::base_rate),
+            accuracy: all.estimate(Counts::accuracy),
+            precision: all.estimate(Counts::precision),
+            recall: all.estimate(Counts::recall),
+            f1: all.estimate(Counts::f1),
+            onset_f1: onset.estimate(Counts::f1),
             auprc: tally.auprc(),
             brier: tally.brier(),
             ece: tally.ece(),
@@ -263,10 +271,10 @@ fn windows(bootstrap: &Bootstrap, scenes: &[&LinkTally]) -> Vec<WindowScores> {
 }
 
 fn mode_scores(bootstrap: &Bootstrap, scenes: &[&SceneScore], m: usize) -> ModeScores {
-    let stage1: Vec<Stage1> = scenes.iter().map(|scene| scene.modes[m].stage1).collect();
-    let displacement: Vec<Displacement> = scenes.iter().map(|scene| scene.modes[m].displacement).collect();
-    let (tracks, forecasts) = (sum(&stage1), sum(&displacement));
-    let of_tracks = |score: fn(&Stage1) -> Option<f64>| estimate(bootstrap, &stage1, score);
+    let stage1 = Spread::of(bootstrap, scenes.iter().map(|scene| scene.modes[m].stage1));
+    let displacement = Spread::of(bootstrap, scenes.iter().map(|scene| scene.modes[m].displacement));
+    let (tracks, forecasts) = (&stage1.pooled, &displacement.pooled);
+    let of_tracks = |score: fn(&Stage1) -> Option<f64>| stage1.estimate(score);
     let mut health = Health::default();
     scenes.iter().for_each(|scene| health.add(&scene.modes[m].health));
     ModeScores {
@@ -280,18 +288,31 @@ fn mode_scores(bootstrap: &Bootstrap, scenes: &[&SceneScore], m: usize) -> ModeS
         position_rmse_m: of_tracks(Stage1::position_rmse_m),
         velocity_rmse_mps: of_tracks(Stage1::velocity_rmse_mps),
         recall_by_returns: tracks.recall_by_returns(),
-        tracked_share: estimate(bootstrap, &displacement, Displacement::tracked_share),
+        tracked_share: displacement.estimate(Displacement::tracked_share),
         scored_share: forecasts.scored_share(),
-        displacement_m: (1..=STEPS).map(|h| estimate(bootstrap, &displacement, |d| d.mean_m(h))).collect(),
-        displacement_mean_m: estimate(bootstrap, &displacement, Displacement::average_m),
+        displacement_m: (1..=STEPS).map(|h| displacement.estimate(|d| d.mean_m(h))).collect(),
+        displacement_mean_m: displacement.estimate(Displacement::average_m),
         nll: (1..=STEPS).map(|h| forecasts.nll(h)).collect(),
         coverage: (1..=STEPS).map(|h| forecasts.coverage(h)).collect(),
         health,
     }
 }
 
-fn estimate<T: Pooled>(bootstrap: &Bootstrap, sums: &[T], score: impl Fn(&T) -> Option<f64>) -> Estimate {
-    Estimate { value: score(&sum(sums)), interval: bootstrap.interval(sums, &score) }
+/// Sums of all scenes, and of every resample of them.
+struct Spread<T> {
+    pooled: T,
+    resampled: Vec<T>,
+}
+
+impl<T: Pooled> Spread<T> {
+    fn of(bootstrap: &Bootstrap, scenes: impl Iterator<Item = T>) -> Self {
+        let scenes: Vec<T> = scenes.collect();
+        Self { pooled: sum(&scenes), resampled: bootstrap.resampled(&scenes) }
+    }
+
+    fn estimate(&self, score: impl Fn(&T) -> Option<f64>) -> Estimate {
+        Estimate { value: score(&self.pooled), interval: interval(&self.resampled, score) }
+    }
 }
 
 fn sum<'a, T: Pooled + 'a>(sums: impl IntoIterator<Item = &'a T>) -> T {

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+use umbracast::config::BoxKind;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Health, Mode};
 use umbracast_io::rows::TrackRow;
@@ -18,10 +20,14 @@ use crate::tally::{LinkTally, Prediction};
 use crate::true_bodies::true_bodies;
 
 /// Who predicts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Predictor {
     /// The mode itself.
     Run,
+    /// The mode with Algorithm 1 on axis-aligned boxes for its stage 3.
+    Aabb,
+    /// The mode with Algorithm 1 on boxes along people's own axes for its stage 3.
+    Obb,
     /// Baseline: nobody is ever blocked.
     Never,
     /// Baseline: as now, the present being the truth's.
@@ -43,6 +49,8 @@ impl Predictor {
     pub fn name(self) -> &'static str {
         match self {
             Self::Run => "run",
+            Self::Aabb => "AABB",
+            Self::Obb => "OBB",
             Self::Never => "never",
             Self::PersistenceOfTruth => "persistence of truth",
             Self::PersistenceOfTracks => "persistence of tracks",
@@ -55,7 +63,7 @@ impl Predictor {
 }
 
 /// What a predictor said in one scene.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PredictorTally {
     /// `None` for baselines that need no mode.
     pub mode: Option<Mode>,
@@ -66,7 +74,7 @@ pub struct PredictorTally {
 }
 
 /// Stages 1 and 2 of a mode in one scene.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModeSums {
     /// Whose.
     pub mode: Mode,
@@ -79,7 +87,7 @@ pub struct ModeSums {
 }
 
 /// Everything that is kept of a scene for the scores of all.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneScore {
     /// Which of the scenes.
     pub scene: u32,
@@ -138,6 +146,8 @@ pub fn score_scene(
         let of_persons = |said: Said| said.of_persons(&instances);
         add(mode, Predictor::PersistenceOfTracks, own.persistence(&instances, &matching));
         add(mode, Predictor::Run, of_tracks(own));
+        add(mode, Predictor::Aabb, of_tracks(casts::algorithm_1(rows, config, BoxKind::Aabb)));
+        add(mode, Predictor::Obb, of_tracks(casts::algorithm_1(rows, config, BoxKind::Obb)));
         add(
             mode,
             Predictor::ConstantVelocityOfTruth,

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
 use crate::bootstrap::Pooled;
@@ -15,7 +16,7 @@ use crate::tally::ratio;
 pub const RETURN_CLASSES: usize = 3;
 
 /// Everything that scores of stage 1 are computed from.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stage1 {
     /// Scenes added up.
     pub scenes: u64,

@@ -1,6 +1,6 @@
 //! Sums from which every score of stage 3 follows: added up over instances, and again over scenes.
 
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use umbracast::{STEP_NS, STEPS};
 
 use crate::bootstrap::Pooled;
@@ -43,7 +43,7 @@ impl Prediction {
 }
 
 /// True and false, positive and negative.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Blocked and said so.
     pub true_positive: u64,
@@ -113,7 +113,7 @@ pub struct Bin {
 }
 
 /// Everything that was said for one window of one access point.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
     /// All instances.
     pub all: Counts,
@@ -122,6 +122,7 @@ pub struct Tally {
     /// Squared differences of probability and truth, added.
     pub brier_sum: f64,
     /// For calibration.
+    #[serde(serialize_with = "write_filled", deserialize_with = "read_filled")]
     pub bins: [Bin; ECE_BINS],
     /// Probabilities, falling, each with how many instances were in sight and how many blocked.
     ranking: Vec<(f32, u32, u32)>,
@@ -192,6 +193,22 @@ impl Tally {
     }
 }
 
+/// Only the bins that hold something, with their places: a yes-or-no answer fills two of the fifteen.
+fn write_filled<S: Serializer>(bins: &[Bin; ECE_BINS], serializer: S) -> Result<S::Ok, S::Error> {
+    let filled = bins.iter().enumerate().filter(|(_, bin)| bin.count > 0);
+    let filled: Vec<_> = filled.map(|(place, bin)| (place, bin.count, bin.p_sum, bin.blocked)).collect();
+    filled.serialize(serializer)
+}
+
+fn read_filled<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[Bin; ECE_BINS], D::Error> {
+    let mut bins = [Bin::default(); ECE_BINS];
+    for (place, count, p_sum, blocked) in Vec::<(usize, u64, f64, u64)>::deserialize(deserializer)? {
+        let bin = bins.get_mut(place).ok_or_else(|| serde::de::Error::custom("a bin that does not exist"))?;
+        *bin = Bin { count, p_sum, blocked };
+    }
+    Ok(bins)
+}
+
 /// Falling by probability, equal ones joined.
 fn ranked(mut entries: Vec<(f32, u32, u32)>) -> Vec<(f32, u32, u32)> {
     entries.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
@@ -207,7 +224,7 @@ fn ranked(mut entries: Vec<(f32, u32, u32)>) -> Vec<(f32, u32, u32)> {
 }
 
 /// How long before each onset the warning began.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct LeadTimes {
     /// Links that went from in sight to blocked.
     pub onsets: u64,
@@ -267,7 +284,7 @@ impl LeadTimes {
 }
 
 /// Everything a predictor said of the links of one access point.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct LinkTally {
     /// Index w - 1.
     pub windows: [Tally; STEPS],

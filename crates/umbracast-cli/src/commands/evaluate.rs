@@ -191,18 +191,20 @@ fn show(
     }
     if let Some(folder) = out {
         let arguments: Vec<String> = std::env::args().skip(1).collect();
-        let command = [&[format!("umbracast {}", arguments.join(" "))], told].concat().join("\n");
-        let explanations: Vec<(String, String)> = scores
-            .groups
-            .iter()
-            .flat_map(|group| &group.ladder)
-            .map(|row| (row.oracle.to_owned(), HARSHER_BODIES.to_owned()))
-            .collect();
-        let context = Context { configs, command: command.trim_end(), kept, explanations: &explanations };
+        let command = format!("umbracast {}", arguments.join(" "));
+        let explanations = explanations(scores);
+        let context =
+            Context { configs, command: command.trim_end(), kept, notes: told, explanations: &explanations };
         report::write(folder, scores, &context)?;
         if !common.json {
             say::line(format_args!("\nreport: {}", folder.join("report.html").display()));
         }
     }
     Ok(Ending::Done)
+}
+
+/// What is known of why our ladder lies below its reference: (oracle, reason).
+pub fn explanations(scores: &Scores) -> Vec<(String, String)> {
+    let rungs = scores.groups.iter().flat_map(|group| &group.ladder);
+    rungs.map(|row| (row.oracle.to_owned(), HARSHER_BODIES.to_owned())).collect()
 }

@@ -56,6 +56,9 @@ pub fn page(scores: &Scores, context: &Context, figures: &[Figure], tables: &[Ta
     if let Some(group) = scores.headline() {
         page += &opening(group);
     }
+    for note in context.notes {
+        let _ = writeln!(page, "<p>{}</p>", escaped(note));
+    }
     page += "<nav><a href=\"#figures\">Figures</a><a href=\"#tables\">Tables</a>\
              <a href=\"#again\">Run it again</a></nav>\n<section id=\"figures\">\n";
     figures.iter().for_each(|figure| page += &drawn(figure));

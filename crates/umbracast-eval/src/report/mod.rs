@@ -3,6 +3,7 @@
 pub mod published;
 pub mod tables;
 pub mod compare;
+mod long_table;
 mod ladder_table;
 mod plot;
 mod figures;
@@ -26,6 +27,8 @@ pub struct Context<'a> {
     pub command: &'a str,
     /// The scene that is shown by itself.
     pub kept: Option<Kept<'a>>,
+    /// What a reader must know of how it was made, a paragraph each.
+    pub notes: &'a [String],
     /// Why rungs of the ladder lie below the reference: (oracle, reason).
     pub explanations: &'a [(String, String)],
 }
@@ -45,8 +48,8 @@ pub struct Kept<'a> {
     pub run: &'a SceneRun,
 }
 
-/// Writes `report.html`, `scores.json`, and each figure as `NAME.svg` and `NAME.png` into a directory, which is
-/// made where it is not there.
+/// Writes into a directory, which is made where it is not there: `report.html`; its tables as text, `report.txt`;
+/// every score as `scores.json` and `scores.csv`; and each figure as `NAME.svg` and `NAME.png`.
 ///
 /// # Errors
 /// A file that cannot be written, or a figure that cannot be drawn.
@@ -60,8 +63,13 @@ pub fn write(directory: &Path, scores: &Scores, context: &Context) -> Result<(),
         write_file(&directory.join(format!("{}.svg", figure.name)), standalone)?;
         write_file(&directory.join(format!("{}.png", figure.name)), &figure.drawing.png)?;
     }
-    let page = html::page(scores, context, &figures, &tables(scores, context));
+    let tables = tables(scores, context);
+    let page = html::page(scores, context, &figures, &tables);
     write_file(&directory.join("report.html"), page.as_bytes())?;
+    let notes = context.notes.iter().map(|note| note.clone() + "\n");
+    let text = notes.chain(tables.iter().map(Table::to_text)).collect::<Vec<_>>().join("\n");
+    write_file(&directory.join("report.txt"), text.as_bytes())?;
+    write_file(&directory.join("scores.csv"), long_table::to_csv(scores).as_bytes())?;
     write_file(&directory.join("scores.json"), to_json(scores).as_bytes())
 }
 
@@ -77,6 +85,16 @@ pub fn to_text(scores: &Scores) -> String {
     shown.extend((scores.groups.len() > 1).then(|| tables::presets(scores)));
     shown.extend([tables::tracking(group), tables::displacement(group)]);
     shown.extend(tables::losses(group));
+    shown.extend((scores.groups.len() > 1).then(|| tables::figures_by_preset(scores)));
+    shown.iter().map(Table::to_text).collect::<Vec<_>>().join("\n")
+}
+
+/// The paper's experiment for a terminal: the boxes at 300 and 800 ms, then figures with intervals.
+pub fn boxes_to_text(scores: &Scores) -> String {
+    let Some(group) = scores.headline() else { return String::new() };
+    let boxes = |access_point| tables::boxes(group, access_point, &[3, 8]);
+    let mut shown: Vec<Table> = group.access_points().into_iter().map(boxes).collect();
+    shown.extend((scores.groups.len() == 1).then(|| tables::figures_by_preset(scores)));
     shown.iter().map(Table::to_text).collect::<Vec<_>>().join("\n")
 }
 
@@ -85,7 +103,9 @@ fn tables(scores: &Scores, context: &Context) -> Vec<Table> {
     let Some(group) = scores.headline() else { return Vec::new() };
     let mut all = vec![tables::headline(group)];
     all.extend((scores.groups.len() > 1).then(|| tables::presets(scores)));
-    all.extend([tables::tracking(group), tables::displacement(group)]);
+    let every_window: Vec<usize> = (1..=umbracast::STEPS).collect();
+    all.extend(group.access_points().into_iter().map(|ap| tables::boxes(group, ap, &every_window)));
+    all.extend([tables::tracking(group), tables::displacement(group), tables::figures_by_preset(scores)]);
     for access_point in group.access_points() {
         all.push(tables::baselines(group, access_point));
         all.push(tables::budget(group, access_point));
@@ -140,7 +160,7 @@ mod tests {
             Kept { label: "hand made", mode: Mode::Default, site: &config.site, truth: &truth, run: &run };
         let command = "umbracast evaluate --out <here>";
         let configs = [config.clone()];
-        let context = Context { configs: &configs, command, kept: Some(kept), explanations: &[] };
+        let context = Context { configs: &configs, command, kept: Some(kept), notes: &[], explanations: &[] };
         let written = [0, 1].map(|_| {
             let directory = tempfile::tempdir().unwrap();
             write(directory.path(), &scores, &context).unwrap();

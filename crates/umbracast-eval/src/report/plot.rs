@@ -41,6 +41,8 @@ pub struct Series {
     pub mark: Mark,
     /// In the units of the axes.
     pub points: Vec<(f64, f64)>,
+    /// Shaded around a line: lower and upper end at each of the points, or nothing.
+    pub band: Vec<[f64; 2]>,
 }
 
 /// One pair of axes.
@@ -150,6 +152,10 @@ fn plot(series: &Series) -> Plot {
             .with_data(series.points.clone())
             .with_color(series.color)
             .with_stroke_width(width);
+        let line = match series.band.len() == series.points.len() {
+            true => line.with_band(series.band.iter().map(|b| b[0]), series.band.iter().map(|b| b[1])),
+            false => line,
+        };
         if series.name.is_empty() { line } else { line.with_legend(&series.name) }
     };
     let marks = |shape, radius| {

@@ -105,6 +105,38 @@ pub fn presets(scores: &Scores) -> Table {
     table
 }
 
+/// Algorithm 1 with AABB and with OBB on every mode's tracks and forecasts, and the modes' own stage 3 where it is
+/// neither, at one access point and these windows.
+pub fn boxes(group: &Group, access_point: &str, windows: &[usize]) -> Table {
+    let header =
+        ["window", "mode", "stage 3", "base rate", "accuracy", "precision", "recall", "F1", "onset F1"];
+    let title = format!("Boxes, access point {access_point}: {}", scenes(group));
+    let mut table = Table::new(title, 3, &header);
+    let shown = [(Predictor::Aabb, "AABB"), (Predictor::Obb, "OBB"), (Predictor::Run, "own")];
+    for &w in windows {
+        for mode in &group.modes {
+            let of = |predictor| group.link(Some(mode.mode), predictor, access_point);
+            let own_is_a_box = [Predictor::Aabb, Predictor::Obb]
+                .iter()
+                .any(|&boxed| of(boxed).zip(of(Predictor::Run)).is_some_and(|(a, b)| a.same_counts(b)));
+            for (predictor, name) in shown {
+                let Some(links) = of(predictor).filter(|_| name != "own" || !own_is_a_box) else { continue };
+                let start = [window(w), mode.mode.name().to_owned(), name.to_owned()];
+                table.rows.push(with_scores(&start, &links.windows[w - 1]));
+            }
+        }
+        let published = published_rows().into_iter().filter(|row| row[1] == window(w));
+        table.rows.extend(published.map(|mut row| {
+            row[..3].clone_from_slice(&[window(w), "published".to_owned(), String::new()]);
+            row
+        }));
+    }
+    table.noted(
+        "Everything before stage 3 is the mode's own and the same in all its rows. In brackets: 95 % interval by \
+         bootstrap over scenes.",
+    )
+}
+
 fn published_rows() -> [Vec<String>; 2] {
     let [(_, accuracy), (_, precision), (_, recall)] = published::AT_300_MS;
     let row = |w: usize, cells: [String; 5]| {
@@ -256,6 +288,46 @@ fn compared(group: &Group, access_point: &str, shown: &[Predictor], title: Strin
     table
 }
 
+/// Stages 1 and 2 and the calibration of every preset, with intervals: a row a figure, a column a mode.
+pub fn figures_by_preset(scores: &Scores) -> Table {
+    type Figure = (String, usize, fn(&ModeScores, usize) -> Estimate, usize, &'static str);
+    let figure = |name: &str, digits, of| -> Figure { (name.to_owned(), digits, of, 0, "") };
+    let mut figures = vec![
+        figure("MOTA", 3, |m, _| m.mota),
+        figure("IDF1", 3, |m, _| m.idf1),
+        figure("switches a scene", 2, |m, _| m.switches_per_scene),
+        figure("position RMSE, m", 3, |m, _| m.position_rmse_m),
+        figure("velocity RMSE, m/s", 3, |m, _| m.velocity_rmse_mps),
+    ];
+    for (h, published) in [(1, "0.22"), (3, "0.34"), (9, "0.96")] {
+        let name = format!("displacement at {}, m", window(h));
+        figures.push((name, 3, |m, h| m.displacement_m[h - 1], h, published));
+    }
+    let mut table = Table::new("Tracking, forecast and calibration, by preset", 2, &["preset", "figure"]);
+    let modes: Vec<Mode> = scores.headline().iter().flat_map(|g| &g.modes).map(|m| m.mode).collect();
+    table.header.extend(modes.iter().map(|mode| mode.name().to_owned()));
+    table.header.push("published".to_owned());
+    for group in &scores.groups {
+        for (name, digits, of, step, published) in &figures {
+            let mut row = vec![group.name.clone(), name.clone()];
+            row.extend(group.modes.iter().map(|mode| with_interval(&of(mode, *step), *digits)));
+            row.push((*published).to_owned());
+            table.rows.push(row);
+        }
+        for access_point in group.access_points() {
+            let mut row = vec![group.name.clone(), format!("ECE, {access_point}, mean of windows")];
+            row.extend(modes.iter().map(|&mode| {
+                let links = group.link(Some(mode), Predictor::Run, access_point);
+                let ece = links.map(|l| l.windows.iter().map(|w| w.ece).collect::<Vec<_>>());
+                number(ece.and_then(|ece| mean(&ece)), 4)
+            }));
+            row.push(String::new());
+            table.rows.push(row);
+        }
+    }
+    table.noted("In brackets: 95 % interval by bootstrap over scenes.")
+}
+
 /// What was counted and skipped, by mode.
 pub fn health(group: &Group) -> Table {
     let named = |mode: &ModeScores| serde_json::to_value(mode.health).unwrap_or_default();
@@ -281,15 +353,15 @@ fn with_scores(start: &[String], scores: &WindowScores) -> Vec<String> {
     let mut row = start.to_vec();
     let plain = [scores.base_rate, scores.accuracy, scores.precision, scores.recall];
     row.extend(plain.iter().map(|score| number(score.value, 3)));
-    row.push(with_interval(&scores.f1));
+    row.push(with_interval(&scores.f1, 3));
     row.push(number(scores.onset_f1.value, 3));
     row
 }
 
-fn with_interval(score: &Estimate) -> String {
+fn with_interval(score: &Estimate, digits: usize) -> String {
     match (score.value, score.interval) {
-        (Some(value), Some([low, high])) => format!("{value:.3} [{low:.3}, {high:.3}]"),
-        (value, _) => number(value, 3),
+        (Some(value), Some([low, high])) => format!("{value:.digits$} [{low:.digits$}, {high:.digits$}]"),
+        (value, _) => number(value, digits),
     }
 }
 
@@ -326,7 +398,7 @@ mod tests {
     #[test]
     fn what_is_not_defined_is_a_dash_and_an_interval_stands_in_brackets() {
         let known = Estimate { value: Some(0.8765), interval: Some([0.86, 0.891]) };
-        assert_eq!(with_interval(&known), "0.876 [0.860, 0.891]");
-        assert_eq!(with_interval(&Estimate::default()), "-");
+        assert_eq!(with_interval(&known, 3), "0.876 [0.860, 0.891]");
+        assert_eq!(with_interval(&Estimate::default(), 3), "-");
     }
 }
