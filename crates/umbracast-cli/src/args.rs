@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use umbracast::Mode;
+use umbracast_eval::experiment::Shard;
 use umbracast_io::trajectories::Unit;
 use umbracast_sim::crowd::Preset;
 
@@ -48,6 +49,8 @@ pub enum Command {
     Compare(Compare),
     /// Show where a person gives how many returns, and which places are blind.
     Coverage(Coverage),
+    /// The paper's whole experiment: 500 scenes, every mode, AABB and OBB. Goes on where it was stopped.
+    Reproduce(Reproduce),
     /// Say what is in a file.
     Inspect(Inspect),
     /// Print the commented default configuration, or check a file.
@@ -241,6 +244,43 @@ pub struct Coverage {
     /// Where table (Parquet and CSV) and floor plan (SVG) go.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// `reproduce`
+#[derive(Debug, Args)]
+pub struct Reproduce {
+    /// How many scenes.
+    #[arg(long, default_value_t = 500, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub scenes: u32,
+    /// 40 scenes.
+    #[arg(long, conflicts_with = "scenes")]
+    pub quick: bool,
+    #[command(flatten)]
+    pub crowd: CrowdArgs,
+    /// Real walkers in place of a crowd; one scene a file.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["scenes", "quick"])]
+    pub trajectories: Vec<PathBuf>,
+    #[command(flatten)]
+    pub replay: Replay,
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// Weights of the LSTM in place of the embedded ones.
+    #[arg(long, value_name = "FILE")]
+    pub weights: Option<PathBuf>,
+    /// Train the LSTM as the paper does (30 epochs) before anything else, and use it; weights, card and checkpoint
+    /// go to DIR/training.
+    #[cfg(feature = "train")]
+    #[arg(long, conflicts_with_all = ["weights", "shard", "merge"])]
+    pub train: bool,
+    /// Run every n-th scene only, from the i-th on (i from 0), and write no report.
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Run nothing: take the scenes that shards left in these folders. All other flags as for the shards.
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
+    pub merge: Vec<PathBuf>,
+    /// Where scenes and report go; scenes that are there already are not run again.
+    #[arg(long, default_value = "reproduce", value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// `inspect`

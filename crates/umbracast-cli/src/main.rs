@@ -35,6 +35,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),
         Command::Compare(args) => commands::compare::run(&args, &cli.common),
         Command::Coverage(args) => commands::coverage::run(&args, &cli.common),
+        Command::Reproduce(args) => commands::reproduce::run(&args, &cli.common),
         Command::Inspect(args) => commands::inspect::run(&args, &cli.common),
         Command::Config(args) => commands::config::run(&args),
         #[cfg(feature = "train")]

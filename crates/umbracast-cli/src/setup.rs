@@ -1,5 +1,6 @@
 //! From arguments to what the crates take: configuration, weights, threads, files.
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +9,8 @@ use umbracast::{Config, Error, Mode};
 
 /// The paper's LSTM as `umbracast train` made it; its card lies beside the file.
 const PAPER_LSTM: &[u8] = include_bytes!("../../../models/paper_lstm.safetensors");
+/// Where it comes from.
+pub const PAPER_LSTM_CARD: &str = include_str!("../../../models/paper_lstm.md");
 
 /// First seed of the test scenes (docs/CONVENTIONS.md).
 pub const TEST_SEED: u64 = 200_000;
@@ -26,10 +29,16 @@ pub fn config_of_run(folder: &Path) -> Result<Config, Error> {
 
 /// The weights given, or the embedded ones.
 pub fn weights(file: Option<&Path>) -> Result<Weights, Error> {
-    match file {
-        None => Weights::from_safetensors(PAPER_LSTM),
-        Some(path) => Weights::from_safetensors(&read(path)?).map_err(|e| e.within(path.display())),
-    }
+    let bytes = weights_file(file)?;
+    Weights::from_safetensors(&bytes).map_err(|e| match file {
+        Some(path) => e.within(path.display()),
+        None => e,
+    })
+}
+
+/// The bytes of the weights given, or of the embedded ones.
+pub fn weights_file(file: Option<&Path>) -> Result<Cow<'static, [u8]>, Error> {
+    file.map_or(Ok(Cow::Borrowed(PAPER_LSTM)), |path| read(path).map(Cow::Owned))
 }
 
 /// A file's bytes, or an error that names it.

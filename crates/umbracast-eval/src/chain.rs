@@ -113,7 +113,9 @@ pub fn drawn_scenes(presets: &[Preset], scenes: usize, people: usize, first_seed
 /// A setting that cannot work.
 pub fn run(spec: &Spec, progress: impl Fn(Progress) + Sync) -> Result<Vec<SceneResult>, Error> {
     let chain = Chain::new(spec)?;
-    (0..spec.scenes.len()).into_par_iter().map(|index| chain.scene(index, &progress)).collect()
+    let scenes = (0..spec.scenes.len()).into_par_iter();
+    // One by one, so that no thread idles while another has a heap of scenes left.
+    scenes.with_max_len(1).map(|index| chain.scene(index, &progress)).collect()
 }
 
 /// The frames of the hall without people.
@@ -160,7 +162,7 @@ impl<'a> Chain<'a> {
     ///
     /// # Errors
     /// A setting that cannot work.
-    pub fn scene(&self, index: usize, progress: impl Fn(Progress)) -> Result<SceneResult, Error> {
+    pub fn scene(&self, index: usize, progress: &impl Fn(Progress)) -> Result<SceneResult, Error> {
         let (spec, scene_spec, site) = (self.spec, &self.spec.scenes[index], &self.spec.configs[0].site);
         let mut scene = Scene::in_hall(scene_spec.crowd(), site, &self.sensors, scene_spec.seed);
         let mut assembler = Assembler::new(site)?;

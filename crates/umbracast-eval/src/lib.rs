@@ -21,6 +21,8 @@ pub mod score;
 pub mod ladder;
 pub mod labels;
 pub mod chain;
+pub mod scene_file;
+pub mod experiment;
 pub mod pooled;
 pub mod report;
 pub mod coverage;

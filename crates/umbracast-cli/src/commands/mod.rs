@@ -6,6 +6,7 @@ pub mod coverage;
 pub mod demo;
 pub mod evaluate;
 pub mod inspect;
+pub mod reproduce;
 pub mod run;
 pub mod simulate;
 #[cfg(feature = "train")]

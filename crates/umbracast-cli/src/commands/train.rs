@@ -1,7 +1,9 @@
 //! `train`: fits the paper's LSTM on generated trajectories.
 
+use std::path::Path;
+
 use umbracast::Error;
-use umbracast_train::{Noise, TrainOptions, train};
+use umbracast_train::{Noise, TrainOptions, TrainedModel, train};
 
 use crate::args::{Common, Train};
 use crate::progress::bar;
@@ -13,7 +15,6 @@ const TRACKER_NOISE: Noise = Noise { white_m: 0.12, lasting_m: 0.05 };
 
 /// Goes on from the checkpoint where there is one, and writes weights and card.
 pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {
-    setup::make_dir(&args.out)?;
     let watch = Stopwatch::start();
     let mut options = TrainOptions {
         seed: args.seed,
@@ -22,14 +23,25 @@ pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {
         epochs: args.epochs,
         windows_per_epoch: args.windows,
         batch: args.batch,
-        checkpoint: Some(args.out.join("paper_lstm.checkpoint")),
         commit: args.commit.clone().unwrap_or_default(),
         ..TrainOptions::paper()
     };
     if args.noise {
         options.noise = TRACKER_NOISE;
     }
-    let progress = bar((args.epochs * (args.windows / args.batch.max(1))) as u64, "training", common.quiet);
+    let model = fit(options, &args.out, common)?;
+    let summary = RunJson::new("train", &watch).with("epochs", args.epochs);
+    summary.write(&args.out)?;
+    summary.print(common, &model.card);
+    Ok(Ending::Done)
+}
+
+/// Trains, or goes on from the checkpoint in `folder`, and writes weights and card there.
+pub fn fit(options: TrainOptions, folder: &Path, common: &Common) -> Result<TrainedModel, Error> {
+    setup::make_dir(folder)?;
+    let options = TrainOptions { checkpoint: Some(folder.join("paper_lstm.checkpoint")), ..options };
+    let batches = options.epochs * (options.windows_per_epoch / options.batch.max(1));
+    let progress = bar(batches as u64, "training", common.quiet);
     let model = train(&options, &mut |now| {
         progress.set_position((now.epoch * now.batches + now.batch) as u64);
         progress.set_message(format!("loss {:.3}", now.training_loss));
@@ -38,10 +50,7 @@ pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {
         }
     })?;
     progress.finish_and_clear();
-    setup::write(&args.out.join("paper_lstm.safetensors"), &model.safetensors)?;
-    setup::write(&args.out.join("paper_lstm.md"), &model.card)?;
-    let summary = RunJson::new("train", &watch).with("epochs", args.epochs);
-    summary.write(&args.out)?;
-    summary.print(common, &model.card);
-    Ok(Ending::Done)
+    setup::write(&folder.join("paper_lstm.safetensors"), &model.safetensors)?;
+    setup::write(&folder.join("paper_lstm.md"), &model.card)?;
+    Ok(model)
 }
