@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use umbracast::Mode;
+use umbracast::{Error, Mode};
 use umbracast_eval::experiment::Shard;
 use umbracast_io::trajectories::Unit;
+use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::Preset;
 
 /// Sees people with LiDARs, foresees where they walk, and tells which radio links they are about to block.
@@ -109,6 +110,21 @@ pub struct Replay {
     pub seconds: Option<f64>,
 }
 
+/// What bodies they have.
+#[derive(Debug, Clone, Args)]
+pub struct BodyArgs {
+    /// Kinds of bodies and their shares of the people, KIND[=SHARE]: bag, phone (at the ear), pockets (hands in
+    /// them), child, wheelchair; the rest are plain. Several with commas.
+    #[arg(long, value_name = "KIND[=SHARE]", value_delimiter = ',', value_parser = body_share)]
+    pub bodies: Vec<(Kind, f64)>,
+}
+
+fn body_share(text: &str) -> Result<(Kind, f64), Error> {
+    let (kind, share) = text.split_once('=').unwrap_or((text, "1"));
+    let wrong = || Error::new(format!("share of {kind}: expected a number, found {share:?}"));
+    Ok((kind.parse()?, share.parse().map_err(|_| wrong())?))
+}
+
 /// `demo`
 #[derive(Debug, Args)]
 pub struct Demo {
@@ -137,6 +153,8 @@ pub struct Simulate {
     pub trajectories: Vec<PathBuf>,
     #[command(flatten)]
     pub replay: Replay,
+    #[command(flatten)]
+    pub bodies: BodyArgs,
     /// Write PointCloud2 clouds too (up to 1.2 GB a scene).
     #[arg(long)]
     pub clouds: bool,
@@ -200,6 +218,8 @@ pub struct Evaluate {
     pub trajectories: Vec<PathBuf>,
     #[command(flatten)]
     pub replay: Replay,
+    #[command(flatten)]
+    pub bodies: BodyArgs,
     /// People in a scene of --scenes.
     #[arg(long, default_value_t = 10, value_name = "N")]
     pub people: usize,

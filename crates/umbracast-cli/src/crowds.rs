@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use umbracast::Error;
 use umbracast_eval::chain::{People, SceneSpec};
 use umbracast_io::trajectories::{self, Options};
+use umbracast_sim::body::kind::Bodies;
 use umbracast_sim::crowd::replay::{Recorded, replay};
 
-use crate::args::Replay;
+use crate::args::{BodyArgs, Replay};
 
 /// Who walks this near to the site's middle, on the whole, is taken to be placed already: the middle of an
 /// experiment is known better than that of noisy tracks.
@@ -46,7 +47,18 @@ pub fn recorded_scenes(files: &[PathBuf], replayed: &Replay, first_seed: u64) ->
             people.len(),
             crowd.duration_ns as f64 * 1e-9
         );
-        Ok((SceneSpec { group, seed, people: People::Replayed(crowd) }, told))
+        Ok((SceneSpec { group, seed, people: People::Replayed(crowd), bodies: Bodies::default() }, told))
     };
     Ok(files.iter().zip(first_seed..).map(scene).collect::<Result<Vec<_>, Error>>()?.into_iter().unzip())
+}
+
+/// Gives everybody in every scene a body of these kinds, and tells it.
+pub fn dressed((mut scenes, mut told): Told, args: &BodyArgs) -> Result<Told, Error> {
+    let bodies = Bodies::new(args.bodies.clone()).map_err(|e| e.within("--bodies"))?;
+    if !bodies.is_plain() {
+        let shares = args.bodies.iter().map(|(kind, share)| format!("{} {share}", kind.name()));
+        told.push(format!("bodies by share: {}", shares.collect::<Vec<_>>().join(", ")));
+        scenes.iter_mut().for_each(|scene| scene.bodies = bodies.clone());
+    }
+    Ok((scenes, told))
 }

@@ -6,6 +6,7 @@ use umbracast::forecast::Weights;
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
 use umbracast_io::rows::{self, PeopleLinkRow, PeopleRow};
+use umbracast_sim::body::kind::Bodies;
 use umbracast_sim::crowd::{self, Crowd, Preset};
 use umbracast_sim::scene::{Scene, SceneFrame};
 use umbracast_sim::sensor::Sensors;
@@ -45,6 +46,8 @@ pub struct SceneSpec {
     pub seed: u64,
     /// Who walks.
     pub people: People,
+    /// In what bodies.
+    pub bodies: Bodies,
 }
 
 /// Who walks.
@@ -103,6 +106,7 @@ pub fn drawn_scenes(presets: &[Preset], scenes: usize, people: usize, first_seed
         group: preset.name().to_owned(),
         seed,
         people: People::Drawn { preset, people },
+        bodies: Bodies::default(),
     };
     (first_seed..).zip(of_presets).map(scene).collect()
 }
@@ -192,7 +196,8 @@ impl<'a> Chain<'a> {
         let kept =
             (spec.keep == Some(index)).then(|| (truth, lanes.into_iter().map(|lane| lane.rows).collect()));
         let ladder = spec.ladder.then(|| {
-            let scene = Scene::truth_only(scene_spec.crowd(), site, scene_spec.seed);
+            let scene =
+                Scene::truth_only(scene_spec.crowd(), site, scene_spec.seed).with_bodies(&scene_spec.bodies);
             ladder::climb(scene, site, scene_spec.seed)
         });
         Ok(SceneResult { score, ladder, kept })
@@ -283,8 +288,12 @@ mod tests {
             height_m: None,
         };
         let crowd = Crowd { trajectories: (0..3).map(way).collect(), duration_ns: 25 * STEP_NS };
-        let scene =
-            |seed| SceneSpec { group: "walk".to_owned(), seed, people: People::Replayed(crowd.clone()) };
+        let scene = |seed| SceneSpec {
+            group: "walk".to_owned(),
+            seed,
+            people: People::Replayed(crowd.clone()),
+            bodies: Bodies::default(),
+        };
         Spec {
             configs: vec![Config::for_mode(Mode::Default)],
             weights: None,

@@ -9,7 +9,7 @@ use rand_distr::StandardNormal;
 use umbracast::blockage::body::EllipticCylinder;
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb, slab};
 use umbracast::{STEP_S, STEPS, Site};
-use umbracast_sim::body::{PersonState, Walker};
+use umbracast_sim::body::{PersonState, Surface, Walker};
 use umbracast_sim::random::stream;
 use umbracast_sim::scene::Scene;
 use umbracast_sim::truth::BodyMesh;
@@ -203,13 +203,13 @@ enum Shape {
 }
 
 impl Shape {
-    fn blocks(&self, triangles: &[[u32; 3]], start: DVec3, end: DVec3) -> bool {
+    fn blocks(&self, surface: &Surface, start: DVec3, end: DVec3) -> bool {
         match self {
             Self::Aabb(aabb) => slab::hit_aabb(aabb, start, end).is_some(),
             Self::Obb(obb) => slab::hit_obb(obb, start, end).is_some(),
             Self::Cylinder(cylinder) => cylinder.hit(start, end).is_some(),
             Self::TrunkAndHead(parts) => parts.iter().any(|part| part.hit(start, end).is_some()),
-            Self::Mesh(mesh) => mesh.blocks(triangles, start, end),
+            Self::Mesh(mesh) => mesh.blocks(surface, start, end),
         }
     }
 }
@@ -265,7 +265,7 @@ impl Play<'_> {
                 let cut_by = |(p, shape): (usize, &Option<Shape>)| {
                     p != q
                         && shape.as_ref().zip(ue).is_some_and(|(shape, ue)| {
-                            shape.blocks(self.walkers[p].triangles(), access_point.position(), ue)
+                            shape.blocks(self.walkers[p].surface(), access_point.position(), ue)
                         })
                 };
                 blocked.push(shapes.iter().enumerate().any(cut_by));
@@ -320,7 +320,7 @@ impl Play<'_> {
             }
             Body::UprightMesh => {
                 let mut mesh = BodyMesh::new();
-                mesh.update(|vertices| {
+                mesh.update(self.walkers[walker].surface(), |vertices| {
                     self.walkers[walker].upright_mesh(state.position_m, state.heading_rad, vertices);
                 });
                 Shape::Mesh(mesh)

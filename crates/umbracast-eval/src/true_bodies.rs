@@ -32,7 +32,7 @@ pub fn true_bodies(run: &SceneRun, matching: &Matching, walkers: &[Walker], site
     let mut blocked_at: BTreeMap<(u64, u32, u64), [bool; STEPS]> = BTreeMap::new();
     for instant_ns in instants {
         for (mesh, walker) in meshes.iter_mut().zip(walkers) {
-            mesh.update(|vertices| {
+            mesh.update(walker.surface(), |vertices| {
                 walker.mesh_at(instant_ns, vertices);
             });
         }
@@ -47,7 +47,7 @@ pub fn true_bodies(run: &SceneRun, matching: &Matching, walkers: &[Walker], site
                     let cuts = |p: &Body| {
                         let (start_m, end_m) = (at.position() - p.offset_m, q.ue_m - p.offset_m);
                         p.walker != q.walker
-                            && meshes[p.walker].blocks(walkers[p.walker].triangles(), start_m, end_m)
+                            && meshes[p.walker].blocks(walkers[p.walker].surface(), start_m, end_m)
                     };
                     blocked_at.entry((q.frame, access_point as u32, q.track)).or_default()[h - 1] =
                         bodies.iter().any(cuts);

@@ -4,8 +4,9 @@ use rand::Rng;
 use umbracast::lidar::Packet;
 use umbracast::{Error, STEP_NS, Site};
 
+use crate::body::kind::Bodies;
 use crate::body::{PersonState, Walker};
-use crate::crowd::Crowd;
+use crate::crowd::{Crowd, Trajectory};
 use crate::random::stream;
 use crate::sensor::Sensors;
 use crate::truth::{LinkTruth, Truth};
@@ -42,6 +43,7 @@ pub struct PersonTruth {
 #[derive(Debug)]
 pub struct Scene {
     site: Site,
+    seed: u64,
     walkers: Vec<Walker>,
     sensors: Option<Sensors>,
     truth: Truth,
@@ -74,18 +76,31 @@ impl Scene {
     /// The same people without sensors: no packets and no returns, for training and the ladder of oracles.
     pub fn truth_only(crowd: Crowd, site: &Site, seed: u64) -> Self {
         let frames = (crowd.duration_ns / STEP_NS).max(0) as u64;
-        let body = |way: crate::crowd::Trajectory| {
-            let own_seed = stream(seed, "body", u64::from(way.person)).next_u64();
+        let body = |way: Trajectory| {
+            let own_seed = own_seed(seed, &way);
             Walker::new(way, own_seed)
         };
         Self {
             site: site.clone(),
+            seed,
             walkers: crowd.trajectories.into_iter().map(body).collect(),
             sensors: None,
             truth: Truth::default(),
             frames,
             next: 0,
         }
+    }
+
+    /// The same ways, walked by these bodies. Before the first frame.
+    #[must_use]
+    pub fn with_bodies(mut self, bodies: &Bodies) -> Self {
+        if !bodies.is_plain() {
+            for walker in &mut self.walkers {
+                let own_seed = own_seed(self.seed, &walker.trajectory);
+                *walker = Walker::of_kind(walker.trajectory.clone(), own_seed, bodies.kind_of(own_seed));
+            }
+        }
+        self
     }
 
     /// The packets of `frames` revolutions in the hall without people: one list a frame, in it one a sensor.
@@ -134,10 +149,15 @@ impl Scene {
     }
 }
 
+/// Of a person's body.
+fn own_seed(scene_seed: u64, way: &Trajectory) -> u64 {
+    stream(scene_seed, "body", u64::from(way.person)).next_u64()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::crowd::Trajectory;
+    use crate::body::kind::Kind;
     use umbracast::Config;
     use umbracast::geometry::DVec2;
 
@@ -206,5 +226,22 @@ mod tests {
         };
         assert_eq!(run(7), run(7));
         assert_ne!(run(7), run(8));
+    }
+
+    #[test]
+    fn bodies_change_who_walks_and_not_where() {
+        let site = Config::default().site;
+        let run = |bodies: Bodies| {
+            let mut scene = Scene::truth_only(crowd(), &site, 7).with_bodies(&bodies);
+            scene.next_frame().unwrap().people
+        };
+        let plain = run(Bodies::default());
+        let children = run(Bodies::new(vec![(Kind::Child, 1.0)]).unwrap());
+        for (adult, child) in plain.iter().zip(&children) {
+            assert_eq!(adult.state.position_m, child.state.position_m);
+            assert!(child.state.height_m < adult.state.height_m);
+        }
+        let handsfree = run(Bodies::new(vec![(Kind::Pockets, 1.0)]).unwrap());
+        assert_eq!(plain, handsfree, "the same measures and the same gait");
     }
 }

@@ -35,7 +35,7 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
         (None, ..) => {
             let seed = args.seed.unwrap_or(TEST_SEED);
             let scenes = args.scenes.unwrap_or(1) as usize;
-            let told = match args.trajectories.is_empty() {
+            let drawn = match args.trajectories.is_empty() {
                 true => (chain::drawn_scenes(&args.preset, scenes, args.people, seed), Vec::new()),
                 false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed)?,
             };
@@ -45,7 +45,7 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
                 .map(|&mode| setup::config(mode, args.site.site.as_deref()))
                 .collect::<Result<Vec<Config>, _>>()?;
             let weights = setup::weights(args.weights.as_deref())?;
-            in_memory(configs, weights, told, args.out.as_deref(), common)
+            in_memory(configs, weights, crowds::dressed(drawn, &args.bodies)?, args.out.as_deref(), common)
         }
     }
 }

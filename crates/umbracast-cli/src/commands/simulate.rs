@@ -26,10 +26,11 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     let config = setup::config(Mode::Default, args.site.site.as_deref())?;
     let seed = args.crowd.seed.unwrap_or(TEST_SEED);
     let (preset, count) = (args.crowd.preset, args.scenes as usize);
-    let (scenes, told) = match args.trajectories.is_empty() {
+    let drawn = match args.trajectories.is_empty() {
         true => (chain::drawn_scenes(&[preset], count, args.crowd.people, seed), Vec::new()),
         false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed)?,
     };
+    let (scenes, told) = crowds::dressed(drawn, &args.bodies)?;
     setup::make_dir(&args.out)?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let watch = Stopwatch::start();

@@ -51,6 +51,10 @@ pub struct Build {
     pub hand_m: f64,
     /// Length and breadth of the bare foot.
     pub foot_m: [f64; 2],
+    /// Length of the legs for the stature, 1 in adults, and the chin's share of it.
+    pub legs: f64,
+    /// See `legs`.
+    pub chin: f64,
 }
 
 /// X25 of men and women, then the exponents p and q and the spread r.
@@ -74,6 +78,15 @@ const STATURE_MEN_M: (f64, f64) = (1.756, 0.069);
 const STATURE_WOMEN_M: (f64, f64) = (1.629, 0.064);
 const BMI_MEN: (f64, f64) = (27.7, 4.0);
 const BMI_WOMEN: (f64, f64) = (25.5, 3.5);
+/// Height of the hip joints of adults, as a share of the stature (BT).
+const HIP: f64 = 0.53;
+/// Height of the chin of adults, as a share of the stature (BT).
+const CHIN: f64 = 0.870;
+/// Children: age and median height, sexes alike.
+const CHILDREN_M: [(f64, f64); 6] =
+    [(3.0, 0.95), (4.0, 1.02), (5.0, 1.09), (6.0, 1.15), (10.0, 1.38), (12.0, 1.50)];
+/// Spread of height within an age, as a share.
+const CHILD_SPREAD: f64 = 0.045;
 /// Flat indoor shoes.
 const SHOE_M: f64 = 0.025;
 /// Trousers and a shirt stand off the skin (shoulder breadth +10 mm indoors).
@@ -92,20 +105,44 @@ impl Build {
         let drawn_m = stature.0 + stature.1 * within_three_sigma(rng);
         let stature_m = height_m.map_or(drawn_m, |height| height - SHOE_M);
         let bmi = (bmi.0 + bmi.1 * within_three_sigma(rng)).max(17.0);
+        Self::measured(male, stature_m, bmi, None, rng)
+    }
+
+    /// Draws a child of 3 to 12 years.
+    pub fn draw_child(seed: u64) -> Self {
+        let rng = &mut stream(seed, "child", 0);
+        let (male, age) = (rng.random::<f64>() < 0.5, rng.random_range(3.0..12.0));
+        let stature_m = along(&CHILDREN_M, age) * (1.0 + CHILD_SPREAD * within_three_sigma(rng));
+        // Slimmest at 5; 18 at 12 (of memory).
+        let bmi =
+            along(&[(3.0, 15.8), (5.0, 15.3), (12.0, 18.0)], age) * (1.0 + 0.06 * within_three_sigma(rng));
+        Self::measured(male, stature_m, bmi, Some(age), rng)
+    }
+
+    /// The rest of the measures; `age` in years of a child.
+    ///
+    /// An adult's exponents, carried on, meet a child's breadths and girths within a centimetre or two but for
+    /// the shoulders: those keep their share of the height. The head is nearly an adult's from six on; the legs
+    /// are shorter below seven, when the upper body is 1.2 times the lower one.
+    fn measured(male: bool, stature_m: f64, bmi: f64, age: Option<f64>, rng: &mut Pcg64) -> Self {
+        let stature = if male { STATURE_MEN_M } else { STATURE_WOMEN_M };
         let mut draw = |Measure(men, women, p, q, r): Measure| {
             let x25 = if male { men } else { women };
             x25 * (stature_m / stature.0).powf(p) * (bmi / 25.0).powf(q) * (r * within_three_sigma(rng)).exp()
         };
         let (sex, h) = (|men, women| if male { men } else { women }, stature_m);
         let girth = |girth_m: f64| girth_m / TAU + CLOTH_M;
-        let biacromial_m = draw(BIACROMIAL);
-        Self {
+        let shoulders = |Measure(men, women, p, q, r): Measure| {
+            Measure(men, women, if age.is_some() { 1.0 } else { p }, q, r)
+        };
+        let biacromial_m = draw(shoulders(BIACROMIAL));
+        let mut build = Self {
             male,
             stature_m,
             shoe_m: SHOE_M,
             bmi,
             biacromial_m,
-            bideltoid_m: draw(BIDELTOID).max(biacromial_m + 0.05) + 2.0 * CLOTH_M,
+            bideltoid_m: draw(shoulders(BIDELTOID)).max(biacromial_m + 0.05) + 2.0 * CLOTH_M,
             chest_m: [draw(CHEST_BREADTH) + 2.0 * CLOTH_M, draw(CHEST_DEPTH) + 2.0 * CLOTH_M],
             waist_m: [draw(WAIST_BREADTH) + 2.0 * CLOTH_M, draw(WAIST_DEPTH) + 2.0 * CLOTH_M],
             hip_m: [draw(HIP_BREADTH) + 2.0 * CLOTH_M, draw(BUTTOCK_DEPTH) + 2.0 * CLOTH_M],
@@ -123,7 +160,17 @@ impl Build {
             forearm_m: sex(0.153, 0.148) * h,
             hand_m: 0.11 * h,
             foot_m: [sex(0.154, 0.151) * h, sex(0.058, 0.057) * h],
+            legs: 1.0,
+            chin: CHIN,
+        };
+        if let Some(age) = age {
+            let grown = along(&[(3.0, 0.94), (6.0, 1.0)], age);
+            build.head_m = build.head_m.map(|size| grown * size);
+            build.chin = 1.0 - (1.0 - CHIN) * grown * STATURE_WOMEN_M.0 / stature_m;
+            // Upper over lower body: 1.2 up to five, 1 from seven on.
+            build.legs = 2.0 / (1.0 + along(&[(5.0, 1.2), (7.0, 1.0)], age));
         }
+        build
     }
 
     /// Standing height with shoes.
@@ -131,9 +178,17 @@ impl Build {
         self.stature_m + self.shoe_m
     }
 
-    /// Height above the floor of a place given as a share of the stature.
+    /// Height above the floor of a place given as a share of an adult's stature: in a child, legs and head have
+    /// their own length and the trunk fills what is between.
     pub fn level_m(&self, share: f64) -> f64 {
-        self.shoe_m + share * self.stature_m
+        let own = if share <= HIP {
+            share * self.legs
+        } else if (self.legs, self.chin) == (1.0, CHIN) {
+            share
+        } else {
+            along(&[(HIP, HIP * self.legs), (CHIN, self.chin), (1.0, 1.0)], share)
+        };
+        self.shoe_m + own * self.stature_m
     }
 
     /// Ankle joint above the floor (BT).
@@ -143,7 +198,7 @@ impl Build {
 
     /// Hip joint above the floor, standing (BT).
     pub fn hip_height_m(&self) -> f64 {
-        self.level_m(0.53)
+        self.level_m(HIP)
     }
 
     /// From the middle to a hip joint.
@@ -153,12 +208,12 @@ impl Build {
 
     /// Hip to knee (BT).
     pub fn thigh_m(&self) -> f64 {
-        0.245 * self.stature_m
+        0.245 * self.legs * self.stature_m
     }
 
     /// Knee to ankle (BT).
     pub fn shank_m(&self) -> f64 {
-        0.246 * self.stature_m
+        0.246 * self.legs * self.stature_m
     }
 
     /// The shoulder joint: 2 cm inside and 3.5 cm below the acromion (.82 H).
@@ -183,6 +238,16 @@ fn male_share(stature_m: f64) -> f64 {
     let (men, women) = (density(STATURE_MEN_M), density(STATURE_WOMEN_M));
     // Both vanish far out, as with children: there the sexes are alike.
     (men + 1e-9) / (men + women + 2e-9)
+}
+
+/// The straight lines through `points`, level beyond their ends.
+fn along(points: &[(f64, f64)], x: f64) -> f64 {
+    let after = points.iter().position(|point| point.0 > x).unwrap_or(points.len());
+    if after == 0 || after == points.len() {
+        return points[after.min(points.len() - 1)].1;
+    }
+    let ((x0, y0), (x1, y1)) = (points[after - 1], points[after]);
+    y0 + (x - x0) / (x1 - x0) * (y1 - y0)
 }
 
 /// A standard normal number, drawn again while it is beyond three sigma.
@@ -221,6 +286,29 @@ mod tests {
         near("waist depth, men", mean(&men, |b| b.waist_m[1] - 0.01), 0.238, 0.008);
         near("hip breadth, women", mean(&women, |b| b.hip_m[0] - 0.01), 0.354, 0.006);
         near("thigh radius, men", mean(&men, |b| b.thigh_radius_m - 0.005), 0.099, 0.003);
+    }
+
+    #[test]
+    fn children_have_short_legs_a_large_head_and_their_sizes() {
+        let all: Vec<Build> = (0..3000).map(Build::draw_child).collect();
+        let of = |low: f64, high: f64| -> Vec<Build> {
+            all.iter().filter(|b| (low..high).contains(&b.stature_m)).copied().collect()
+        };
+        let five = of(1.05, 1.13);
+        assert!(five.len() > 100, "{}", five.len());
+        // Breadth and depth of the chest of five-year-olds are about 19 and 14 cm, their shoulders 25 cm.
+        assert!((mean(&five, |b| b.chest_m[0]) - 0.20).abs() < 0.02);
+        assert!((mean(&five, |b| b.chest_m[1]) - 0.15).abs() < 0.02);
+        assert!((mean(&five, |b| b.biacromial_m) - 0.245).abs() < 0.02);
+        for b in &all {
+            let lower = b.level_m(0.5) - b.shoe_m;
+            assert!(b.stature_m - lower > 0.99 * lower, "at {} m", b.stature_m);
+            assert!((0.75..=0.88).contains(&b.chin), "{}", b.chin);
+            let levels: Vec<f64> = (0..=100).map(|i| b.level_m(f64::from(i) * 0.01)).collect();
+            assert!(levels.is_sorted(), "{levels:?}");
+            assert!((levels[100] - b.height_m()).abs() < 1e-12);
+            assert!((b.thigh_m() + b.shank_m() + b.ankle_m() - b.hip_height_m()).abs() < 1e-9);
+        }
     }
 
     #[test]

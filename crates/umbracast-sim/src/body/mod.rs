@@ -7,9 +7,10 @@ mod skeleton;
 mod shape;
 mod feet;
 mod walk;
+pub mod kind;
+mod things;
 
 use std::f64::consts::{PI, TAU};
-use std::ops::Range;
 
 use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};
@@ -17,12 +18,11 @@ use umbracast::geometry::{DVec2, DVec3};
 use crate::crowd::Trajectory;
 use crate::random::stream;
 use build::Build;
+use kind::Kind;
 use shape::Shape;
-use skeleton::{PelvisPose, Pose};
-use walk::Walk;
-
-/// Corner indices of a body's triangles: the same for every pose of every body.
-pub type Triangles = Vec<[u32; 3]>;
+pub use shape::Surface;
+use skeleton::{Holds, PelvisPose, Pose};
+use walk::{Instant, Walk};
 
 /// Where a person is and how he stands, at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +33,7 @@ pub struct PersonState {
     pub velocity_mps: DVec2,
     /// The trunk's, held while standing.
     pub heading_rad: f64,
-    /// Standing height with shoes.
+    /// Standing height with shoes; of who sits, the height of the head's top.
     pub height_m: f64,
 }
 
@@ -46,27 +46,48 @@ pub struct Walker {
     pub build: Build,
     shape: Shape,
     walk: Walk,
-    /// Standing upright at the origin, looking along x.
+    holds: Holds,
+    /// Height of the hip joints of who sits.
+    seat_m: Option<f64>,
+    /// Standing (or sitting) upright at the origin, looking along x.
     upright: Pose,
 }
 
 impl Walker {
     /// Draws a body (sex, height, build, proportions) from `seed` and lets it walk along the trajectory.
     pub fn new(trajectory: Trajectory, seed: u64) -> Self {
-        let build = Build::draw(seed, trajectory.height_m);
+        Self::of_kind(trajectory, seed, Kind::Plain)
+    }
+
+    /// The same for a kind of body. Children have heights of their own.
+    pub fn of_kind(trajectory: Trajectory, seed: u64, kind: Kind) -> Self {
+        let build = match kind {
+            Kind::Child => Build::draw_child(seed),
+            _ => Build::draw(seed, trajectory.height_m),
+        };
+        let things = things::of(kind, &build, seed);
         let first_phase: f64 = stream(seed, "phase", 0).random();
         let walk = Walk::plan(&trajectory, &build, first_phase);
         let still = gait::upper_body(0.0, 0.0);
-        let pelvis = PelvisPose::new(DVec2::ZERO, 0.0, &still, build.hip_height_m() - 0.006);
-        let upright = Pose::new(&build, 0.0, &still, &pelvis, &feet::at_rest(&build));
-        Self { shape: Shape::new(&build), trajectory, build, walk, upright }
+        let (hips_m, feet) = match things.seat_m {
+            Some(seat_m) => (seat_m, things::feet_on_rests(&build, DVec2::ZERO, 0.0)),
+            None => (build.hip_height_m() - 0.006, feet::at_rest(&build)),
+        };
+        let pelvis = PelvisPose::new(DVec2::ZERO, 0.0, &still, hips_m);
+        let upright = Pose::new(&build, 0.0, &still, &pelvis, &feet, &things.holds);
+        let shape = Shape::new(&build, things.parts);
+        Self { shape, trajectory, build, walk, holds: things.holds, seat_m: things.seat_m, upright }
     }
 
     /// The person's state, or `None` while not in the scene.
     pub fn state_at(&self, time_ns: i64) -> Option<PersonState> {
         let (position_m, velocity_mps) = self.trajectory.at(time_ns)?;
         let heading_rad = (self.walk.at(time_ns).heading_rad + PI).rem_euclid(TAU) - PI;
-        Some(PersonState { position_m, velocity_mps, heading_rad, height_m: self.build.height_m() })
+        Some(PersonState { position_m, velocity_mps, heading_rad, height_m: self.height_m() })
+    }
+
+    fn height_m(&self) -> f64 {
+        self.build.height_m() - self.seat_m.map_or(0.0, |seat_m| self.build.hip_height_m() - seat_m)
     }
 
     /// Writes the vertices of the walking body in the site frame; false (and nothing written) while the person
@@ -93,25 +114,33 @@ impl Walker {
         self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
     }
 
-    /// The triangles of every mesh this walker makes, counter-clockwise from outside.
-    pub fn triangles(&self) -> &Triangles {
-        shape::triangles()
+    /// How the vertices of every mesh that this walker makes hang together.
+    pub fn surface(&self) -> &Surface {
+        self.shape.surface()
     }
 
     fn pose_at(&self, time_ns: i64) -> Option<(Pose, PersonState)> {
         let state = self.state_at(time_ns)?;
         let instant = self.walk.at(time_ns);
+        if let Some(seat_m) = self.seat_m {
+            return Some((self.seated(seat_m, &instant, &state), state));
+        }
         let upper = walk::upper_body(&instant, &self.build);
         let pelvis = PelvisPose::new(state.position_m, instant.heading_rad, &upper, instant.hip_height_m);
         let feet = feet::poses(&self.walk, &instant, &self.build);
-        Some((Pose::new(&self.build, instant.heading_rad, &upper, &pelvis, &feet), state))
+        Some((Pose::new(&self.build, instant.heading_rad, &upper, &pelvis, &feet, &self.holds), state))
     }
-}
 
-/// The closed parts that every mesh is made of (trunk, neck, head, limbs), as ranges of vertices and triangles.
-pub fn parts() -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
-    shape::vertex_ranges().iter().cloned().zip(shape::triangle_ranges().iter().cloned())
+    /// Who sits rolls along, still.
+    fn seated(&self, seat_m: f64, instant: &Instant, state: &PersonState) -> Pose {
+        let (heading_rad, still) = (instant.heading_rad, gait::upper_body(0.0, 0.0));
+        let pelvis = PelvisPose::new(state.position_m, heading_rad, &still, seat_m);
+        let feet = things::feet_on_rests(&self.build, state.position_m, heading_rad);
+        Pose::new(&self.build, heading_rad, &still, &pelvis, &feet, &self.holds)
+    }
 }
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod kind_tests;

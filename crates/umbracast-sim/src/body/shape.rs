@@ -2,130 +2,131 @@
 //! overlap at the joints, each carried by one bone or bent between two.
 
 use std::ops::Range;
-use std::sync::OnceLock;
 
 use umbracast::geometry::DVec3;
 
-use super::Triangles;
 use super::build::Build;
 use super::loft::{self, Along, Ring, rounded, smooth};
 use super::skeleton::Bone;
 
-/// One closed surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Part {
-    bones: [Bone; 2],
-    along: Along,
-    rings: usize,
-    points: usize,
+/// One closed surface, carried by one bone or bent between two.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// The second where a ring's share of it is 1.
+    pub bones: [Bone; 2],
+    /// Of the resting body.
+    pub form: Form,
 }
 
-const fn part(bones: [Bone; 2], along: Along, rings: usize, points: usize) -> Part {
-    Part { bones, along, rings, points }
+/// What closed surfaces there are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Form {
+    /// Stretched over rings, in either order, of so many points.
+    Loft(Along, Vec<Ring>, usize),
+    /// A wheel's rim and tyre about an axle along y: middle, radius to the middle of the tyre, half its width.
+    Hoop(DVec3, f64, f64),
 }
 
-/// The parts of every body, in the order of their vertices and triangles.
-const PARTS: [Part; 13] = [
-    part([Bone::Pelvis, Bone::Thorax], Along::Z, 23, 20),
-    part([Bone::Head, Bone::Head], Along::Z, 4, 12),
-    part([Bone::Head, Bone::Head], Along::Z, 13, 16),
-    part([Bone::UpperArmLeft, Bone::UpperArmLeft], Along::Z, 9, 12),
-    part([Bone::UpperArmRight, Bone::UpperArmRight], Along::Z, 9, 12),
-    part([Bone::ForearmLeft, Bone::ForearmLeft], Along::Z, 11, 12),
-    part([Bone::ForearmRight, Bone::ForearmRight], Along::Z, 11, 12),
-    part([Bone::ThighLeft, Bone::ThighLeft], Along::Z, 10, 12),
-    part([Bone::ThighRight, Bone::ThighRight], Along::Z, 10, 12),
-    part([Bone::ShankLeft, Bone::ShankLeft], Along::Z, 10, 12),
-    part([Bone::ShankRight, Bone::ShankRight], Along::Z, 10, 12),
-    part([Bone::FootLeft, Bone::ToesLeft], Along::X, 9, 12),
-    part([Bone::FootRight, Bone::ToesRight], Along::X, 9, 12),
-];
+/// What every mesh of a body has in common.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Surface {
+    /// Corner indices, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// The closed parts (trunk, neck, head, limbs, then what the person carries): vertices and triangles.
+    pub parts: Vec<(Range<usize>, Range<usize>)>,
+}
 
-/// The vertices of one body at rest.
+/// One body at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
     /// Rest position and how far the vertex follows the part's second bone, part after part.
     vertices: Vec<(DVec3, f64)>,
+    bones: Vec<[Bone; 2]>,
+    surface: Surface,
 }
 
 impl Shape {
-    /// Lofts the body of a build.
-    pub fn new(build: &Build) -> Self {
-        let mut vertices = Vec::with_capacity(2200);
-        let surfaces = [
-            trunk(build),
-            neck(build),
-            head(build),
-            upper_arm(build, 1.0),
-            upper_arm(build, -1.0),
-            forearm(build, 1.0),
-            forearm(build, -1.0),
-            thigh(build, 1.0),
-            thigh(build, -1.0),
-            shank(build, 1.0),
-            shank(build, -1.0),
-            foot(build, 1.0),
-            foot(build, -1.0),
-        ];
-        for (part, mut rings) in PARTS.iter().zip(surfaces) {
-            // Limbs are listed from the top; rings are stacked upward.
-            if rings[0].at_m > rings[rings.len() - 1].at_m {
-                rings.reverse();
-            }
-            assert_eq!(rings.len(), part.rings, "{:?}", part.bones);
-            loft::vertices(part.along, &rings, part.points, &mut vertices);
-        }
-        Self { vertices }
+    /// Lofts the body of a build, and what the person has.
+    pub fn new(build: &Build, things: Vec<Part>) -> Self {
+        let mut shape =
+            Self { vertices: Vec::with_capacity(2200), bones: Vec::new(), surface: Surface::default() };
+        body(build).into_iter().chain(things).for_each(|part| shape.add(part));
+        shape
     }
 
     /// Moves every vertex with its bones; `posed(bone, rest)` says where a point of a bone comes to lie.
     pub fn skin(&self, posed: impl Fn(Bone, DVec3) -> DVec3, out: &mut Vec<DVec3>) {
         out.clear();
-        for (part, range) in PARTS.iter().zip(vertex_ranges()) {
-            let [first, second] = part.bones;
+        for ([first, second], (range, _)) in self.bones.iter().zip(&self.surface.parts) {
             out.extend(self.vertices[range.clone()].iter().map(|&(rest, share)| match share {
-                0.0 => posed(first, rest),
-                1.0 => posed(second, rest),
-                _ => posed(first, rest).lerp(posed(second, rest), share),
+                0.0 => posed(*first, rest),
+                1.0 => posed(*second, rest),
+                _ => posed(*first, rest).lerp(posed(*second, rest), share),
             }));
         }
     }
-}
 
-/// The triangles of every body.
-pub fn triangles() -> &'static Triangles {
-    static TRIANGLES: OnceLock<Triangles> = OnceLock::new();
-    TRIANGLES.get_or_init(|| {
-        let mut triangles = Vec::new();
-        for (part, range) in PARTS.iter().zip(vertex_ranges()) {
-            loft::triangles(part.rings, part.points, range.start, &mut triangles);
+    /// How the vertices hang together.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    fn add(&mut self, part: Part) {
+        let (from, first) = (self.vertices.len(), self.surface.triangles.len());
+        match part.form {
+            Form::Loft(along, mut rings, points) => {
+                // Limbs are listed from the top; rings are stacked upward.
+                if rings[0].at_m > rings[rings.len() - 1].at_m {
+                    rings.reverse();
+                }
+                loft::vertices(along, &rings, points, &mut self.vertices);
+                loft::triangles(rings.len(), points, from, &mut self.surface.triangles);
+            }
+            Form::Hoop(middle_m, radius_m, half_m) => {
+                loft::hoop(middle_m, radius_m, half_m, &mut self.vertices, &mut self.surface.triangles);
+            }
         }
-        triangles
-    })
+        self.bones.push(part.bones);
+        self.surface.parts.push((from..self.vertices.len(), first..self.surface.triangles.len()));
+    }
 }
 
-/// Which vertices each closed part has.
-pub fn vertex_ranges() -> &'static [Range<usize>] {
-    static RANGES: OnceLock<Vec<Range<usize>>> = OnceLock::new();
-    RANGES.get_or_init(|| ranges(|part| part.rings * part.points + 2))
+/// The parts of every body, in the order of their vertices and triangles.
+fn body(b: &Build) -> Vec<Part> {
+    let part = |first, second, along, rings, points| Part {
+        bones: [first, second],
+        form: Form::Loft(along, rings, points),
+    };
+    let of = |bone, rings, points| part(bone, bone, Along::Z, rings, points);
+    vec![
+        part(Bone::Pelvis, Bone::Thorax, Along::Z, trunk(b), 20),
+        of(Bone::Head, neck(b), 12),
+        of(Bone::Head, head(b), 16),
+        of(Bone::UpperArmLeft, upper_arm(b, 1.0), 12),
+        of(Bone::UpperArmRight, upper_arm(b, -1.0), 12),
+        of(Bone::ForearmLeft, forearm(b, 1.0), 12),
+        of(Bone::ForearmRight, forearm(b, -1.0), 12),
+        of(Bone::ThighLeft, thigh(b, 1.0), 12),
+        of(Bone::ThighRight, thigh(b, -1.0), 12),
+        of(Bone::ShankLeft, shank(b, 1.0), 12),
+        of(Bone::ShankRight, shank(b, -1.0), 12),
+        part(Bone::FootLeft, Bone::ToesLeft, Along::X, foot(b, 1.0), 12),
+        part(Bone::FootRight, Bone::ToesRight, Along::X, foot(b, -1.0), 12),
+    ]
 }
 
-/// Which triangles each closed part has.
-pub fn triangle_ranges() -> &'static [Range<usize>] {
-    static RANGES: OnceLock<Vec<Range<usize>>> = OnceLock::new();
-    RANGES.get_or_init(|| ranges(|part| 2 * part.rings * part.points))
-}
-
-fn ranges(count: impl Fn(&Part) -> usize) -> Vec<Range<usize>> {
-    let mut start = 0;
-    PARTS
-        .iter()
-        .map(|part| {
-            let range = start..start + count(part);
-            start = range.end;
-            range
-        })
-        .collect()
+/// A box with its edges a little rounded, upright: middle and size.
+pub fn case(bone: Bone, middle_m: DVec3, size_m: DVec3) -> Part {
+    let half = size_m * 0.5;
+    let level = |share: f64, across: f64| Ring {
+        at_m: middle_m.z + share * half.z,
+        center_m: [middle_m.x, middle_m.y],
+        half_m: [across * half.x, across * half.y],
+        power: 8.0,
+        second: 0.0,
+    };
+    let rings = vec![level(-1.0, 0.9), level(-0.9, 1.0), level(0.9, 1.0), level(1.0, 0.9)];
+    Part { bones: [bone, bone], form: Form::Loft(Along::Z, rings, 24) }
 }
 
 fn ring(at_m: f64, center_m: [f64; 2], half_m: [f64; 2]) -> Ring {

@@ -92,6 +92,22 @@ impl PelvisPose {
     }
 }
 
+/// What a hand is at, in place of swinging.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hold {
+    /// Where: a point of this bone at rest.
+    pub bone: Bone,
+    /// See `bone`.
+    pub at_m: DVec3,
+    /// Which part of the hand is there: 0 the wrist, 1 the fingertips.
+    pub grip: f64,
+    /// Where the elbow points, at rest.
+    pub elbow: DVec3,
+}
+
+/// Left hand, right hand; `None` hangs and swings.
+pub type Holds = [Option<Hold>; 2];
+
 /// Every bone's motion at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
@@ -106,6 +122,7 @@ impl Pose {
         upper: &UpperBody,
         pelvis: &PelvisPose,
         feet: &[FootPose; 2],
+        holds: &Holds,
     ) -> Self {
         let hips_rest = DVec3::new(0.0, 0.0, build.hip_height_m());
         let pelvis_motion = Motion::about(pelvis.rotation, hips_rest, pelvis.hips_m);
@@ -123,7 +140,10 @@ impl Pose {
         bones[Bone::Thorax as usize] = thorax;
         bones[Bone::Head as usize] = head;
         for (i, side) in [1.0, -1.0].into_iter().enumerate() {
-            let arm = arm(build, side, &thorax, upper.shoulder_rad[i], upper.elbow_rad[i]);
+            let arm = match &holds[i] {
+                Some(hold) => holding(build, side, &thorax, hold, &bones[hold.bone as usize]),
+                None => arm(build, side, &thorax, upper.shoulder_rad[i], upper.elbow_rad[i]),
+            };
             bones[Bone::UpperArmLeft as usize + i] = arm[0];
             bones[Bone::ForearmLeft as usize + i] = arm[1];
             let leg = leg(build, side, pelvis.hip_m(build, side), heading_rad, &feet[i]);
@@ -172,24 +192,9 @@ fn leg(build: &Build, side: f64, hip: DVec3, heading_rad: f64, foot: &FootPose) 
     let hip_rest = DVec3::new(0.0, y, build.hip_height_m());
     let knee_rest = hip_rest - DVec3::new(0.0, 0.0, thigh);
     let ankle_rest = DVec3::new(0.0, y, build.ankle_m());
-
-    let span = foot.ankle_m - hip;
-    let reach = span.length().clamp((thigh - shank).abs() + 0.05, 0.9999 * (thigh + shank));
-    let down = span.normalize();
-    let ankle = hip + down * reach;
     // The knee bends forward, between where the body and the foot look.
     let ahead = DVec2::from_angle(heading_rad) + DVec2::from_angle(foot.yaw_rad);
-    let hinge = ahead.extend(0.0).cross(down).normalize();
-    let bend = down.cross(hinge);
-    let along = (reach * reach + thigh * thigh - shank * shank) / (2.0 * reach);
-    let out = (thigh * thigh - along * along).max(0.0).sqrt();
-    let knee = hip + down * along + bend * out;
-
-    let bone = |upper: DVec3, lower: DVec3| {
-        let up = (upper - lower).normalize();
-        let y_axis = (hinge - up * hinge.dot(up)).normalize();
-        DMat3::from_cols(y_axis.cross(up), y_axis, up)
-    };
+    let [hinge, knee, ankle] = bent(hip, foot.ankle_m, [thigh, shank], ahead.extend(0.0));
     let foot_yaw = DMat3::from_rotation_z(foot.yaw_rad);
     let ball_rest = ball_rest(build, y);
     let foot_motion = Motion::about(foot_yaw * DMat3::from_rotation_y(-foot.pitch_rad), ankle_rest, ankle);
@@ -199,11 +204,47 @@ fn leg(build: &Build, side: f64, hip: DVec3, heading_rad: f64, foot: &FootPose) 
         foot_motion.point(ball_rest),
     );
     [
-        Motion::about(bone(hip, knee), hip_rest, hip),
-        Motion::about(bone(knee, ankle), knee_rest, knee),
+        Motion::about(turned(hip, knee, hinge), hip_rest, hip),
+        Motion::about(turned(knee, ankle, hinge), knee_rest, knee),
         foot_motion,
         toes,
     ]
+}
+
+/// Upper arm and forearm of a hand that holds something.
+fn holding(build: &Build, side: f64, thorax: &Motion, hold: &Hold, to: &Motion) -> [Motion; 2] {
+    let (offset, level) = build.shoulder_m();
+    let shoulder_rest = DVec3::new(0.0, side * offset, level);
+    let elbow_rest = DVec3::new(0.0, side * offset, build.elbow_height_m());
+    let lengths = [level - build.elbow_height_m(), build.forearm_m + hold.grip * build.hand_m];
+    let shoulder = thorax.point(shoulder_rest);
+    let [hinge, elbow, hand] = bent(shoulder, to.point(hold.at_m), lengths, to.rotation * hold.elbow);
+    // Elbows bend against knees.
+    [
+        Motion::about(turned(shoulder, elbow, -hinge), shoulder_rest, shoulder),
+        Motion::about(turned(elbow, hand, -hinge), elbow_rest, elbow),
+    ]
+}
+
+/// Two bones of these lengths from `root` to `goal`, or as far as they reach, their joint towards `ahead`: the
+/// axis of the joint, the joint and the end.
+fn bent(root: DVec3, goal: DVec3, [upper, lower]: [f64; 2], ahead: DVec3) -> [DVec3; 3] {
+    let span = goal - root;
+    let reach = span.length().clamp((upper - lower).abs() + 0.05, 0.9999 * (upper + lower));
+    let down = span.normalize();
+    let end = root + down * reach;
+    let hinge = ahead.cross(down).normalize();
+    let bend = down.cross(hinge);
+    let along = (reach * reach + upper * upper - lower * lower) / (2.0 * reach);
+    let out = (upper * upper - along * along).max(0.0).sqrt();
+    [hinge, root + down * along + bend * out, end]
+}
+
+/// The turn of a bone that hangs at rest, once it runs from `upper` to `lower` with its y axis along `hinge`.
+fn turned(upper: DVec3, lower: DVec3, hinge: DVec3) -> DMat3 {
+    let up = (upper - lower).normalize();
+    let y_axis = (hinge - up * hinge.dot(up)).normalize();
+    DMat3::from_cols(y_axis.cross(up), y_axis, up)
 }
 
 /// Where toes bend: the ball of the foot, on the floor.

@@ -59,7 +59,7 @@ impl<'a> Oracle<'a> {
                     .iter()
                     .zip(self.walkers)
                     .filter(|(room, _)| room.intersects_local_ray(&ray, FAR_M))
-                    .map(|(_, w)| (mesh(w, image.time_ns(c, b)), w.triangles().as_slice()))
+                    .map(|(_, w)| (mesh(w, image.time_ns(c, b)), w.surface().triangles.as_slice()))
                     .collect();
                 let found_m = image.range_m[c * image.beams.len() + b];
                 if (found_m - self.range_m(&ray, &bodies)).abs() > 1e-3 {
@@ -111,7 +111,7 @@ fn mesh(walker: &Walker, time_ns: i64) -> Vec<Vector> {
 
 /// How far a point is from a body's surface.
 pub fn distance_m(walker: &Walker, time_ns: i64, point_m: DVec3) -> f32 {
-    let body = TriMesh::new(mesh(walker, time_ns), walker.triangles().clone()).unwrap();
+    let body = TriMesh::new(mesh(walker, time_ns), walker.surface().triangles.clone()).unwrap();
     body.distance_to_local_point(vector(point_m), false)
 }
 

@@ -157,7 +157,7 @@ impl Painter {
                 let columns = bound(k)..=bound(k + 1) - 1;
                 let middle_cdeg = view.azimuth_at((bound(k) + bound(k + 1)) as f64 * 0.5);
                 let pass = Pass { columns, start_ns, end_ns, middle_cdeg };
-                self.pass(&pass, walker.triangles(), person, view);
+                self.pass(&pass, &walker.surface().triangles, person, view);
             }
             start_ns = end_ns;
         }

@@ -1,8 +1,10 @@
 //! Segments against triangle meshes (Möller and Trumbore 1997). Shares nothing with the sensors' rasteriser.
 
+use std::ops::Range;
+
 use umbracast::geometry::{Aabb, DVec3};
 
-use crate::body;
+use crate::body::Surface;
 
 /// A body's mesh at one instant, boxed part by part so that most segments are settled without a triangle.
 #[derive(Debug, Clone)]
@@ -27,14 +29,15 @@ impl BodyMesh {
         Self { vertices: Vec::new(), bounds: Aabb::EMPTY, parts: Vec::new() }
     }
 
-    /// Lets `write` fill in the vertices of the moment, then boxes them.
-    pub fn update(&mut self, write: impl FnOnce(&mut Vec<DVec3>)) {
+    /// Lets `write` fill in the vertices of the moment, then boxes them, part by part of the body's `surface`.
+    pub fn update(&mut self, surface: &Surface, write: impl FnOnce(&mut Vec<DVec3>)) {
         write(&mut self.vertices);
         self.bounds = Aabb::around(self.vertices.iter().copied());
         self.parts.clear();
         if !self.vertices.is_empty() {
             let vertices = &self.vertices;
-            self.parts.extend(body::parts().map(|(range, _)| Aabb::around(vertices[range].iter().copied())));
+            let boxed = |range: &Range<usize>| Aabb::around(vertices[range.clone()].iter().copied());
+            self.parts.extend(surface.parts.iter().map(|(range, _)| boxed(range)));
         }
     }
 
@@ -44,28 +47,28 @@ impl BodyMesh {
     }
 
     /// Does the segment cross the surface?
-    pub fn blocks(&self, triangles: &[[u32; 3]], start_m: DVec3, end_m: DVec3) -> bool {
-        self.crossings(triangles, start_m, end_m).next().is_some()
+    pub fn blocks(&self, surface: &Surface, start_m: DVec3, end_m: DVec3) -> bool {
+        self.crossings(surface, start_m, end_m).next().is_some()
     }
 
     /// Is the point inside one of the closed parts? A line from an inner point leaves more often than it enters.
-    pub fn holds(&self, triangles: &[[u32; 3]], point_m: DVec3) -> bool {
+    pub fn holds(&self, surface: &Surface, point_m: DVec3) -> bool {
         // Any direction will do; an odd one runs along no edge.
         let far = point_m + DVec3::new(3.971_3, 1.237_9, 2.718_1);
-        let crossings = self.crossings(triangles, point_m, far);
+        let crossings = self.crossings(surface, point_m, far);
         crossings.map(|crossing| if crossing == Crossing::Out { 1 } else { -1 }).sum::<i32>() > 0
     }
 
     fn crossings<'a>(
         &'a self,
-        triangles: &'a [[u32; 3]],
+        surface: &'a Surface,
         start_m: DVec3,
         end_m: DVec3,
     ) -> impl Iterator<Item = Crossing> + 'a {
         let near = meets_box(&self.bounds, start_m, end_m);
-        let parts = self.parts.iter().zip(body::parts()).take(if near { usize::MAX } else { 0 });
+        let parts = self.parts.iter().zip(&surface.parts).take(if near { usize::MAX } else { 0 });
         parts.filter(move |(bounds, _)| meets_box(bounds, start_m, end_m)).flat_map(move |(_, (_, range))| {
-            triangles[range]
+            surface.triangles[range.clone()]
                 .iter()
                 .filter_map(move |t| crossing(t.map(|i| self.vertices[i as usize]), start_m, end_m))
         })
@@ -143,7 +146,7 @@ mod tests {
 
     fn mesh(walker: &Walker) -> BodyMesh {
         let mut mesh = BodyMesh::new();
-        mesh.update(|vertices| {
+        mesh.update(walker.surface(), |vertices| {
             walker.mesh_at(1_000_000_000, vertices);
         });
         mesh
@@ -172,8 +175,8 @@ mod tests {
                 DVec3::new(1.0 + spread * draw(), spread * draw(), 0.9 + 0.9 * draw())
             };
             let (start, end) = (point(4.0), point(0.6));
-            let found = mesh.blocks(walker.triangles(), start, end);
-            assert_eq!(found, brute_force(&mesh, walker.triangles(), start, end), "{start} {end}");
+            let found = mesh.blocks(walker.surface(), start, end);
+            assert_eq!(found, brute_force(&mesh, &walker.surface().triangles, start, end), "{start} {end}");
             blocked += i32::from(found);
         }
         assert!((500..3500).contains(&blocked), "{blocked}: the test meets both answers");
@@ -185,9 +188,9 @@ mod tests {
         let mesh = mesh(&walker);
         let at = |z: f64| walker.state_at(1_000_000_000).unwrap().position_m.extend(z);
         let height = walker.build.height_m();
-        assert!(mesh.holds(walker.triangles(), at(0.60 * height)));
-        assert!(mesh.holds(walker.triangles(), at(0.94 * height)));
-        assert!(!mesh.holds(walker.triangles(), at(height + 0.05)));
-        assert!(!mesh.holds(walker.triangles(), at(1.2) + DVec3::new(0.6, 0.0, 0.0)));
+        assert!(mesh.holds(walker.surface(), at(0.60 * height)));
+        assert!(mesh.holds(walker.surface(), at(0.94 * height)));
+        assert!(!mesh.holds(walker.surface(), at(height + 0.05)));
+        assert!(!mesh.holds(walker.surface(), at(1.2) + DVec3::new(0.6, 0.0, 0.0)));
     }
 }

@@ -36,7 +36,7 @@ impl Truth {
     pub fn links(&mut self, site: &Site, walkers: &[Walker], time_ns: i64) -> Vec<LinkTruth> {
         self.meshes.resize_with(walkers.len(), BodyMesh::new);
         for (mesh, walker) in self.meshes.iter_mut().zip(walkers) {
-            mesh.update(|vertices| {
+            mesh.update(walker.surface(), |vertices| {
                 walker.mesh_at(time_ns, vertices);
             });
         }
@@ -46,8 +46,8 @@ impl Truth {
             for (own, walker) in walkers.iter().enumerate() {
                 let Some(state) = walker.state_at(time_ns) else { continue };
                 let ue = site.ue.on_body(state.position_m, state.heading_rad, state.height_m);
-                let cuts = |i: usize| self.meshes[i].blocks(walker.triangles(), start, ue);
-                let inside = self.meshes[own].holds(walker.triangles(), ue);
+                let cuts = |i: usize| self.meshes[i].blocks(walkers[i].surface(), start, ue);
+                let inside = self.meshes[own].holds(walker.surface(), ue);
                 links.push(LinkTruth {
                     access_point,
                     person: walker.trajectory.person,

@@ -1,0 +1,120 @@
+//! Kinds of bodies, and who in a scene has which.
+
+use std::str::FromStr;
+
+use rand::RngExt;
+use umbracast::Error;
+
+use crate::random::stream;
+
+/// What sets a body apart.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// An adult with empty hands whose arms swing.
+    #[default]
+    Plain,
+    /// A shoulder bag or a backpack.
+    Bag,
+    /// A telephone at one ear.
+    Phone,
+    /// Both hands in the pockets.
+    Pockets,
+    /// 3 to 12 years old.
+    Child,
+    /// Seated in a wheelchair.
+    Wheelchair,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Plain, Self::Bag, Self::Phone, Self::Pockets, Self::Child, Self::Wheelchair];
+
+    /// As it is written on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Bag => "bag",
+            Self::Phone => "phone",
+            Self::Pockets => "pockets",
+            Self::Child => "child",
+            Self::Wheelchair => "wheelchair",
+        }
+    }
+}
+
+impl FromStr for Kind {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            Error::new(format!("kind of body: expected one of {names}, found {name:?}"))
+        })
+    }
+}
+
+/// Shares of the kinds in a scene; who is left over is plain.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Bodies(Vec<(Kind, f64)>);
+
+impl Bodies {
+    /// Kinds with their shares.
+    ///
+    /// # Errors
+    /// A share that is not above 0, or more than 1 together.
+    pub fn new(shares: Vec<(Kind, f64)>) -> Result<Self, Error> {
+        if let Some((kind, share)) = shares.iter().find(|(_, share)| share.is_nan() || *share <= 0.0) {
+            let name = kind.name();
+            return Err(Error::new(format!("share of {name}: expected more than 0, found {share}")));
+        }
+        let sum: f64 = shares.iter().map(|(_, share)| share).sum();
+        // Shares written with a few digits may miss 1 by a hair.
+        if sum > 1.0 + 1e-9 {
+            return Err(Error::new(format!("shares of bodies: expected 1 at most together, found {sum}")));
+        }
+        Ok(Self(shares))
+    }
+
+    /// Nobody is special.
+    pub fn is_plain(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The kind of a person, drawn from the person's own seed.
+    pub fn kind_of(&self, seed: u64) -> Kind {
+        let drawn: f64 = stream(seed, "kind", 0).random();
+        let mut sum = 0.0;
+        let reached = |(_, share): &&(Kind, f64)| {
+            sum += share;
+            drawn < sum || sum > 1.0 - 1e-9
+        };
+        self.0.iter().find(reached).map_or(Kind::Plain, |&(kind, _)| kind)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_are_drawn_by_share_and_who_is_left_over_is_plain() {
+        let bodies = Bodies::new(vec![(Kind::Bag, 0.3), (Kind::Child, 0.2)]).unwrap();
+        let count = |kind: Kind| (0..2000).filter(|&seed| bodies.kind_of(seed) == kind).count();
+        assert!((520..680).contains(&count(Kind::Bag)), "{}", count(Kind::Bag));
+        assert!((330..470).contains(&count(Kind::Child)), "{}", count(Kind::Child));
+        assert_eq!(count(Kind::Bag) + count(Kind::Child) + count(Kind::Plain), 2000);
+        let all = Bodies::new(vec![(Kind::Phone, 1.0)]).unwrap();
+        assert!((0..2000).all(|seed| all.kind_of(seed) == Kind::Phone));
+        assert_eq!(Bodies::default().kind_of(7), Kind::Plain);
+    }
+
+    #[test]
+    fn shares_that_cannot_be_are_refused() {
+        let refused = |shares: Vec<(Kind, f64)>| Bodies::new(shares).unwrap_err().to_string();
+        assert!(refused(vec![(Kind::Bag, 0.0)]).contains("share of bag: expected more than 0, found 0"));
+        assert!(refused(vec![(Kind::Bag, 0.6), (Kind::Child, 0.6)]).contains("1 at most together"));
+        assert!("dog".parse::<Kind>().unwrap_err().to_string().contains("found \"dog\""));
+        assert!(Kind::ALL.iter().all(|kind| kind.name().parse() == Ok(*kind)));
+    }
+}
