@@ -1,10 +1,13 @@
 //! From arguments to scenes: drawn crowds or recorded people.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use umbracast::Error;
 use umbracast_eval::chain::{People, SceneSpec};
+use umbracast_io::bvh;
 use umbracast_io::trajectories::{self, Options};
+use umbracast_sim::body::Gait;
 use umbracast_sim::body::kind::Bodies;
 use umbracast_sim::crowd::replay::{Recorded, replay};
 
@@ -54,11 +57,23 @@ pub fn recorded_scenes(files: &[PathBuf], replayed: &Replay, first_seed: u64) ->
 
 /// Gives everybody in every scene a body of these kinds, and tells it.
 pub fn dressed((mut scenes, mut told): Told, args: &BodyArgs) -> Result<Told, Error> {
-    let bodies = Bodies::new(args.bodies.clone()).map_err(|e| e.within("--bodies"))?;
+    let gait = match &args.gait {
+        None => None,
+        Some(file) => {
+            let motion = bvh::read(file)?;
+            let gait = Gait::new(motion.frame_s, &motion.joints, &motion.positions);
+            Some(Arc::new(gait.map_err(|e| e.within(file.display()))?))
+        }
+    };
+    let bodies = Bodies::new(args.bodies.clone(), gait).map_err(|e| e.within("--bodies"))?;
     if !bodies.is_plain() {
-        let shares = args.bodies.iter().map(|(kind, share)| format!("{} {share}", kind.name()));
-        told.push(format!("bodies by share: {}", shares.collect::<Vec<_>>().join(", ")));
-        scenes.iter_mut().for_each(|scene| scene.bodies = bodies.clone());
+        let shares = args.bodies.iter().map(|(kind, share)| format!("{}={share}", kind.name()));
+        let shares = shares.collect::<Vec<_>>().join(",");
+        for scene in &mut scenes {
+            scene.group += &format!(" {shares}");
+            scene.bodies = bodies.clone();
+        }
+        told.push(format!("bodies by share: {shares}"));
     }
     Ok((scenes, told))
 }

@@ -168,7 +168,8 @@ impl<'a> Chain<'a> {
     /// A setting that cannot work.
     pub fn scene(&self, index: usize, progress: &impl Fn(Progress)) -> Result<SceneResult, Error> {
         let (spec, scene_spec, site) = (self.spec, &self.spec.scenes[index], &self.spec.configs[0].site);
-        let mut scene = Scene::in_hall(scene_spec.crowd(), site, &self.sensors, scene_spec.seed);
+        let scene = Scene::in_hall(scene_spec.crowd(), site, &self.sensors, scene_spec.seed);
+        let mut scene = scene.with_bodies(&scene_spec.bodies);
         let mut assembler = Assembler::new(site)?;
         let mut health = Health::default();
         let mut lanes = Vec::new();
@@ -273,6 +274,7 @@ mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
     use umbracast::geometry::DVec2;
     use umbracast::{Mode, STEP_NS};
+    use umbracast_sim::body::kind::Kind;
     use umbracast_sim::crowd::Trajectory;
 
     /// Three people who walk side by side for 2.5 s.
@@ -335,6 +337,15 @@ mod tests {
         assert!(mode.displacement.tracked_share().unwrap() > 0.99);
         assert!(mode.displacement.mean_m(1).unwrap() < 0.2, "{:?}", mode.displacement.mean_m(1));
         assert!(mode.health.is_clean(), "{:?}", mode.health);
+    }
+
+    #[test]
+    fn the_bodies_asked_for_walk() {
+        let mut spec = spec(1);
+        spec.scenes[0].bodies = Bodies::new(vec![(Kind::Wheelchair, 1.0)], None).unwrap();
+        let results = run(&spec, |_| {}).unwrap();
+        let (truth, _) = results[0].kept.as_ref().unwrap();
+        assert!(truth.people.iter().all(|row| row.height_m < 1.5), "who sits is lower");
     }
 
     #[test]

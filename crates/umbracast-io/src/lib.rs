@@ -1,4 +1,4 @@
-//! Files and tables: pcap, PCD, MCAP recordings, trajectories, Parquet and CSV.
+//! Files and tables: pcap, PCD, MCAP recordings, trajectories, motion captures, Parquet and CSV.
 
 mod lzf;
 pub mod pcap;
@@ -9,3 +9,4 @@ pub mod messages;
 pub mod recording;
 pub mod tables;
 pub mod trajectories;
+pub mod bvh;

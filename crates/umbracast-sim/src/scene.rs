@@ -97,7 +97,7 @@ impl Scene {
         if !bodies.is_plain() {
             for walker in &mut self.walkers {
                 let own_seed = own_seed(self.seed, &walker.trajectory);
-                *walker = Walker::of_kind(walker.trajectory.clone(), own_seed, bodies.kind_of(own_seed));
+                *walker = bodies.walker(walker.trajectory.clone(), own_seed);
             }
         }
         self
@@ -236,12 +236,12 @@ mod tests {
             scene.next_frame().unwrap().people
         };
         let plain = run(Bodies::default());
-        let children = run(Bodies::new(vec![(Kind::Child, 1.0)]).unwrap());
+        let children = run(Bodies::new(vec![(Kind::Child, 1.0)], None).unwrap());
         for (adult, child) in plain.iter().zip(&children) {
             assert_eq!(adult.state.position_m, child.state.position_m);
             assert!(child.state.height_m < adult.state.height_m);
         }
-        let handsfree = run(Bodies::new(vec![(Kind::Pockets, 1.0)]).unwrap());
+        let handsfree = run(Bodies::new(vec![(Kind::Pockets, 1.0)], None).unwrap());
         assert_eq!(plain, handsfree, "the same measures and the same gait");
     }
 }

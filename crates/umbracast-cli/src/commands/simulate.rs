@@ -87,7 +87,7 @@ fn record_scene(
     progress: &ProgressBar,
 ) -> Result<SceneTruth, Error> {
     let path = args.out.join(format!("scene-{number:04}.mcap"));
-    let mut scene = Scene::in_hall(spec.crowd(), &config.site, sensors, spec.seed);
+    let mut scene = Scene::in_hall(spec.crowd(), &config.site, sensors, spec.seed).with_bodies(&spec.bodies);
     let mut writer = Recorder::create(&path, config, args.clouds)?;
     let mut all = SceneTruth::default();
     while let Some(frame) = scene.next_frame() {

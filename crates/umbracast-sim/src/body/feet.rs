@@ -119,7 +119,7 @@ fn swing_way(u: f64, amount: f64) -> f64 {
 }
 
 /// The lowest point of the sole, from the ankle.
-fn lowest_m(build: &Build, pitch_rad: f64, toe_pitch_rad: f64) -> f64 {
+pub fn lowest_m(build: &Build, pitch_rad: f64, toe_pitch_rad: f64) -> f64 {
     let (sole, ankle) = (build.sole_m(), build.ankle_m());
     let heel = turned(-ANKLE_SHARE * sole, -ankle, pitch_rad)[1];
     let ball = turned((BALL_SHARE - ANKLE_SHARE) * sole, -ankle, pitch_rad)[1];

@@ -9,8 +9,10 @@ mod feet;
 mod walk;
 pub mod kind;
 mod things;
+mod recorded;
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};
@@ -19,6 +21,7 @@ use crate::crowd::Trajectory;
 use crate::random::stream;
 use build::Build;
 use kind::Kind;
+pub use recorded::Gait;
 use shape::Shape;
 pub use shape::Surface;
 use skeleton::{Holds, PelvisPose, Pose};
@@ -49,6 +52,8 @@ pub struct Walker {
     holds: Holds,
     /// Height of the hip joints of who sits.
     seat_m: Option<f64>,
+    /// In place of the published gait.
+    gait: Option<Arc<Gait>>,
     /// Standing (or sitting) upright at the origin, looking along x.
     upright: Pose,
 }
@@ -76,7 +81,24 @@ impl Walker {
         let pelvis = PelvisPose::new(DVec2::ZERO, 0.0, &still, hips_m);
         let upright = Pose::new(&build, 0.0, &still, &pelvis, &feet, &things.holds);
         let shape = Shape::new(&build, things.parts);
-        Self { shape, trajectory, build, walk, holds: things.holds, seat_m: things.seat_m, upright }
+        Self {
+            shape,
+            trajectory,
+            build,
+            walk,
+            holds: things.holds,
+            seat_m: things.seat_m,
+            gait: None,
+            upright,
+        }
+    }
+
+    /// The same body, moving as somebody who was recorded.
+    #[must_use]
+    pub fn with_gait(mut self, gait: Arc<Gait>) -> Self {
+        self.walk.keep_pace(gait.stride_m(&self.build));
+        self.gait = Some(gait);
+        self
     }
 
     /// The person's state, or `None` while not in the scene.
@@ -124,6 +146,10 @@ impl Walker {
         let instant = self.walk.at(time_ns);
         if let Some(seat_m) = self.seat_m {
             return Some((self.seated(seat_m, &instant, &state), state));
+        }
+        if let Some(gait) = &self.gait {
+            let Instant { heading_rad, speed_mps, phase, .. } = instant;
+            return Some((gait.pose(&self.build, state.position_m, heading_rad, phase, speed_mps), state));
         }
         let upper = walk::upper_body(&instant, &self.build);
         let pelvis = PelvisPose::new(state.position_m, instant.heading_rad, &upper, instant.hip_height_m);

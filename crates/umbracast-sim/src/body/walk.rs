@@ -96,6 +96,15 @@ impl Walk {
         }
     }
 
+    /// Gives every stride the same length at every speed; footprints are of no use then.
+    pub fn keep_pace(&mut self, stride_m: f64) {
+        let mut phase = self.instants[0].phase;
+        for instant in &mut self.instants {
+            phase += instant.speed_mps * STEP_S / stride_m;
+            instant.phase = phase;
+        }
+    }
+
     /// The footprints between which a foot is: the one it stands on or left last, and the next one.
     pub fn prints_of(&self, left: bool, phase: f64) -> [Footprint; 2] {
         let contact = (2.0 * (phase - if left { 0.5 } else { 0.0 })).floor().max(0.0) as usize;
