@@ -68,7 +68,10 @@ pub fn dressed((mut scenes, mut told): Told, args: &BodyArgs) -> Result<Told, Er
     let bodies = Bodies::new(args.bodies.clone(), gait).map_err(|e| e.within("--bodies"))?;
     if !bodies.is_plain() {
         let shares = args.bodies.iter().map(|(kind, share)| format!("{}={share}", kind.name()));
-        let shares = shares.collect::<Vec<_>>().join(",");
+        let mut shares = shares.collect::<Vec<_>>().join(",");
+        if let Some(file) = args.gait.as_ref().and_then(|file| file.file_stem()) {
+            shares += &format!(" of {}", file.to_string_lossy());
+        }
         for scene in &mut scenes {
             scene.group += &format!(" {shares}");
             scene.bodies = bodies.clone();
