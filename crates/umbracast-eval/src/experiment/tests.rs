@@ -4,6 +4,7 @@ use crate::pooled;
 use crate::report;
 use umbracast::geometry::DVec2;
 use umbracast::{Config, Mode, STEP_NS};
+use umbracast_sim::body::kind::Bodies;
 use umbracast_sim::crowd::{Crowd, Trajectory};
 
 /// Two people who walk one behind the other for 2.2 s, in `scenes` scenes.
@@ -19,7 +20,12 @@ fn spec(scenes: u64) -> Spec {
         height_m: None,
     };
     let crowd = Crowd { trajectories: (0..2).map(way).collect(), duration_ns: 22 * STEP_NS };
-    let scene = |seed| SceneSpec { group: "walk".to_owned(), seed, people: People::Replayed(crowd.clone()) };
+    let scene = |seed| SceneSpec {
+        group: "walk".to_owned(),
+        seed,
+        people: People::Replayed(crowd.clone()),
+        bodies: Bodies::default(),
+    };
     Spec {
         configs: vec![Config::for_mode(Mode::Default)],
         weights: None,
