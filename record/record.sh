@@ -34,6 +34,9 @@ cp "$scratch/coverage/coverage.svg" record/coverage.svg
 # Other heights, a lost sensor, more people, pairs.
 record sites record/sites.sh 20 hdl,paper,default
 
+# Why the paper's figures are what they are.
+record/explain.sh
+
 # How fast: one scene of 10 people with two HDL-32E on one core, and a frame through every mode.
 record speed umbracast simulate --scenes 1 --threads 1 --out "$scratch/sim"
 for mode in default paper hdl; do

@@ -151,20 +151,22 @@ fn nothing_is_left_undone() {
 }
 
 #[test]
-fn every_figure_of_the_readme_stands_in_a_recorded_run() {
-    let readme = fs::read_to_string(root().join("README.md")).expect("README.md");
-    let mut checked = 0;
-    for part in readme.split("<!-- from ").skip(1) {
-        let (name, rest) = part.split_once(" -->").expect("a comment that names a record");
-        let record = fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let block = rest.split("```").nth(1).expect("a block below the comment");
-        for line in block.lines().skip(1).filter(|line| !line.trim().is_empty()) {
-            assert!(
-                record.contains(line.trim_end()),
-                "README quotes a line that {name} does not hold: {line}"
-            );
-            checked += 1;
+fn every_figure_of_a_page_stands_in_a_recorded_run() {
+    for page in ["README.md", "docs/PAPER_FIGURES.md"] {
+        let text = fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
+        let mut checked = 0;
+        for part in text.split("<!-- from ").skip(1) {
+            let (name, rest) = part.split_once(" -->").expect("a comment that names a record");
+            let record = fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let block = rest.split("```").nth(1).expect("a block below the comment");
+            for line in block.lines().skip(1).filter(|line| !line.trim().is_empty()) {
+                assert!(
+                    record.contains(line.trim_end()),
+                    "{page} quotes a line that {name} does not hold: {line}"
+                );
+                checked += 1;
+            }
         }
+        assert!(checked > 0, "{page} quotes no recorded run");
     }
-    assert!(checked > 0, "the README quotes no recorded run");
 }

@@ -170,7 +170,7 @@ fn with_own_future(own: &TrackRow, acceleration_psd: f64) -> (Track, Forecast) {
 }
 
 /// A person of the truth as the tracker would see him if it made no error.
-fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb)) -> Track {
+pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb)) -> Track {
     let first = row.frame.saturating_sub(OBSERVED as u64 - 1);
     let observed: VecDeque<Observed> = (first..=row.frame)
         .filter_map(|frame| truth.person(frame, row.person))

@@ -4,7 +4,7 @@
 //!
 //! Works on scenes, not on tables, because it needs the bodies. Who counts is the same as everywhere.
 
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use umbracast::blockage::body::EllipticCylinder;
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb, slab};
@@ -122,7 +122,8 @@ pub fn climb(mut scene: Scene, site: &Site, seed: u64) -> SceneLadder {
         note_truth(0, &frame, &mut truth);
         moments.push(Moment::new(scene.walkers(), frame.time_ns));
     }
-    let errors = state_errors(moments.len(), scene.walkers().len(), seed);
+    let rng = stream(seed, "ladder errors", 0);
+    let errors = lasting_errors(moments.len(), scene.walkers().len(), ERROR_KEPT, rng);
     let play = Play { site, walkers: scene.walkers(), moments, errors };
     let instances = instances(&TruthIndex::new(&truth));
     let tallies = |oracle: &Oracle| {
@@ -176,16 +177,20 @@ impl Moment {
 /// Errors of one person's state in units of the rung's sizes: x, y, vx, vy, height.
 type StateError = [f64; 5];
 
-/// By frame, then by walker: normal with unit variance, hanging together from frame to frame.
-fn state_errors(frames: usize, walkers: usize, seed: u64) -> Vec<Vec<StateError>> {
-    let mut rng = stream(seed, "ladder errors", 0);
+/// By frame, then by walker: normal with unit variance, of which the share `kept` is still there a frame later.
+pub fn lasting_errors<const N: usize>(
+    frames: usize,
+    walkers: usize,
+    kept: f64,
+    mut rng: impl Rng,
+) -> Vec<Vec<[f64; N]>> {
     let mut draw = || std::array::from_fn(|_| rng.sample(StandardNormal));
-    let mut errors: Vec<Vec<StateError>> = vec![(0..walkers).map(|_| draw()).collect()];
+    let mut errors: Vec<Vec<[f64; N]>> = vec![(0..walkers).map(|_| draw()).collect()];
+    let fresh = (1.0 - kept * kept).sqrt();
     for k in 1..frames {
-        let fresh = (1.0 - ERROR_KEPT * ERROR_KEPT).sqrt();
         let later = errors[k - 1].iter().map(|old| {
-            let new: StateError = draw();
-            std::array::from_fn(|i| ERROR_KEPT * old[i] + fresh * new[i])
+            let new: [f64; N] = draw();
+            std::array::from_fn(|i| kept * old[i] + fresh * new[i])
         });
         let later = later.collect();
         errors.push(later);
@@ -351,7 +356,7 @@ mod tests {
 
     #[test]
     fn errors_have_unit_variance_and_hang_together() {
-        let errors = state_errors(4000, 5, 3);
+        let errors = lasting_errors::<5>(4000, 5, ERROR_KEPT, stream(3, "errors", 0));
         let mean = |of: &dyn Fn(usize, usize) -> f64| {
             (0..3999).flat_map(|k| (0..5).map(move |i| (k, i))).map(|(k, i)| of(k, i)).sum::<f64>() / 19_995.0
         };

@@ -26,3 +26,4 @@ pub mod experiment;
 pub mod pooled;
 pub mod report;
 pub mod coverage;
+pub mod explain;

@@ -56,7 +56,8 @@ pub struct Counts {
 }
 
 impl Counts {
-    fn count(&mut self, truth: bool, said: bool) {
+    /// Adds one instance.
+    pub fn count(&mut self, truth: bool, said: bool) {
         *match (truth, said) {
             (true, true) => &mut self.true_positive,
             (false, true) => &mut self.false_positive,

@@ -5,8 +5,8 @@ pub mod tables;
 pub mod compare;
 mod long_table;
 mod ladder_table;
-mod plot;
-mod figures;
+pub(crate) mod plot;
+pub(crate) mod figures;
 mod one_scene;
 pub(crate) mod html;
 

@@ -62,6 +62,8 @@ pub struct Panel {
     pub y_step: Option<f64>,
     /// Digits after the point on the y axis.
     pub y_digits: usize,
+    /// Names along the y axis instead of figures: the first at 1.
+    pub y_names: Vec<String>,
     /// One metre is as long on both axes.
     pub equal_axes: bool,
     /// Drawn in this order.
@@ -123,6 +125,9 @@ fn parts(panel: &Panel, legend: bool) -> (Vec<Plot>, Layout) {
     }
     if let Some(step) = panel.y_step {
         layout = layout.with_y_tick_step(step);
+    }
+    if !panel.y_names.is_empty() {
+        layout = layout.with_y_categories(panel.y_names.clone());
     }
     if panel.equal_axes {
         layout = layout.with_equal_aspect();

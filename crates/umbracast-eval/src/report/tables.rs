@@ -27,7 +27,8 @@ pub struct Table {
 const SHORT_WINDOWS: [usize; 4] = [1, 3, 8, 9];
 
 impl Table {
-    pub(crate) fn new(title: impl Into<String>, words: usize, header: &[&str]) -> Self {
+    /// Without rows.
+    pub fn new(title: impl Into<String>, words: usize, header: &[&str]) -> Self {
         let header = header.iter().map(|&name| name.to_owned()).collect();
         Self { title: title.into(), words, header, ..Self::default() }
     }
