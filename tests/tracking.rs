@@ -144,6 +144,27 @@ fn a_pair_half_a_metre_apart_is_two_tracks_in_default_and_one_in_hdl() {
 }
 
 #[test]
+fn who_is_out_of_sight_for_long_is_not_told_but_known_again() {
+    let config = Config::for_mode(Mode::Default).track;
+    let mut tracker = Tracker::new(&config, &open_site());
+    let mut tracks = Vec::new();
+    let mut told = Vec::new();
+    for index in 0..53 {
+        let hidden = (20..48).contains(&index);
+        let mut frame = frame(index);
+        let seen = detection(DVec2::new(0.1 * index as f64, 0.0), frame.time_ns);
+        if hidden {
+            frame.scans.clear(); // the sensor is silent, so nobody can be seen
+        }
+        tracker.update(&frame, if hidden { &[] } else { std::slice::from_ref(&seen) }, &mut tracks);
+        told.push(tracks[..].iter().map(|track| (track.id, track.confirmed)).collect::<Vec<_>>());
+    }
+    assert_eq!(told[22], [(0, true)]);
+    assert_eq!(told[47], [(0, false)]);
+    assert_eq!(told[52], [(0, true)]);
+}
+
+#[test]
 fn pieces_of_a_person_keep_a_track_and_start_none() {
     let config = Config::for_mode(Mode::Default).track;
     let followed = |first_piece: u64| {

@@ -26,8 +26,8 @@ pub struct TrackConfig {
     pub noise_floor_m: f64,
     /// Measurement noise that falls with the square root of the points, one axis.
     pub noise_per_point_m: f64,
-    /// The same as `noise_floor_m` where only a piece of a person is seen.
-    pub piece_noise_m: f64,
+    /// Measurement noise added where hardly anything of a person's height is seen, one axis; none is where half is.
+    pub hidden_noise_m: f64,
     /// A new track's position variance as a multiple of the measurement's.
     pub birth_variance_per_noise: f64,
     /// A new track's velocity, one standard deviation of an axis.
@@ -48,6 +48,8 @@ pub struct TrackConfig {
     pub confirm_hits: u32,
     /// Time within which they must come.
     pub confirm_within_s: f64,
+    /// A track is not told as confirmed while its position, one standard deviation of the larger axis, is less sure.
+    pub told_sigma_max_m: f64,
     /// Whether sensors, furniture and other people decide if a person can be seen.
     pub visibility: bool,
     /// Chance to detect a person in full view.

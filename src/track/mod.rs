@@ -38,7 +38,8 @@ pub struct Track {
     pub height_sigma_m: f64,
     /// Points of this frame's detection; 0 while it coasts.
     pub points: u32,
-    /// False until the track has been seen often enough to be believed.
+    /// False until the track has been seen often enough to be believed, and while it has been out of sight so long
+    /// that its position says little.
     pub confirmed: bool,
     /// The person's box along the site's axes, at `position_m`.
     pub aabb: Aabb,

@@ -153,7 +153,7 @@ impl Person {
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
             points: self.points,
-            confirmed: self.confirmed,
+            confirmed: self.confirmed && largest_sigma(state.position_covariance()) < config.told_sigma_max_m,
             aabb,
             obb,
             observed: self.observed.clone(),
@@ -203,10 +203,14 @@ impl Person {
     }
 }
 
-/// Covariance of a detection's position: part of its error falls with the number of points.
+/// Covariance of a detection's position: part of its error falls with the number of points, part with the share of
+/// the body that is seen.
 pub(super) fn noise(config: &TrackConfig, detection: &Detection) -> Mat2 {
-    let floor_m = if detection.whole { config.noise_floor_m } else { config.piece_noise_m };
-    let variance = floor_m.powi(2) + config.noise_per_point_m.powi(2) / f64::from(detection.points.max(1));
+    // 1 where hardly anything is seen, 0 from half the height on.
+    let hidden = (1.0 - 2.0 * detection.aabb.size_m().z / config.height_mean_m).max(0.0);
+    let variance = config.noise_floor_m.powi(2)
+        + (config.hidden_noise_m * hidden).powi(2)
+        + config.noise_per_point_m.powi(2) / f64::from(detection.points.max(1));
     [[variance, 0.0], [0.0, variance]]
 }
 
