@@ -37,6 +37,15 @@ record sites record/sites.sh 20 hdl,paper,default
 # Why the paper's figures are what they are.
 record/explain.sh
 
+# The job files: on a Slurm of this one machine, and as a cluster would read the Kubernetes ones.
+if command -v slurmctld >/dev/null && [ "$(id -u)" = 0 ]; then
+    { echo '$ deploy/slurm/try.sh' && deploy/slurm/try.sh; } >record/slurm.txt || true
+fi
+if python3 -c 'import yaml' 2>/dev/null; then
+    { echo '$ deploy/kubernetes/try.py umbracast' && deploy/kubernetes/try.py "$(command -v umbracast)"; } \
+        >record/kubernetes.txt || true
+fi
+
 # How fast: one scene of 10 people with two HDL-32E on one core, and a frame through every mode.
 record speed umbracast simulate --scenes 1 --threads 1 --out "$scratch/sim"
 for mode in default paper hdl; do
@@ -72,3 +81,10 @@ if [ -n "${UMBRACAST_DATA:-}" ]; then
         done
     done
 fi
+
+# The paper's experiment whole: an hour on two cores. REPRODUCE names a folder in which an earlier try is gone on with.
+reproduced="${REPRODUCE:-$scratch/reproduce}"
+record reproduce umbracast reproduce --out "$reproduced"
+sed -i "s|$reproduced|/tmp/reproduce|g" record/reproduce.txt
+cp "$reproduced/report.html" record/reproduce.html
+cp "$reproduced/boxes.svg" record/reproduce-boxes.svg

@@ -17,6 +17,8 @@ FLAGS="${FLAGS:---scenes 4 --people 3}"
 export UMBRACAST FLAGS
 
 lab="$(mktemp -d)"
+node="$(hostname -s)"
+tell() { sed "s|$lab|/tmp/try|g; s|$node|node|g"; }
 chmod 755 "$lab" # munged insists
 pids=()
 clear_up() {
@@ -26,7 +28,6 @@ clear_up() {
 }
 trap clear_up EXIT
 
-node="$(hostname -s)"
 mkdir "$lab/state" "$lab/spool" "$lab/logs"
 chmod 700 "$lab/logs"
 (umask 077; head -c 1024 /dev/urandom >"$lab/munge.key")
@@ -56,29 +57,39 @@ CONF
 export SLURM_CONF="$lab/slurm.conf"
 
 munged --foreground --force --key-file "$lab/munge.key" --socket "$lab/munge.socket" \
-    --pid-file "$lab/munged.pid" --log-file "$lab/logs/munged.log" --seed-file "$lab/munged.seed" &
+    --pid-file "$lab/munged.pid" --log-file "$lab/logs/munged.log" --seed-file "$lab/munged.seed" 2>/dev/null &
 pids+=($!)
 for _ in $(seq 50); do [ -S "$lab/munge.socket" ] && break; sleep 0.1; done
-slurmctld -D -f "$SLURM_CONF" -L "$lab/logs/slurmctld.log" &
+slurmctld -D -f "$SLURM_CONF" -L "$lab/logs/slurmctld.log" 2>/dev/null &
 pids+=($!)
-slurmd -D -f "$SLURM_CONF" -L "$lab/logs/slurmd.log" &
+slurmd -D -f "$SLURM_CONF" -L "$lab/logs/slurmd.log" 2>/dev/null &
 pids+=($!)
 for _ in $(seq 100); do sinfo -h -o %T 2>/dev/null | grep -q idle && break; sleep 0.2; done
+sbatch --version
 echo "\$ sinfo"
-sinfo -o "%P %a %D nodes, CPUs %c, %T"
+sinfo -o "%P: %a, %D node of %c CPUs, %T"
 
 export OUT="$lab/sharded"
-submit() { sbatch --parsable --mem=1500M --output="$lab/logs/%A_%a.txt" "$@" deploy/slurm/reproduce.sbatch; }
-shards="$(submit --array=0-1)"
-merge="$(submit --dependency=afterok:"$shards")"
+submit() {
+    echo "\$ FLAGS=\"$FLAGS\" OUT=$OUT sbatch $* deploy/slurm/reproduce.sbatch" | tell
+    job="$(sbatch --parsable --mem=1500M --output="$lab/logs/%A_%a.txt" "$@" deploy/slurm/reproduce.sbatch)"
+    echo "$job"
+}
+submit --array=0-1
+shards="$job"
+submit --dependency=afterok:"$shards"
+merge="$job"
 echo "\$ squeue"
-squeue -o "%.10i %.20j %.2t %.20E"
+squeue -o "%.6i %.20j %.2t %E"
 while [ -n "$(squeue -h -j "$shards,$merge" 2>/dev/null)" ]; do sleep 1; done
-for log in "$lab/logs/$shards"_*.txt "$lab/logs/$merge"_*.txt; do
-    echo "\$ cat $log"
-    # The log of a long run tells times; what a run says does not change.
-    grep -v " left$" "$log"
+for log in "$lab/logs/$shards"_*.txt; do
+    echo "\$ cat $log" | tell
+    tell <"$log"
 done
+echo "\$ head -n 12 $(echo "$lab/logs/$merge"_*.txt)" | tell
+head -n 12 "$lab/logs/$merge"_*.txt | tell
+echo "\$ umbracast reproduce $FLAGS --out /tmp/try/single"
+# shellcheck disable=SC2086 # several words
 "$UMBRACAST" reproduce $FLAGS --quiet --out "$lab/single" >/dev/null
 echo "\$ diff -r --exclude run.json sharded single && echo the same"
 diff -r --exclude run.json "$lab/sharded" "$lab/single" && echo "the same"

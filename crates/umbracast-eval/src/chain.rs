@@ -271,7 +271,9 @@ pub fn note_truth(scene: u32, frame: &SceneFrame, truth: &mut SceneTruth) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::score::Predictor;
     use std::sync::atomic::{AtomicU64, Ordering};
+    use umbracast::config::{BlockageMethod, BoxKind};
     use umbracast::geometry::DVec2;
     use umbracast::{Mode, STEP_NS};
     use umbracast_sim::body::kind::Kind;
@@ -346,6 +348,23 @@ mod tests {
         let results = run(&spec, |_| {}).unwrap();
         let (truth, _) = results[0].kept.as_ref().unwrap();
         assert!(truth.people.iter().all(|row| row.height_m < 1.5), "who sits is lower");
+    }
+
+    #[test]
+    fn algorithm_1_cast_from_the_rows_is_what_the_run_cast() {
+        for (person_box, predictor) in [(BoxKind::Aabb, Predictor::Aabb), (BoxKind::Obb, Predictor::Obb)] {
+            let mut spec = spec(1);
+            spec.configs[0].blockage.method = BlockageMethod::Algorithm1;
+            spec.configs[0].blockage.person_box = person_box;
+            // One behind the other, in line with the access point `side`.
+            let People::Replayed(crowd) = &mut spec.scenes[0].people else { unreachable!() };
+            let ways = crowd.trajectories.iter_mut().flat_map(|way| &mut way.positions_m);
+            ways.for_each(|at| *at = DVec2::new(at.x - at.y, 0.0));
+            let said = run(&spec, |_| {}).unwrap().remove(0).score.said;
+            let of = |who| &said.iter().find(|said| said.predictor == who).unwrap().access_points;
+            assert_eq!(of(predictor), of(Predictor::Run));
+            assert!(of(predictor)[0].windows[8].all.true_positive > 0, "nobody is ever in the way");
+        }
     }
 
     #[test]

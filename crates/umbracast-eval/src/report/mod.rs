@@ -190,6 +190,8 @@ mod tests {
         let named: Vec<_> = scores.groups.iter().map(|group| (group.name.as_str(), group.scenes)).collect();
         assert_eq!(named, [("orca-03", 2), ("orca-06", 1), ("all", 3)]);
         let text = to_text(&scores);
+        let row = |name: &str| text.lines().any(|l| l.starts_with(name) && l.contains("position RMSE"));
+        assert!(["orca-03 ", "orca-06 ", "all "].into_iter().all(row), "{text}");
         assert!(
             ["orca-03 ", "orca-06 ", "all "].iter().all(|name| text.lines().any(|l| l.starts_with(name)))
         );
