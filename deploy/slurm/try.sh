@@ -67,27 +67,29 @@ pids+=($!)
 for _ in $(seq 100); do sinfo -h -o %T 2>/dev/null | grep -q idle && break; sleep 0.2; done
 sbatch --version
 echo "\$ sinfo"
-sinfo -o "%P: %a, %D node of %c CPUs, %T"
+sinfo
 
 export OUT="$lab/sharded"
 submit() {
+    local log="$1"
+    shift
     echo "\$ FLAGS=\"$FLAGS\" OUT=$OUT sbatch $* deploy/slurm/reproduce.sbatch" | tell
-    job="$(sbatch --parsable --mem=1500M --output="$lab/logs/%A_%a.txt" "$@" deploy/slurm/reproduce.sbatch)"
+    job="$(sbatch --parsable --mem=1500M --output="$lab/logs/$log.txt" "$@" deploy/slurm/reproduce.sbatch)"
     echo "$job"
 }
-submit --array=0-1
+submit shard-%a --array=0-1
 shards="$job"
-submit --dependency=afterok:"$shards"
+submit merge --dependency=afterok:"$shards"
 merge="$job"
 echo "\$ squeue"
-squeue -o "%.6i %.20j %.2t %E"
+squeue -o "%.10i %.20j %.2t %E"
 while [ -n "$(squeue -h -j "$shards,$merge" 2>/dev/null)" ]; do sleep 1; done
-for log in "$lab/logs/$shards"_*.txt; do
-    echo "\$ cat $log" | tell
-    tell <"$log"
+for shard in 0 1; do
+    echo "\$ cat shard-$shard.txt"
+    tell <"$lab/logs/shard-$shard.txt"
 done
-echo "\$ head -n 12 $(echo "$lab/logs/$merge"_*.txt)" | tell
-head -n 12 "$lab/logs/$merge"_*.txt | tell
+echo "\$ head -n 9 merge.txt"
+head -n 9 "$lab/logs/merge.txt" | tell
 echo "\$ umbracast reproduce $FLAGS --out /tmp/try/single"
 # shellcheck disable=SC2086 # several words
 "$UMBRACAST" reproduce $FLAGS --quiet --out "$lab/single" >/dev/null
