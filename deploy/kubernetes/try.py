@@ -33,7 +33,7 @@ def run(job, out, **environment):
     """The container's command, its volume being `out` and its program this one."""
     arguments = [a.replace("/out", str(out)) for a in container(job)["args"]]
     arguments = [a.replace("umbracast reproduce", " ".join(["umbracast reproduce --quiet", *flags])) for a in arguments]
-    path = f"{program.parent}:{os.environ['PATH']}"
+    path = f"{out.parent}:{os.environ['PATH']}"
     command = container(job)["command"] + arguments
     return subprocess.run(command, env={**os.environ, "PATH": path, **environment}, check=True, capture_output=True)
 
@@ -41,6 +41,7 @@ def run(job, out, **environment):
 with tempfile.TemporaryDirectory() as lab:
     out, single = pathlib.Path(lab, "out"), pathlib.Path(lab, "single")
     out.mkdir()
+    pathlib.Path(lab, "umbracast").symlink_to(program)
     completions = shards["spec"]["completions"]
     for index in range(completions):
         run(shards, out, JOB_COMPLETION_INDEX=str(index))

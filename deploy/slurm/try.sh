@@ -67,7 +67,7 @@ pids+=($!)
 for _ in $(seq 100); do sinfo -h -o %T 2>/dev/null | grep -q idle && break; sleep 0.2; done
 sbatch --version
 echo "\$ sinfo"
-sinfo
+sinfo | tell
 
 export OUT="$lab/sharded"
 submit() {
