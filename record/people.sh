@@ -1,43 +1,37 @@
 #!/usr/bin/env bash
-# Real people and unusual bodies: record/people.txt. Called by record/record.sh, or by itself:
-#   UMBRACAST_DATA=... record/people.sh
-# SCENES=5 has fewer scenes of each kind of body than the 20 that are the rule.
+# Real people, and bodies that the predictor was not made for: one table of all modes beside the ORCA row.
+# record/people.sh [SCENES] [MODES]; `umbracast` is the one on the path, UMBRACAST_DATA the folder of the real data.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-: "${UMBRACAST_DATA:?folder of the real data}"
-cargo build --release -p umbracast-cli
-cargo build --release -p umbracast-eval --example sets_table
-bin="$(realpath "${CARGO_TARGET_DIR:-target}")/release"
-out="$(mktemp -d)"
-trap 'rm -rf "$out"' EXIT
-scenes="${SCENES:-20}"
-file=record/people.txt
-: >"$file"
+: "${UMBRACAST_DATA:?expected the folder of the real data}"
+scenes="${1:-20}"
+modes="${2:-hdl,paper,default}"
+scratch="$(mktemp -d)"
+trap 'rm -rf "$scratch"' EXIT
+reports=()
 
-scored() { # NAME ARGUMENTS... of evaluate
+score() { # NAME ARGUMENTS...
     local name="$1"
     shift
-    printf '$ umbracast evaluate %s\n' "$*" | sed "s|$UMBRACAST_DATA|\$UMBRACAST_DATA|g" >>"$file"
-    "$bin/umbracast" evaluate "$@" --quiet --json >"$out/$name.json"
-    printf '%s\n' "$out/$name.json" >>"$out/order"
+    mkdir "$scratch/$name"
+    reports+=("$scratch/$name")
+    printf '# %s: umbracast evaluate --mode %s %s\n' "$name" "$modes" "$*" | sed "s|$UMBRACAST_DATA|\$UMBRACAST_DATA|g"
+    umbracast evaluate --mode "$modes" "$@" --json --quiet >"$scratch/$name/scores.json"
 }
 
-scored 00-orca --scenes "$scenes" --preset orca-03
+score plain --scenes "$scenes" --preset orca-03
 for kind in bag phone pockets child wheelchair; do
-    scored "10-$kind" --scenes "$scenes" --preset orca-03 --bodies "$kind"
+    score "$kind" --scenes "$scenes" --preset orca-03 --bodies "$kind"
 done
-for clip in 01 02; do
-    scored "11-cmu-$clip" --scenes "$scenes" --preset orca-03 --bodies cmu-walk \
-        --gait "$UMBRACAST_DATA/cmu_walk/scaled_131_$clip.bvh"
-done
+score cmu-walk --scenes "$scenes" --preset orca-03 --bodies cmu-walk \
+    --gait "$UMBRACAST_DATA/cmu_walk/scaled_131_01.bvh"
 walkers="$UMBRACAST_DATA/circle_antipode"
-scored 20-antipode --unit cm --fps 25 --trajectories "$walkers/circle-10m-08-2.txt" \
-    "$walkers/circle-10m-16-2.txt" "$walkers/circle-10m-32-2x.txt" "$walkers/circle-10m-64-2x.txt"
-scored 30-pedpy --seconds 20 --trajectories "$UMBRACAST_DATA/pedpy/traj_UNI_CORR_500_01.txt" \
+score antipode --unit cm --fps 25 --trajectories "$walkers/circle-10m-08-2.txt" "$walkers/circle-10m-16-2.txt" \
+    "$walkers/circle-10m-32-2x.txt" "$walkers/circle-10m-64-2x.txt"
+# The corridor fills and empties; of the bottleneck the part in which people wait and push through.
+score pedpy --seconds 20 --trajectories "$UMBRACAST_DATA/pedpy/traj_UNI_CORR_500_01.txt" \
     "$UMBRACAST_DATA/pedpy/030_c_56_h0.txt"
-scored 40-madras --trajectories "$UMBRACAST_DATA/madras/Topview_1A.csv" \
-    "$UMBRACAST_DATA/madras/Topview_1C.csv" "$UMBRACAST_DATA/madras/Topview_2F.csv"
-
-printf '\n$ sets_table scores of all of these\n' >>"$file"
-xargs "$bin/examples/sets_table" <"$out/order" >>"$file"
-echo "$file"
+score madras --trajectories "$UMBRACAST_DATA/madras/Topview_1A.csv" "$UMBRACAST_DATA/madras/Topview_1C.csv" \
+    "$UMBRACAST_DATA/madras/Topview_2F.csv"
+echo
+umbracast compare "${reports[@]}"

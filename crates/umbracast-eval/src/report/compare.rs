@@ -29,8 +29,12 @@ pub struct Row {
     pub position_m: Option<f64>,
     /// The same of the velocity, metres a second.
     pub velocity_mps: Option<f64>,
+    /// Mean displacement of the forecast at 900 ms, metres.
+    pub displacement_m: Option<f64>,
     /// F1 at 300 ms by access point.
     pub f1: Vec<(String, Option<f64>)>,
+    /// The same over links in sight when it was said.
+    pub onset_f1: Vec<(String, Option<f64>)>,
     /// Scans of sensors that were not there.
     pub scans_missing: u64,
 }
@@ -61,6 +65,7 @@ struct Links {
 struct Window {
     w: usize,
     f1: Score,
+    onset_f1: Score,
 }
 
 #[derive(Deserialize)]
@@ -72,6 +77,7 @@ struct Stage1 {
     switches_per_scene: Score,
     position_rmse_m: Score,
     velocity_rmse_mps: Score,
+    displacement_m: Vec<Score>,
     health: Health,
 }
 
@@ -99,9 +105,12 @@ pub fn rows(name: &str, scores_json: &[u8]) -> Result<Vec<Row>, Error> {
 
 fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
     let own = |links: &&Links| links.mode == Some(scores.mode) && links.predictor == Predictor::Run.name();
-    let at_300_ms = |links: &Links| {
-        let f1 = links.windows.iter().find(|window| window.w == 3).and_then(|window| window.f1.value);
-        (links.access_point.clone(), f1)
+    let at_300_ms = |score: fn(&Window) -> &Score| {
+        let of = |links: &Links| {
+            let window = links.windows.iter().find(|window| window.w == 3);
+            (links.access_point.clone(), window.and_then(|window| score(window).value))
+        };
+        group.links.iter().filter(own).map(of).collect()
     };
     Row {
         name: name.to_owned(),
@@ -114,7 +123,9 @@ fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
         switches: scores.switches_per_scene.value,
         position_m: scores.position_rmse_m.value,
         velocity_mps: scores.velocity_rmse_mps.value,
-        f1: group.links.iter().filter(own).map(at_300_ms).collect(),
+        displacement_m: scores.displacement_m.last().and_then(|score| score.value),
+        f1: at_300_ms(|window| &window.f1),
+        onset_f1: at_300_ms(|window| &window.onset_f1),
         scans_missing: scores.health.sensors_missing,
     }
 }
@@ -138,19 +149,23 @@ pub fn table(rows: &[Row]) -> Table {
         "switches",
         "position, m",
         "velocity, m/s",
+        "900 ms, m",
     ];
-    let mut table = Table::new("Detection, tracking, and F1 of blockage within 300 ms", 3, &header);
+    let title = "Detection, tracking, displacement of the forecast, and F1 of blockage within 300 ms";
+    let mut table = Table::new(title, 3, &header);
     table.header.extend(access_points.iter().map(|name| format!("F1 {name}")));
+    table.header.extend(access_points.iter().map(|name| format!("onset {name}")));
     table.header.push("scans missing".to_owned());
     for row in rows {
         let mut cells = vec![row.name.clone(), row.group.clone(), row.mode.name().to_owned()];
         cells.push(row.scenes.to_string());
         cells.extend([row.recall, row.mota, row.idf1].map(|score| number(score, 3)));
         cells.push(number(row.switches, 2));
-        cells.extend([row.position_m, row.velocity_mps].map(|score| number(score, 3)));
-        for name in &access_points {
-            let f1 = row.f1.iter().find(|(own, _)| own == name).and_then(|(_, f1)| *f1);
-            cells.push(number(f1, 3));
+        let metres = [row.position_m, row.velocity_mps, row.displacement_m];
+        cells.extend(metres.map(|score| number(score, 3)));
+        for scores in [&row.f1, &row.onset_f1] {
+            let of = |name: &&str| scores.iter().find(|(own, _)| own == name).and_then(|(_, f1)| *f1);
+            cells.extend(access_points.iter().map(|name| number(of(name), 3)));
         }
         cells.push(row.scans_missing.to_string());
         table.rows.push(cells);
