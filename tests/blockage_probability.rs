@@ -4,7 +4,7 @@ use umbracast::blockage::{Blockage, Caster};
 use umbracast::config::{ArmsConfig, SliceConfig};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
-use umbracast::track::{Observed, Track};
+use umbracast::track::{Gait, Observed, Track};
 use umbracast::{Config, STEP_S, STEPS};
 
 const HEIGHT_M: f64 = 1.75;
@@ -51,6 +51,7 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         heading_sigma_rad: 0.0,
         height_m: HEIGHT_M,
         height_sigma_m: 0.0,
+        gait: Gait::UNKNOWN,
         points: 30,
         confirmed: true,
         aabb,

@@ -14,9 +14,6 @@ const HIP_SHARE: f64 = 0.53;
 const FULL_SWAY_HZ: f64 = 0.5;
 /// Gaits are known up to here: 2 m/s.
 const FASTEST_HZ: f64 = 2.0;
-/// Stride over sqrt(speed x height), sqrt(s), by the same source.
-const STRIDE: f64 = 0.98;
-
 /// How one body stands or walks at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Posture {
@@ -45,11 +42,6 @@ impl Posture {
     fn relative_speed_hz(&self) -> f64 {
         (self.speed_mps / (HIP_SHARE * self.height_m)).min(FASTEST_HZ)
     }
-}
-
-/// Length of a stride; the phase advances with the way walked.
-pub fn stride_m(speed_mps: f64, height_m: f64) -> f64 {
-    STRIDE * (speed_mps * height_m).sqrt()
 }
 
 /// True when the segment meets the body; touching counts.

@@ -3,7 +3,7 @@
 //! every sample. Steps of a window, and links that share a blocker, hang together as they do in reality.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::body::{self, Posture, distance2_to_segment};
 use super::caster::{heading_at, position_at};
@@ -13,6 +13,7 @@ use crate::forecast::Forecast;
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
 use crate::track::Track;
+use crate::track::gait::{self, Gait};
 use crate::{STEP_S, STEPS};
 
 /// Below this speed a velocity says little about where somebody faces.
@@ -186,11 +187,12 @@ impl Ways {
         let means: [DVec2; STEPS + 1] = std::array::from_fn(|s| position_at(track, forecast, s));
         self.ahead = std::array::from_fn(|s| DVec2::from_angle(heading_at(track, forecast, s)));
         let velocity = track.velocity_mps;
+        let phases = Phases::new(&track.gait);
         for k in 0..samples {
             let e: [f64; 4] =
                 std::array::from_fn(|r| (0..=r).map(|c| state_root[r][c] * draws.state[c][k]).sum());
             let (mut offset, mut drift) = (DVec2::new(e[0], e[1]), DVec2::new(e[2], e[3]));
-            self.traits.push(Traits::new(config, draws, k, track, velocity, drift));
+            self.traits.push(Traits::new(config, draws, k, track, velocity, drift, &phases));
             for (s, &mean_m) in means.iter().enumerate() {
                 if s > 0 {
                     let [x, y] = &draws.kicks[s - 1];
@@ -237,6 +239,7 @@ impl Traits {
         track: &Track,
         velocity: DVec2,
         drift: DVec2,
+        phases: &Phases,
     ) -> Self {
         let height_sigma_m = track.height_sigma_m.hypot(config.height_sigma_m);
         let height_m = (track.height_m + height_sigma_m * draws.height[k]).max(0.5);
@@ -248,16 +251,51 @@ impl Traits {
         } else {
             track.heading_sigma_rad.hypot(trunk_rad) * draws.heading[k]
         };
-        let stride_m = body::stride_m(speed_mps, height_m);
+        let stride_m = gait::stride_m(speed_mps, height_m);
         Self {
             turn: DVec2::from_angle(turn_rad),
             height_m,
             girth: (1.0 + config.size_sigma_share * draws.girth[k]).clamp(0.5, 1.8),
             speed_mps,
-            phase_rad: TAU * draws.phase[k],
+            phase_rad: phases.at(draws.phase[k]),
             phase_step_rad: if stride_m > 0.0 { TAU * speed_mps * STEP_S / stride_m } else { 0.0 },
             swing: if draws.swing[k] < config.body.arms.still_share { 0.0 } else { 1.0 },
         }
+    }
+}
+
+/// Quantiles of the phase of a gait.
+struct Phases {
+    first_rad: f64,
+    /// Share of the phases up to each of so many equal steps of a turn, the first from opposite the likeliest phase.
+    shares: [f64; PHASES],
+}
+
+const PHASES: usize = 48;
+
+impl Phases {
+    /// Of a von Mises distribution.
+    fn new(gait: &Gait) -> Self {
+        let width_rad = TAU / PHASES as f64;
+        let density = |i: usize| {
+            let off_rad = (i as f64 + 0.5) * width_rad - PI;
+            (gait.concentration * (off_rad.cos() - 1.0)).exp()
+        };
+        let total: f64 = (0..PHASES).map(density).sum();
+        let mut sum = 0.0;
+        let shares = std::array::from_fn(|i| {
+            sum += density(i) / total;
+            sum
+        });
+        Self { first_rad: gait.phase_rad - PI, shares }
+    }
+
+    /// The phase below which a share of them lies.
+    fn at(&self, share: f64) -> f64 {
+        let i = self.shares.partition_point(|&up_to| up_to < share).min(PHASES - 1);
+        let below = if i == 0 { 0.0 } else { self.shares[i - 1] };
+        let within = (share - below) / (self.shares[i] - below).max(f64::MIN_POSITIVE);
+        self.first_rad + TAU / PHASES as f64 * (i as f64 + within)
     }
 }
 

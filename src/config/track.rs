@@ -82,6 +82,8 @@ pub struct TrackConfig {
     pub height_sigma_m: f64,
     /// Time over which the width of a box is averaged.
     pub box_average_s: f64,
+    /// Time over which the sway of a walking trunk is remembered; 0: not looked for.
+    pub sway_memory_s: f64,
 }
 
 /// Which instant a detection is taken to be measured at.

@@ -162,6 +162,7 @@ mod tests {
             heading_sigma_rad: 0.0,
             height_m: 1.75,
             height_sigma_m: 0.0,
+            gait: crate::track::Gait::UNKNOWN,
             points: 30,
             confirmed: true,
             aabb: Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE },

@@ -4,9 +4,11 @@ pub mod kalman;
 pub mod association;
 pub mod visibility;
 mod height;
+pub mod gait;
 mod person;
 pub mod tracker;
 
+pub use gait::Gait;
 pub use tracker::Tracker;
 
 use std::collections::VecDeque;
@@ -36,6 +38,8 @@ pub struct Track {
     pub height_m: f64,
     /// One standard deviation of `height_m`.
     pub height_sigma_m: f64,
+    /// Where in the stride, as the sway of the trunk tells it.
+    pub gait: Gait,
     /// Points of this frame's detection; 0 while it coasts.
     pub points: u32,
     /// False until the track has been seen often enough to be believed, and while it has been out of sight so long

@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use super::gait::Sway;
 use super::height::Height;
 use super::kalman::{Filter, Mat2, State};
 use super::visibility::{Body, View};
@@ -46,6 +47,7 @@ pub(super) struct Person {
     /// When the track was last given out.
     given_ns: i64,
     height: Height,
+    sway: Sway,
     /// The last detection's boxes, moved so that the detection's position is at the origin.
     aabb: Aabb,
     obb: Obb,
@@ -71,6 +73,7 @@ impl Person {
             heading_variance_rad2: ANY_HEADING_RAD2,
             given_ns: time_ns,
             height: Height::new(config.height_mean_m, config.height_sigma_m),
+            sway: Sway::new(config.sway_memory_s),
             aabb: Aabb::EMPTY,
             obb: Obb::from_aabb(&Aabb::EMPTY),
             extent_m: DVec2::splat(WIDTH_M),
@@ -81,6 +84,13 @@ impl Person {
     }
 
     /// The frame's detection of this person, `after_s` after the last frame; the filter stands at it.
+    /// Carries the person on.
+    pub(super) fn predict(&mut self, config: &TrackConfig, step_s: f64) {
+        let speed_mps = self.filter.state().velocity_mps().length();
+        self.sway.advance(speed_mps, self.height.mean_m(), step_s);
+        self.filter.predict(config, step_s);
+    }
+
     pub(super) fn hit(
         &mut self,
         config: &TrackConfig,
@@ -89,7 +99,12 @@ impl Person {
         time_ns: i64,
         step_s: f64,
     ) {
-        self.filter.correct(detection.position_m, detection.z_m, noise(config, detection));
+        let state = self.filter.state();
+        let left = state.velocity_mps().perp().normalize_or_zero();
+        let sway_m = self.sway.left_m();
+        self.sway.see(left.dot(detection.position_m - state.position_m()), state.velocity_mps().length());
+        let position_m = detection.position_m - left * sway_m;
+        self.filter.correct(position_m, detection.z_m, noise(config, detection));
         let there = self.existence * config.hit_ratio;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.hits += 1;
@@ -152,6 +167,7 @@ impl Person {
             heading_sigma_rad: self.heading_variance_rad2.sqrt(),
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
+            gait: self.sway.gait(),
             points: self.points,
             confirmed: self.confirmed && largest_sigma(state.position_covariance()) < config.told_sigma_max_m,
             aabb,

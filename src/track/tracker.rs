@@ -139,12 +139,12 @@ impl Tracker {
         for (p, (given, expected)) in given.iter().zip(expected).enumerate() {
             let at_ns = given.map_or(time_ns, |d| self.measured_ns(detections[d], last_ns, time_ns));
             let (config, person) = (&self.config, &mut self.people[p]);
-            person.filter.predict(config, seconds(last_ns, at_ns));
+            person.predict(config, seconds(last_ns, at_ns));
             match given {
                 Some(d) => person.hit(config, detections[*d], &expected.view, time_ns, step_s),
                 None => person.missed(expected.detection_probability, step_s),
             }
-            person.filter.predict(config, seconds(at_ns, time_ns));
+            person.predict(config, seconds(at_ns, time_ns));
         }
     }
 

@@ -7,7 +7,7 @@ use umbracast::blockage::Caster;
 use umbracast::config::{BlockageConfig, BlockageMethod, BoxKind};
 use umbracast::forecast::{Coupling, Forecast, Forecaster, Gaussian2, Weights, constant_velocity};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
-use umbracast::track::{OBSERVED, Observed, Track};
+use umbracast::track::{Gait, OBSERVED, Observed, Track};
 use umbracast::{Config, Error, STEP_S, STEPS};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
@@ -141,7 +141,8 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, heading_
     let (heading_rad, heading_sigma_rad) =
         if walks { (track.velocity_mps.to_angle(), 0.0) } else { (own.heading_rad, own.heading_sigma_rad) };
     let (height_m, height_sigma_m) = (own.height_m, own.height_sigma_m);
-    Track { heading_rad, heading_sigma_rad, height_m, height_sigma_m, ..track }
+    let gait = track_of(own).gait;
+    Track { heading_rad, heading_sigma_rad, height_m, height_sigma_m, gait, ..track }
 }
 
 /// A track at the true positions of its person, now and at every step. The present is moved as well: a body
@@ -189,6 +190,7 @@ pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb))
         heading_sigma_rad: 0.0,
         height_m: row.height_m,
         height_sigma_m: 0.0,
+        gait: Gait::UNKNOWN,
         points: row.returns,
         confirmed: true,
         aabb,
@@ -242,6 +244,7 @@ fn track_of(row: &TrackRow) -> Track {
         heading_sigma_rad: row.heading_sigma_rad,
         height_m: row.height_m,
         height_sigma_m: row.height_sigma_m,
+        gait: Gait { phase_rad: row.gait_phase_rad, concentration: row.gait_concentration },
         points: row.points,
         confirmed: row.confirmed,
         aabb,

@@ -15,6 +15,7 @@ pub mod identity;
 pub mod stage1;
 pub mod displacement;
 pub mod links;
+pub mod times;
 pub mod casts;
 pub mod true_bodies;
 pub mod score;

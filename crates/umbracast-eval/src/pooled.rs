@@ -10,6 +10,7 @@ use crate::ladder::{self, LadderRow, SceneLadder};
 use crate::score::{Predictor, SceneScore};
 use crate::stage1::Stage1;
 use crate::tally::{Bin, Counts, LinkTally};
+use crate::times::{TimeTally, Times};
 
 /// The group of all scenes, where there are several presets.
 pub const ALL: &str = "all";
@@ -132,8 +133,34 @@ pub struct ModeScores {
     pub nll: Vec<Option<f64>>,
     /// Shares within the 50 and the 90 % region by step.
     pub coverage: Vec<Option<[f64; 2]>>,
+    /// When links are blocked and clear again, one an access point, in the site's order.
+    pub times: Vec<[TimeScores; 2]>,
     /// What was skipped, all scenes.
     pub health: Health,
+}
+
+/// Times told by their quantiles: of the onset of a blockage, or of its end.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TimeScores {
+    /// Links of which a time was told.
+    pub told: u64,
+    /// Share of them between the 10 and the 90 % quantile.
+    pub coverage: Option<f64>,
+    /// Mean size of the 50 % quantile's error, seconds.
+    pub mean_error_s: Option<f64>,
+    /// The middle one.
+    pub median_error_s: Option<f64>,
+}
+
+impl TimeScores {
+    fn of(tally: &TimeTally) -> Self {
+        Self {
+            told: tally.told,
+            coverage: tally.coverage(),
+            mean_error_s: tally.mean_error_s(),
+            median_error_s: tally.median_error_s(),
+        }
+    }
 }
 
 /// The scores of a run in memory, ladder and all.
@@ -277,8 +304,13 @@ fn mode_scores(bootstrap: &Bootstrap, scenes: &[&SceneScore], m: usize) -> ModeS
     let of_tracks = |score: fn(&Stage1) -> Option<f64>| stage1.estimate(score);
     let mut health = Health::default();
     scenes.iter().for_each(|scene| health.add(&scene.modes[m].health));
+    let times = |a: usize| {
+        let pooled = Times::pooled(scenes.iter().filter_map(|scene| scene.modes[m].times.get(a)));
+        [&pooled.onset, &pooled.duration].map(TimeScores::of)
+    };
     ModeScores {
         mode: scenes[0].modes[m].mode,
+        times: (0..scenes[0].modes[m].times.len()).map(times).collect(),
         recall: of_tracks(Stage1::recall),
         precision: of_tracks(Stage1::precision),
         mota: of_tracks(Stage1::mota),

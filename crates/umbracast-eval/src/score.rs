@@ -17,6 +17,7 @@ use crate::matching::match_scene;
 use crate::scene::{SceneRun, SceneTruth, TruthIndex};
 use crate::stage1::Stage1;
 use crate::tally::{LinkTally, Prediction};
+use crate::times::Times;
 use crate::true_bodies::true_bodies;
 
 /// Who predicts.
@@ -82,6 +83,8 @@ pub struct ModeSums {
     pub stage1: Stage1,
     /// Forecasts.
     pub displacement: Displacement,
+    /// When links are blocked and clear again, one an access point.
+    pub times: Vec<Times>,
     /// What was skipped.
     pub health: Health,
 }
@@ -169,6 +172,7 @@ pub fn score_scene(
             mode: config.mode,
             stage1: Stage1::of(&truth.people, &rows.tracks),
             displacement: Displacement::of(&index, forecast),
+            times: Times::each(&index, &instances, rows, &matching, site_access_points),
             health: *health,
         });
     }

@@ -57,6 +57,8 @@ pub struct TrackRow {
     pub heading_sigma_rad: f64,
     pub height_m: f64,
     pub height_sigma_m: f64,
+    pub gait_phase_rad: f64,
+    pub gait_concentration: f64,
     pub points: u32,
     pub confirmed: bool,
     /// min x y z, max x y z.
@@ -81,6 +83,10 @@ pub struct LinkRow {
     pub blocked: [bool; STEPS],
     /// Windows 1..=9.
     pub p: [f64; STEPS],
+    /// 10, 50 and 90 % quantiles of the time until the link is blocked; null where it is now or not within the steps.
+    pub onset_s: [Option<f64>; 3],
+    /// The same of the time until the link is clear; null where it is now or not within the steps.
+    pub duration_s: [Option<f64>; 3],
 }
 
 /// The rows of one outcome.
@@ -99,6 +105,8 @@ pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, lin
         p_now: b.p_now,
         blocked: b.blocked,
         p: b.p,
+        onset_s: b.onset_s,
+        duration_s: b.duration_s,
     }));
 }
 
@@ -122,6 +130,8 @@ pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
         heading_sigma_rad: track.heading_sigma_rad,
         height_m: track.height_m,
         height_sigma_m: track.height_sigma_m,
+        gait_phase_rad: track.gait.phase_rad,
+        gait_concentration: track.gait.concentration,
         points: track.points,
         confirmed: track.confirmed,
         aabb_m: [lo.x, lo.y, lo.z, hi.x, hi.y, hi.z],

@@ -106,6 +106,7 @@ fn tables(scores: &Scores, context: &Context) -> Vec<Table> {
     let every_window: Vec<usize> = (1..=umbracast::STEPS).collect();
     all.extend(group.access_points().into_iter().map(|ap| tables::boxes(group, ap, &every_window)));
     all.extend([tables::tracking(group), tables::displacement(group), tables::figures_by_preset(scores)]);
+    all.push(tables::times(group));
     for access_point in group.access_points() {
         all.push(tables::baselines(group, access_point));
         all.push(tables::budget(group, access_point));

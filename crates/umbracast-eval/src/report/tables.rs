@@ -240,6 +240,34 @@ pub fn baselines(group: &Group, access_point: &str) -> Table {
     )
 }
 
+/// When a link is blocked and when it is clear again, of every mode that tells it.
+pub fn times(group: &Group) -> Table {
+    let header =
+        ["mode", "access point", "time until", "links", "in 10 to 90 %", "median error, s", "mean error, s"];
+    let mut table = Table::new("Time to blockage and its duration", 3, &header);
+    for mode in &group.modes {
+        for (access_point, both) in group.access_points().into_iter().zip(&mode.times) {
+            for (until, scores) in ["blocked", "clear"].into_iter().zip(both).filter(|(_, s)| s.told > 0) {
+                table.rows.push(vec![
+                    mode.mode.name().to_owned(),
+                    access_point.to_owned(),
+                    until.to_owned(),
+                    scores.told.to_string(),
+                    number(scores.coverage, 3),
+                    number(scores.median_error_s, 2),
+                    number(scores.mean_error_s, 2),
+                ]);
+            }
+        }
+    }
+    table.noted(
+        "Of links in sight, the time until they are blocked; of blocked ones, until they are clear. Links: those \
+         with a chance of 10 % or more that it happens within 900 ms. Share of them between the 10 and the 90 % \
+         quantile (times are whole steps of 100 ms, so more than 80 %), and the error of the 50 % quantile where it \
+         happened.",
+    )
+}
+
 /// Each stage replaced by the truth, at one access point.
 pub fn budget(group: &Group, access_point: &str) -> Table {
     let shown = [Predictor::Run, Predictor::TrueState, Predictor::TrueFuture, Predictor::TrueBody];

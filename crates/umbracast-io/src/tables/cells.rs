@@ -34,6 +34,8 @@ pub enum Cell<'a> {
     Bool(&'a mut bool),
     /// Yes, no or null.
     MaybeBool(&'a mut Option<bool>),
+    /// A measure or null.
+    MaybeF64(&'a mut Option<f64>),
     /// Index of an access point; its name in the file.
     AccessPoint(&'a mut u32),
 }
@@ -139,6 +141,8 @@ impl Row for TrackRow {
         see(plain("heading_sigma_rad"), Cell::F64(&mut self.heading_sigma_rad));
         see(plain("height_m"), Cell::F64(&mut self.height_m));
         see(plain("height_sigma_m"), Cell::F64(&mut self.height_sigma_m));
+        see(plain("gait_phase_rad"), Cell::F64(&mut self.gait_phase_rad));
+        see(plain("gait_concentration"), Cell::F64(&mut self.gait_concentration));
         see(plain("points"), Cell::U32(&mut self.points));
         see(plain("confirmed"), Cell::Bool(&mut self.confirmed));
         for (name, value) in AABB.into_iter().zip(&mut self.aabb_m) {
@@ -171,6 +175,11 @@ impl Row for LinkRow {
         see(plain("p_now"), Cell::F64(&mut self.p_now));
         for w in 1..=STEPS {
             see(Name("p_w", Some(w), ""), Cell::F64(&mut self.p[w - 1]));
+        }
+        for (name, quantiles) in [("onset_p", &mut self.onset_s), ("duration_p", &mut self.duration_s)] {
+            for (percent, value) in [10, 50, 90].into_iter().zip(quantiles) {
+                see(Name(name, Some(percent), "_s"), Cell::MaybeF64(value));
+            }
         }
     }
 }

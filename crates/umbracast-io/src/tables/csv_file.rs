@@ -39,7 +39,8 @@ impl CsvFile {
                     Cell::I64(v) => write!(text, "{v},"),
                     Cell::F64(v) => write!(text, "{v},"),
                     Cell::Bool(v) | Cell::MaybeBool(Some(v)) => write!(text, "{v},"),
-                    Cell::MaybeBool(None) => write!(text, ","),
+                    Cell::MaybeF64(Some(v)) => write!(text, "{v},"),
+                    Cell::MaybeBool(None) | Cell::MaybeF64(None) => write!(text, ","),
                     Cell::AccessPoint(v) => write!(text, "{},", self.access_points[*v as usize]),
                 };
             });

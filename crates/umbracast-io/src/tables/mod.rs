@@ -218,6 +218,7 @@ mod tests {
                 Cell::F64(v) => *v = f64::from(counter) / 3.0,
                 Cell::Bool(v) => *v = counter.is_multiple_of(3),
                 Cell::MaybeBool(v) => *v = [None, Some(false), Some(true)][counter as usize % 3],
+                Cell::MaybeF64(v) => *v = (!counter.is_multiple_of(3)).then(|| f64::from(counter) / 3.0),
                 Cell::AccessPoint(v) => *v = counter % 2,
             }
         };
@@ -254,9 +255,9 @@ mod tests {
             assert_eq!(names[..3], keys);
         }
         let links = columns::<LinkRow>();
-        assert_eq!(links.len(), 3 + 2 + 2 * (1 + STEPS));
+        assert_eq!(links.len(), 3 + 2 + 2 * (1 + STEPS) + 2 * 3);
         assert!(
-            ["blocked_now", "blocked_w1", "blocked_w9", "p_now", "p_w9"]
+            ["blocked_now", "blocked_w1", "blocked_w9", "p_now", "p_w9", "onset_p10_s", "duration_p90_s"]
                 .iter()
                 .all(|c| links.contains(&(*c).into()))
         );

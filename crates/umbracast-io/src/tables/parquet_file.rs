@@ -157,12 +157,12 @@ fn fields_of<R: Row>() -> Vec<Field> {
             Cell::U32(_) => (Physical::INT32, unsigned(32)),
             Cell::U64(_) => (Physical::INT64, unsigned(64)),
             Cell::I64(_) => (Physical::INT64, None),
-            Cell::F64(_) => (Physical::DOUBLE, None),
+            Cell::F64(_) | Cell::MaybeF64(_) => (Physical::DOUBLE, None),
             Cell::Bool(_) | Cell::MaybeBool(_) => (Physical::BOOLEAN, None),
             Cell::AccessPoint(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         };
         let needed = match cell {
-            Cell::MaybeBool(_) => Repetition::OPTIONAL,
+            Cell::MaybeBool(_) | Cell::MaybeF64(_) => Repetition::OPTIONAL,
             _ => Repetition::REQUIRED,
         };
         fields.push((name.to_string(), physical, logical, needed));
@@ -201,6 +201,7 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
             Cell::F64(_) => Column::Double(Vec::new()),
             Cell::Bool(_) => Column::Bool(Vec::new()),
             Cell::MaybeBool(_) => Column::MaybeBool(Vec::new(), Vec::new()),
+            Cell::MaybeF64(_) => Column::MaybeDouble(Vec::new(), Vec::new()),
             Cell::AccessPoint(_) => Column::Text(Vec::new()),
         });
     });
@@ -215,6 +216,10 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
             (Some(Column::Double(values)), Cell::F64(v)) => values.push(*v),
             (Some(Column::Bool(values)), Cell::Bool(v)) => values.push(*v),
             (Some(Column::MaybeBool(values, there)), Cell::MaybeBool(v)) => {
+                values.extend(*v);
+                there.push(i16::from(v.is_some()));
+            }
+            (Some(Column::MaybeDouble(values, there)), Cell::MaybeF64(v)) => {
                 values.extend(*v);
                 there.push(i16::from(v.is_some()));
             }
@@ -289,6 +294,8 @@ impl Value {
             (Cell::Bool(to), Self::Truth(v)) => *to = v,
             (Cell::MaybeBool(to), Self::Truth(v)) => *to = Some(v),
             (Cell::MaybeBool(to), _) => *to = None,
+            (Cell::MaybeF64(to), Self::Real(v)) => *to = Some(v),
+            (Cell::MaybeF64(to), _) => *to = None,
             _ => {}
         }
     }
@@ -305,7 +312,7 @@ fn read_column(
     let at = columns.iter().position(|c| c.column_path().string() == name);
     let expected = match cell {
         Cell::U32(_) | Cell::U64(_) | Cell::I64(_) => "whole numbers",
-        Cell::F64(_) => "real numbers",
+        Cell::F64(_) | Cell::MaybeF64(_) => "real numbers",
         Cell::Bool(_) | Cell::MaybeBool(_) => "true or false",
         Cell::AccessPoint(_) => "names of access points",
     };
@@ -322,8 +329,10 @@ fn read_column(
         (ColumnReader::Int64ColumnReader(r), Cell::U32(_) | Cell::U64(_) | Cell::I64(_)) => {
             values(r, count, |&v: &i64| whole(v))
         }
-        (ColumnReader::DoubleColumnReader(r), Cell::F64(_)) => values(r, count, |&v: &f64| Value::Real(v)),
-        (ColumnReader::FloatColumnReader(r), Cell::F64(_)) => {
+        (ColumnReader::DoubleColumnReader(r), Cell::F64(_) | Cell::MaybeF64(_)) => {
+            values(r, count, |&v: &f64| Value::Real(v))
+        }
+        (ColumnReader::FloatColumnReader(r), Cell::F64(_) | Cell::MaybeF64(_)) => {
             values(r, count, |&v: &f32| Value::Real(f64::from(v)))
         }
         (ColumnReader::BoolColumnReader(r), Cell::Bool(_) | Cell::MaybeBool(_)) => {
@@ -354,9 +363,10 @@ fn read_column(
     if let Some(row) = values.iter().position(|value| !fits(value)) {
         return Err(Error::new(format!("row {row}: expected 0 to {}, found {:?}", u32::MAX, values[row])));
     }
-    if let (Some(row), false) =
-        (values.iter().position(|v| matches!(v, Value::Null)), matches!(cell, Cell::MaybeBool(_)))
-    {
+    if let (Some(row), false) = (
+        values.iter().position(|v| matches!(v, Value::Null)),
+        matches!(cell, Cell::MaybeBool(_) | Cell::MaybeF64(_)),
+    ) {
         return Err(Error::new(format!("row {row}: expected {expected}, found null")));
     }
     if values.len() != count {
