@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use crate::config::{ArmsConfig, BodyConfig};
+use crate::config::{ArmsConfig, BodyConfig, SliceConfig};
 use crate::geometry::{DVec2, DVec3};
 
 /// The hip joint above the floor, share of the height. Gait goes by speed over it (Boulic and Thalmann 1990).
@@ -40,8 +40,13 @@ impl Posture {
     }
 
     fn relative_speed_hz(&self) -> f64 {
-        (self.speed_mps / (HIP_SHARE * self.height_m)).min(FASTEST_HZ)
+        relative_speed_hz(self.speed_mps, self.height_m)
     }
+}
+
+/// Speed over the height of the hips.
+fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
+    (speed_mps / (HIP_SHARE * height_m)).min(FASTEST_HZ)
 }
 
 /// True when the segment meets the body; touching counts.
@@ -51,32 +56,63 @@ pub fn blocks(body: &BodyConfig, posture: &Posture, start_m: DVec3, end_m: DVec3
         DVec3::new(posture.ahead.dot(from_axis), posture.ahead.perp_dot(from_axis), v.z)
     };
     let (start, end) = (local(start_m), local(end_m));
-    let h = posture.height_m;
-    let nearest_m2 = distance2_to_segment(DVec2::ZERO, start.truncate(), end.truncate());
-    if nearest_m2 > (body.reach * h * posture.girth.max(1.0)).powi(2) || start.z.min(end.z) > h {
+    let (h, speed_hz) = (posture.height_m, posture.relative_speed_hz());
+    let along_m = end.truncate() - start.truncate();
+    let along_m2 = along_m.length_squared().max(f64::MIN_POSITIVE);
+    let nearest = (-start.truncate().dot(along_m) / along_m2).clamp(0.0, 1.0);
+    let nearest_m = (start.truncate() + along_m * nearest).length();
+    let reach_m = reach_m(body, h, posture.girth, posture.speed_mps);
+    if nearest_m > reach_m {
         return false;
     }
-    let speed_hz = posture.relative_speed_hz();
+    // The lowest point of the ray where it is over the body.
+    let within = reach_m / along_m2.sqrt();
+    let z_at = |share: f64| start.z + share.clamp(0.0, 1.0) * (end.z - start.z);
+    let lowest_m = z_at(nearest - within).min(z_at(nearest + within));
+    if lowest_m > h {
+        return false;
+    }
     // The trunk rides over the foot that stands: to the left while the left one does.
     let sway_m = -body.sway * h * sway_share(speed_hz) * (posture.phase_rad - 0.2 * PI).sin();
     let mut bottom_m = 0.0;
     for slice in &body.slices {
+        let top_m = slice.top * h;
         let cylinder = EllipticCylinder {
             center_m: DVec2::new(slice.ahead * h, sway_m),
             ahead: DVec2::X,
             half_depth_m: slice.half_depth * h * posture.girth,
             half_width_m: slice.half_width * h * posture.girth,
             bottom_m,
-            top_m: slice.top * h,
+            top_m,
         };
-        if cylinder.hit(start, end).is_some() {
+        bottom_m = top_m;
+        let far = nearest_m > slice_reach(body, slice, posture.girth) * h;
+        if !far && top_m >= lowest_m && cylinder.hit(start, end).is_some() {
             return true;
         }
-        bottom_m = cylinder.top_m;
+    }
+    let arms = &body.arms;
+    if lowest_m > (arms.shoulder_up + arms.upper_radius * posture.girth) * h {
+        return false;
     }
     let sway = DVec3::new(0.0, sway_m, 0.0);
-    arm_blocks(&body.arms, posture, speed_hz, -1.0, start - sway, end - sway)
-        || arm_blocks(&body.arms, posture, speed_hz, 1.0, start - sway, end - sway)
+    arm_blocks(arms, posture, speed_hz, -1.0, start - sway, end - sway)
+        || arm_blocks(arms, posture, speed_hz, 1.0, start - sway, end - sway)
+}
+
+/// No part of such a body is farther from its axis.
+pub fn reach_m(body: &BodyConfig, height_m: f64, girth: f64, speed_mps: f64) -> f64 {
+    let arms = &body.arms;
+    let hand_ahead = relative_speed_hz(speed_mps, height_m) * (arms.hand_ahead + arms.hand_swing).abs();
+    let out = arms.hand_out.max(arms.elbow_out).max(arms.shoulder_out);
+    let radius = arms.upper_radius.max(arms.fore_radius) * girth;
+    let arms_reach = (hand_ahead * hand_ahead + out * out).sqrt() + radius + body.sway;
+    height_m * body.slices.iter().fold(arms_reach, |far, slice| far.max(slice_reach(body, slice, girth)))
+}
+
+/// The same of a slice, as a share of the height.
+fn slice_reach(body: &BodyConfig, slice: &SliceConfig, girth: f64) -> f64 {
+    slice.half_depth.max(slice.half_width) * girth + slice.ahead.abs() + body.sway
 }
 
 /// Sway rises with the speed and stays (the source's published codes jump where this bends).

@@ -206,7 +206,8 @@ impl Ways {
         }
         self.height_max_m = self.traits.iter().fold(0.0, |a, b| a.max(b.height_m));
         let girth_max = self.traits.iter().fold(1.0, |a: f64, b| a.max(b.girth));
-        self.reach_m = config.body.reach * self.height_max_m * girth_max;
+        let fastest_mps = self.traits.iter().fold(0.0, |a: f64, b| a.max(b.speed_mps));
+        self.reach_m = body::reach_m(&config.body, self.height_max_m, girth_max, fastest_mps);
         for s in 0..=STEPS {
             let center = means[s];
             self.center_m[s] = center;

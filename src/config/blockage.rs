@@ -38,8 +38,6 @@ pub struct BodyConfig {
     pub slices: Vec<SliceConfig>,
     /// Side to side, half of the way that the trunk sways as it walks.
     pub sway: f64,
-    /// No part of the body is farther from its axis.
-    pub reach: f64,
     /// Left and right alike.
     pub arms: ArmsConfig,
 }

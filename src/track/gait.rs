@@ -15,6 +15,8 @@ const STRIDE: f64 = 0.98;
 const NOISE_M: f64 = 0.01;
 /// So many detections without sway are believed before any is seen.
 const DOUBT: f64 = 3.0;
+/// Half of a sway is believed whose phase is this concentrated.
+const BELIEVED_AT: f64 = 6.0;
 /// Who is slower may shift his weight, but not in strides.
 const WALKS_FROM_MPS: f64 = 0.3;
 /// The trunk is farthest to the left so long after the right heel touches the floor.
@@ -80,9 +82,11 @@ impl Sway {
         }
     }
 
-    /// How far to the left the trunk is now.
+    /// How far to the left the trunk is now, as far as that is known.
     pub fn left_m(&self) -> f64 {
-        2.0 * self.swing_m.x / (self.weight + DOUBT)
+        let concentration = self.gait().concentration;
+        let known = concentration / (concentration + BELIEVED_AT);
+        2.0 * self.swing_m.x / (self.weight + DOUBT) * known
     }
 
     /// What is known now.
