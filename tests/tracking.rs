@@ -10,6 +10,9 @@ use umbracast::lidar::{Cloud, Frame, Scan};
 use umbracast::track::{Track, Tracker};
 use umbracast::{Config, Mode, Site};
 
+/// What a detection tells of its error: one sigma of an axis.
+const NOISE_M: f64 = 0.06;
+
 /// People who walk straight on: where from, and how fast.
 type Walkers = [(DVec2, DVec2)];
 
@@ -27,7 +30,8 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         max_m: (position_m + DVec2::splat(0.25)).extend(1.7),
     };
     let obb = Obb::from_aabb(&aabb);
-    Detection { position_m, z_m: 0.9, time_ns, points: 30, whole: true, top_m: 1.7, aabb, obb }
+    let covariance_m2 = Some([[NOISE_M * NOISE_M, 0.0], [0.0, NOISE_M * NOISE_M]]);
+    Detection { position_m, covariance_m2, z_m: 0.9, time_ns, points: 30, whole: true, top_m: 1.7, aabb, obb }
 }
 
 /// The site without anything that could hide somebody.
@@ -261,9 +265,10 @@ fn the_order_of_detections_does_not_matter() {
 #[test]
 fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
     let mut config = Config::for_mode(Mode::Default).track;
-    (config.noise_floor_m, config.noise_per_point_m) = (0.05, 0.0);
+    (config.noise_floor_m, config.noise_per_point_m, config.noise_share) = (0.05, 0.0, 0.0);
+    (config.sway_left_m, config.sway_ahead_m) = (0.0, 0.0);
     // One model and a walker who keeps to it: nothing but the filter's own account is tested.
-    (config.acceleration_m2ps3, config.model_share) = (vec![1e-6], vec![1.0]);
+    (config.acceleration_m2ps3, config.model_share, config.standing_share) = (vec![1e-6], vec![1.0], 0.0);
     let walkers = [(DVec2::new(-6.0, 2.0), DVec2::new(1.2, -0.3))];
     let (mut sum, mut n) = (0.0, 0);
     for seed in 0..200 {
@@ -277,6 +282,48 @@ fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
     // Chi-square with 4 n degrees of freedom: its mean over n is 4 with a spread of sqrt(8 / n).
     let (mean, spread) = (sum / f64::from(n), (8.0 / f64::from(n)).sqrt());
     assert!((mean - 4.0).abs() < 1.96 * spread, "mean {mean}, band 4 +- {}", 1.96 * spread);
+}
+
+/// A body that sways 2 cm to each side, 0.92 times a second as somebody 1.75 m tall does at 1.4 m/s.
+#[test]
+fn the_sway_of_a_walking_body_is_not_taken_for_turns() {
+    let config = Config::for_mode(Mode::Default).track;
+    let rigid = TrackConfig { sway_left_m: 0.0, sway_ahead_m: 0.0, noise_share: 0.2, ..config.clone() };
+    let config = TrackConfig { noise_share: 0.05, ..config };
+    let worst_mps = |config: &TrackConfig| {
+        let mut tracker = Tracker::new(config, &open_site());
+        let mut tracks = Vec::new();
+        let mut worst_mps: f64 = 0.0;
+        for index in 0..80 {
+            let frame = frame(index);
+            let t_s = frame.time_ns as f64 * 1e-9;
+            let sway_m = 0.02 * (std::f64::consts::TAU * 0.92 * t_s).sin();
+            let at_m = DVec2::new(1.4 * t_s - 6.0, sway_m);
+            tracker.update(&frame, &[detection(at_m, frame.time_ns)], &mut tracks);
+            if index > 40 {
+                worst_mps = worst_mps.max(tracks[0].velocity_mps.y.abs());
+            }
+        }
+        worst_mps
+    };
+    let (followed, rigid) = (worst_mps(&config), worst_mps(&rigid));
+    assert!(followed < 0.015 && followed < 0.5 * rigid, "{followed} and {rigid} m/s");
+}
+
+#[test]
+fn the_heading_is_open_until_somebody_walks_and_again_with_the_time_one_stands() {
+    let config = Config::for_mode(Mode::Default).track;
+    let mut tracker = Tracker::new(&config, &open_site());
+    let (mut tracks, mut sigmas_rad) = (Vec::new(), Vec::new());
+    for index in 0..90 {
+        let frame = frame(index);
+        let walked_m = 0.12 * index.clamp(20, 60) as f64;
+        tracker.update(&frame, &[detection(DVec2::new(walked_m - 4.0, 0.0), frame.time_ns)], &mut tracks);
+        sigmas_rad.push(tracks[0].heading_sigma_rad);
+    }
+    assert!(sigmas_rad[15] > 1.0, "standing from the start: {}", sigmas_rad[15]);
+    assert!(sigmas_rad[59] < 0.1, "walking: {}", sigmas_rad[59]);
+    assert!(sigmas_rad[89] > 0.8, "stood for 3 s: {}", sigmas_rad[89]);
 }
 
 /// e' P^-1 e by elimination.

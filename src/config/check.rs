@@ -19,6 +19,7 @@ pub(super) fn check(config: &Config) -> Result<(), Error> {
         ("detect.background.azimuth_bin_deg", detect.background.azimuth_bin_deg),
         ("detect.split.lambda_m", detect.split.lambda_m),
         ("track.model_dwell_s", track.model_dwell_s),
+        ("track.sway_lasts_s", track.sway_lasts_s),
         ("track.noise_floor_m", track.noise_floor_m),
         ("track.height_sigma_m", track.height_sigma_m),
         ("track.box_average_s", track.box_average_s),

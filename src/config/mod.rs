@@ -119,6 +119,18 @@ impl Config {
         Self::with_overlay(Mode::ALL.into_iter().find(named).unwrap_or(Mode::Default), text, file)
     }
 
+    /// The site alone of a configuration that a run or a recording holds: the other settings come and go with
+    /// versions, and a recording is of use to all of them.
+    ///
+    /// # Errors
+    /// As [`Config::with_overlay`], of the site.
+    pub fn site_of_run(text: &str, file: &str) -> Result<Site, Error> {
+        let mut recorded: toml::Table =
+            toml::from_str(text).map_err(|e| Error::new(e.to_string()).within(file))?;
+        recorded.retain(|key, _| key == "site");
+        Ok(Self::with_overlay(Mode::Default, &recorded.to_string(), file)?.site)
+    }
+
     /// The same as TOML text, as every run writes it beside its output.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a configuration is plain data")
@@ -142,6 +154,18 @@ mod tests {
             assert_eq!(config.mode, mode);
             assert_eq!(Config::of_run(&config.to_toml(), "config.toml").unwrap(), config);
         }
+    }
+
+    #[test]
+    fn the_site_of_a_recording_outlives_settings_of_its_version() {
+        let mut config = Config::default();
+        config.site.name = "lab".to_owned();
+        let text = config.to_toml().replace("[track]", "[track]\nforgotten_setting = 1.0");
+        assert!(Config::of_run(&text, "config.toml").is_err());
+        assert_eq!(Config::site_of_run(&text, "config.toml").unwrap(), config.site);
+        let wrong = text.replace("height_m = 10.0", "height_m = \"high\"");
+        let message = Config::site_of_run(&wrong, "config.toml").unwrap_err().to_string();
+        assert!(message.contains("expected a number, found a string"), "{message}");
     }
 
     #[test]

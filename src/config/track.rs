@@ -14,14 +14,26 @@ pub struct TrackConfig {
     pub acceleration_m2ps3: Vec<f64>,
     /// How much of the time each motion model holds.
     pub model_share: Vec<f64>,
+    /// How much of the time people stand: with 0 there is no such model. The shares add up to 1.
+    pub standing_share: f64,
+    /// Velocity of who stands, one standard deviation of an axis.
+    pub standing_speed_mps: f64,
     /// How long a motion model lasts.
     pub model_dwell_s: f64,
+    /// How far a walking body sways to the left and right, one standard deviation.
+    pub sway_left_m: f64,
+    /// The same ahead and back.
+    pub sway_ahead_m: f64,
+    /// Time after which size and phase of the sway are forgotten.
+    pub sway_lasts_s: f64,
     /// `per-step`: added to the position's variance each frame.
     pub step_position_m2: f64,
     /// `per-step`: added to the velocity's variance each frame.
     pub step_velocity_m2ps2: f64,
     /// Follow the height of the points too.
     pub follow_z: bool,
+    /// How much of the variance that a detection tells of its position is no sway, which the filter follows.
+    pub noise_share: f64,
     /// Measurement noise of a detection with many points, one axis.
     pub noise_floor_m: f64,
     /// Measurement noise that falls with the square root of the points, one axis.
@@ -34,6 +46,8 @@ pub struct TrackConfig {
     pub birth_speed_mps: f64,
     /// Which spread a detection must lie within to belong to a track.
     pub gate_on: GateOn,
+    /// How much farther than foreseen a detection may lie where it is given to a track, one sigma of an axis.
+    pub gate_slack_m: f64,
     /// Squared Mahalanobis distance a pair may have.
     pub gate_chi2: f64,
     /// Distance a pair may have.
@@ -82,8 +96,6 @@ pub struct TrackConfig {
     pub height_sigma_m: f64,
     /// Time over which the width of a box is averaged.
     pub box_average_s: f64,
-    /// Time over which the sway of a walking trunk is remembered; 0: not looked for.
-    pub sway_memory_s: f64,
 }
 
 /// Which instant a detection is taken to be measured at.

@@ -1,151 +1,223 @@
-//! Where a body's axis stands, given the points that were seen of it.
+//! What was seen of one body, as numbers that tell where its axis stands.
 //!
 //! What is seen is the side toward the sensors, and legs and arms swing. So every point first moves away from its
-//! own sensor by a constant; the rest is a linear model of what the points look like and where the person walks,
-//! in a frame along the line of sight. Its coefficients were fitted on simulated returns by
-//! `cargo run --release -p umbracast-eval --example fit_bias`: error of a single frame 0.038 m on scenes of their
-//! own (all presets and pairs), 0.046 m with the constant alone, 0.083 m for the mean of the points.
+//! own sensor by a constant, and back along the person's way to the mean time of all points; the rest is left to
+//! [`super::axis`], which is told how the points lie, in a frame along the line of sight.
 
 use super::Point;
 use crate::geometry::{DVec2, DVec3};
 
-/// Features along the line of sight.
-pub const ALONG: usize = 9;
-/// Features across it: all change sign when the scene is mirrored.
-pub const ACROSS: usize = 7;
-/// From the shifted mean to the body axis, away from the sensor, metres a unit of each feature.
-const AWAY: [f64; ALONG] = [0.0054, -0.1760, -0.0130, -0.0093, -0.0122, -0.0741, -0.0494, 0.0043, 0.0010];
-/// The same, to the left as the sensor sees it.
-const LEFT: [f64; ACROSS] = [0.4527, 0.5074, -0.0169, -0.1439, 0.0038, 0.0490, -0.0823];
-/// A cluster that is no single body shall not be moved about.
-const LIMIT_M: f64 = 0.12;
-/// Upper ends of feet, legs and trunk as shares of the height that was seen; the head is above.
-const BANDS: [f64; 3] = [0.25, 0.5, 0.82];
+/// Numbers that stay when the scene is mirrored at the line of sight.
+pub const EVEN: usize = 34;
+/// Numbers that change sign.
+pub const ODD: usize = 14;
+/// Upper ends of feet, shanks, thighs, hips, waist and chest as shares of the height that was seen; then the head.
+const BANDS: [f64; 6] = [0.12, 0.3, 0.5, 0.62, 0.74, 0.86];
 /// The part whose extent tells more than its mean.
 const TRUNK: std::ops::Range<f64> = 0.5..0.86;
+/// Who walks slower may look anywhere.
+const WALKING_MPS: f64 = 0.3;
 
-/// A person's points as the linear model sees them.
+/// A person's points as the model of the body axis sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Mean of the points, each moved away from its sensor.
     pub base_m: DVec2,
     /// Unit vector along the mean line of sight of the sensor that saw more.
     pub away: DVec2,
-    /// Features along it.
-    pub along: [f64; ALONG],
-    /// Features across it.
-    pub across: [f64; ACROSS],
+    /// How the points lie along it, how high, how many, from how far.
+    pub even: [f64; EVEN],
+    /// How they lie across it.
+    pub odd: [f64; ODD],
+}
+
+/// A point that has been moved.
+struct Seen {
+    at_m: DVec2,
+    z_m: f64,
+    /// Horizontal, from the sensor.
+    away: DVec2,
+    range_m: f64,
+    sensor: u16,
 }
 
 impl View {
-    /// Looks at a person's points, given with the horizontal unit vector from the sensor to each. `heading` is the
-    /// direction of walking where it is known.
+    /// Looks at a person's points. `velocity_mps` is the person's, where it is known.
     pub fn new<'a>(
-        points: impl Iterator<Item = (&'a Point, DVec2)> + Clone,
+        points: impl Iterator<Item = &'a Point> + Clone,
+        sensors_m: &[DVec3],
         shift_m: f64,
-        heading: Option<DVec2>,
+        velocity_mps: Option<DVec2>,
     ) -> Self {
-        let moved =
-            points.clone().map(|(p, away)| (p.position_m.truncate() + away * shift_m, p.position_m.z));
-        let n = points.clone().count().max(1) as f64;
-        let base_m = moved.clone().map(|(q, _)| q).sum::<DVec2>() / n;
-        let (away, other_share) = main_direction(points.clone());
-        let left = away.perp();
-        let top_m = points.clone().map(|(p, _)| p.position_m.z).fold(0.0, f64::max);
-        let mean_z_m = points.map(|(p, _)| p.position_m.z).sum::<f64>() / n;
+        let seen = moved(points, sensors_m, shift_m, velocity_mps);
+        let n = seen.len().max(1) as f64;
+        let base_m = seen.iter().map(|s| s.at_m).sum::<DVec2>() / n;
+        let main = main_sensor(&seen);
+        let of_main = || seen.iter().filter(|s| s.sensor == main);
+        let away = of_main().map(|s| s.away).sum::<DVec2>().normalize_or(DVec2::X);
+        let along = |v: DVec2| DVec2::new(v.dot(away), v.dot(away.perp()));
+        let top_m = seen.iter().map(|s| s.z_m).fold(f64::MIN_POSITIVE, f64::max);
 
-        let mut bands = [(DVec2::ZERO, 0.0); BANDS.len() + 1];
-        let mut whole = Span::default();
-        let mut trunk = Span::default();
-        for (q, z_m) in moved {
-            let off = q - base_m;
-            let off = DVec2::new(off.dot(away), off.dot(left));
-            let share = z_m / top_m;
-            let band = &mut bands[BANDS.iter().filter(|&&upper| share >= upper).count()];
-            band.0 += off;
-            band.1 += 1.0;
+        let mut bands = [const { Group::EMPTY }; BANDS.len() + 1];
+        let [mut whole, mut trunk, mut others] = [const { Group::EMPTY }; 3];
+        let mut others_away = DVec2::ZERO;
+        for s in &seen {
+            let off = along(s.at_m - base_m);
+            let share = s.z_m / top_m;
+            bands[BANDS.iter().filter(|&&upper| share >= upper).count()].add(off);
             whole.add(off);
             if TRUNK.contains(&share) {
                 trunk.add(off);
             }
+            if s.sensor != main {
+                others.add(off);
+                others_away += s.away;
+            }
         }
-        let [feet, legs, body, head] = bands.map(|(sum, n)| if n > 0.0 { sum / n } else { DVec2::ZERO });
-        let (cos, sin) = heading.map_or((0.0, 0.0), |h| (h.dot(away), h.dot(left)));
-        let (cos_2, sin_2) = (cos * cos - sin * sin, 2.0 * cos * sin);
+        let others_away = along(others_away.normalize_or_zero());
+        let range_m = of_main().map(|s| s.range_m).sum::<f64>() / of_main().count().max(1) as f64;
+        let above_m = sensors_m.get(usize::from(main)).map_or(0.0, |s| s.z);
+        let speed_mps = velocity_mps.map_or(0.0, DVec2::length);
+        let walks = speed_mps > WALKING_MPS;
+        let ahead = velocity_mps.filter(|_| walks).map_or(DVec2::ZERO, |v| along(v.normalize_or_zero()));
+
+        let band = |i: usize| (bands[i].mean().x, bands[i].n / n);
+        let shares =
+            std::array::from_fn::<_, 14, _>(|i| if i % 2 == 0 { band(i / 2).0 } else { band(i / 2).1 });
+        let (size, of_trunk) = (whole.size(), trunk.size());
+        let rest = [
+            whole.ends().x,
+            size.x,
+            size.y,
+            trunk.ends().x,
+            of_trunk.x,
+            of_trunk.y,
+            trunk.spread().x,
+            trunk.spread().y,
+            others.n / n,
+            others.mean().x,
+            others_away.x,
+            range_m,
+            above_m / range_m.max(1.0),
+            1.0 / n.sqrt(),
+            top_m,
+            seen.iter().map(|s| s.z_m).sum::<f64>() / n,
+            ahead.x,
+            ahead.x * ahead.x - ahead.y * ahead.y,
+            speed_mps,
+            f64::from(u8::from(walks)),
+        ];
+        let across = [
+            whole.ends().y,
+            trunk.ends().y,
+            trunk.turn(),
+            others.mean().y,
+            others_away.y,
+            ahead.y,
+            2.0 * ahead.x * ahead.y,
+        ];
         Self {
             base_m,
             away,
-            along: [
-                1.0,
-                whole.middle().x,
-                cos,
-                cos_2,
-                feet.x,
-                trunk.deviation_x(),
-                cos_2 * (mean_z_m - 1.0),
-                trunk.middle().x,
-                other_share * cos_2,
-            ],
-            across: [body.y, head.y, sin, whole.middle().y, sin_2, legs.y, trunk.middle().y],
+            even: std::array::from_fn(|i| if i < 14 { shares[i] } else { rest[i - 14] }),
+            odd: std::array::from_fn(|i| if i < 7 { bands[i].mean().y } else { across[i - 7] }),
         }
-    }
-
-    /// Ground point of the body axis.
-    pub fn position_m(&self) -> DVec2 {
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let off = self.away * dot(&AWAY, &self.along) + self.away.perp() * dot(&LEFT, &self.across);
-        self.base_m + off.clamp_length_max(LIMIT_M)
     }
 }
 
-/// Mean line of sight of the sensor that saw more, and the share of the points the others saw.
-fn main_direction<'a>(points: impl Iterator<Item = (&'a Point, DVec2)> + Clone) -> (DVec2, f64) {
-    let of = |sensor: u16| points.clone().filter(move |(p, _)| p.sensor == sensor);
-    let n = points.clone().count();
+/// Each point where it would have been met at the mean time of all, moved from the skin toward the axis.
+fn moved<'a>(
+    points: impl Iterator<Item = &'a Point> + Clone,
+    sensors_m: &[DVec3],
+    shift_m: f64,
+    velocity_mps: Option<DVec2>,
+) -> Vec<Seen> {
+    let n = points.clone().count().max(1) as f64;
+    let first_ns = points.clone().map(|p| p.time_ns).min().unwrap_or_default();
+    let late_s = |p: &Point| (p.time_ns - first_ns) as f64 * 1e-9;
+    let mean_s = points.clone().map(late_s).sum::<f64>() / n;
+    let velocity_mps = velocity_mps.unwrap_or_default();
+    let seen = points.map(|p| {
+        let at_m = p.position_m.truncate() - velocity_mps * (late_s(p) - mean_s);
+        let sensor = sensors_m.get(usize::from(p.sensor));
+        let sight_m = sensor.map_or(DVec2::ZERO, |s| at_m - s.truncate());
+        let away = sight_m.normalize_or_zero();
+        Seen {
+            at_m: at_m + away * shift_m,
+            z_m: p.position_m.z,
+            away,
+            range_m: sight_m.length(),
+            sensor: p.sensor,
+        }
+    });
+    seen.collect()
+}
+
+/// The sensor that saw most of the points; of equals the first.
+fn main_sensor(seen: &[Seen]) -> u16 {
+    let points_of = |sensor: u16| seen.iter().filter(|s| s.sensor == sensor).count();
     let mut main = (0, 0);
-    let mut last = None;
-    for (point, _) in points.clone() {
-        if last.replace(point.sensor) == Some(point.sensor) {
+    for (i, s) in seen.iter().enumerate() {
+        if i > 0 && seen[i - 1].sensor == s.sensor {
             continue;
         }
-        let seen = of(point.sensor).count();
-        if seen > main.1 || (seen == main.1 && point.sensor < main.0) {
-            main = (point.sensor, seen);
+        let points = points_of(s.sensor);
+        if points > main.1 || (points == main.1 && s.sensor < main.0) {
+            main = (s.sensor, points);
         }
     }
-    let sum: DVec2 = of(main.0).map(|(_, away)| away).sum();
-    (sum.normalize_or(DVec2::X), 1.0 - main.1 as f64 / n.max(1) as f64)
+    main.0
 }
 
-/// Extent and deviation of a group of points.
-#[derive(Default)]
-struct Span {
-    points: f64,
+/// How a group of points lies, along and across the line of sight, about the mean of all points.
+struct Group {
+    n: f64,
+    sum: DVec2,
+    squares: DVec2,
+    product: f64,
     min: DVec2,
     max: DVec2,
-    sum_x: f64,
-    squares_x: f64,
 }
 
-impl Span {
+impl Group {
+    const EMPTY: Self = Self {
+        n: 0.0,
+        sum: DVec2::ZERO,
+        squares: DVec2::ZERO,
+        product: 0.0,
+        min: DVec2::INFINITY,
+        max: DVec2::NEG_INFINITY,
+    };
+
     fn add(&mut self, p: DVec2) {
-        (self.min, self.max) = if self.points == 0.0 { (p, p) } else { (self.min.min(p), self.max.max(p)) };
-        self.points += 1.0;
-        self.sum_x += p.x;
-        self.squares_x += p.x * p.x;
+        self.n += 1.0;
+        self.sum += p;
+        self.squares += p * p;
+        self.product += p.x * p.y;
+        (self.min, self.max) = (self.min.min(p), self.max.max(p));
     }
 
-    /// Middle of the extent; zero for fewer than two points.
-    fn middle(&self) -> DVec2 {
-        if self.points < 2.0 { DVec2::ZERO } else { (self.min + self.max) * 0.5 }
+    fn mean(&self) -> DVec2 {
+        self.sum / self.n.max(1.0)
     }
 
-    fn deviation_x(&self) -> f64 {
-        if self.points < 2.0 {
-            return 0.0;
-        }
-        let mean = self.sum_x / self.points;
-        (self.squares_x / self.points - mean * mean).max(0.0).sqrt()
+    /// Root mean square.
+    fn spread(&self) -> DVec2 {
+        (self.squares / self.n.max(1.0)).powf(0.5)
+    }
+
+    /// Mean product: not zero where the group lies askew.
+    fn turn(&self) -> f64 {
+        self.product / self.n.max(1.0)
+    }
+
+    /// Sum of both ends, twice the middle; zero for fewer than two points.
+    fn ends(&self) -> DVec2 {
+        if self.n < 2.0 { DVec2::ZERO } else { self.min + self.max }
+    }
+
+    fn size(&self) -> DVec2 {
+        if self.n < 2.0 { DVec2::ZERO } else { self.max - self.min }
     }
 }
 
@@ -158,23 +230,27 @@ pub fn away(sensors_m: &[DVec3], point: &Point) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::axis::AxisModel;
 
     const SENSOR_M: DVec3 = DVec3::new(-10.0, 0.0, 8.0);
+    const PERSON: [(f64, f64, f64); 5] =
+        [(0.0, 0.1, 0.1), (0.1, -0.2, 0.9), (0.0, 0.25, 1.1), (0.05, 0.0, 1.3), (0.0, 0.1, 1.7)];
 
-    fn position_m(corners: &[(f64, f64, f64)], heading: DVec2) -> DVec2 {
-        let points: Vec<Point> = corners
-            .iter()
-            .map(|&(x, y, z)| Point { position_m: DVec3::new(x, y, z), time_ns: 0, sensor: 0 })
-            .collect();
-        View::new(points.iter().map(|p| (p, away(&[SENSOR_M], p))), 0.1, Some(heading)).position_m()
+    fn points(corners: &[(f64, f64, f64)]) -> Vec<Point> {
+        let point = |&(x, y, z)| Point { position_m: DVec3::new(x, y, z), time_ns: 0, sensor: 0 };
+        corners.iter().map(point).collect()
+    }
+
+    fn position_m(points: &[Point], velocity_mps: DVec2) -> DVec2 {
+        let view = View::new(points.iter(), &[SENSOR_M], 0.1, Some(velocity_mps));
+        AxisModel::shipped().locate(&view).0
     }
 
     #[test]
     fn a_mirrored_person_stands_at_the_mirrored_place() {
-        let person = [(0.0, 0.1, 0.1), (0.1, -0.2, 0.9), (0.0, 0.25, 1.1), (0.05, 0.0, 1.3), (0.0, 0.1, 1.7)];
-        let mirrored = person.map(|(x, y, z)| (x, -y, z));
-        let (a, b) =
-            (position_m(&person, DVec2::from_angle(0.4)), position_m(&mirrored, DVec2::from_angle(-0.4)));
+        let mirrored = PERSON.map(|(x, y, z)| (x, -y, z));
+        let a = position_m(&points(&PERSON), DVec2::from_angle(0.4));
+        let b = position_m(&points(&mirrored), DVec2::from_angle(-0.4));
         assert!(a.y.abs() > 0.01, "{a}");
         assert!((a.x - b.x).abs() < 1e-12 && (a.y + b.y).abs() < 1e-12, "{a} {b}");
     }
@@ -183,7 +259,27 @@ mod tests {
     fn the_axis_lies_behind_the_side_that_was_seen() {
         let front: Vec<(f64, f64, f64)> =
             (0..20).map(|i| (0.0, 0.02 * f64::from(i) - 0.19, 0.09 * f64::from(i))).collect();
-        let found = position_m(&front, DVec2::X);
+        let found = position_m(&points(&front), DVec2::X);
         assert!((0.04..0.2).contains(&found.x), "{found}");
+    }
+
+    /// A sensor that turns half a turn later meets a walker 5 cm farther on.
+    #[test]
+    fn points_of_a_walker_met_at_different_times_are_seen_as_at_one() {
+        let velocity_mps = DVec2::new(0.3, 1.2);
+        let at_once = points(&PERSON);
+        let spread: Vec<Point> = (0..)
+            .zip(&at_once)
+            .map(|(i, p)| {
+                let time_ns = (i - 2) * 20_000_000;
+                Point {
+                    position_m: p.position_m + (velocity_mps * time_ns as f64 * 1e-9).extend(0.0),
+                    time_ns,
+                    ..*p
+                }
+            })
+            .collect();
+        let off_m = position_m(&at_once, velocity_mps).distance(position_m(&spread, velocity_mps));
+        assert!(off_m < 1e-9, "{off_m}");
     }
 }

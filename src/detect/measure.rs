@@ -1,6 +1,7 @@
 //! Position and boxes of one person.
 
-use super::bias::{View, away};
+use super::axis::AxisModel;
+use super::bias::View;
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
 use crate::config::{DetectConfig, MeasureConfig, ObbAxes, PositionMethod};
@@ -8,8 +9,6 @@ use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 /// A prior farther than this from a cluster does not tell where its person walks.
 const OWN_M: f64 = 0.5;
-/// Who walks slower may look anywhere.
-const WALKING_MPS: f64 = 0.3;
 
 /// Turns clusters into detections.
 #[derive(Debug)]
@@ -17,6 +16,7 @@ pub struct Measurer {
     config: MeasureConfig,
     whole_top_m: f64,
     sensors_m: Vec<DVec3>,
+    axis: AxisModel,
 }
 
 impl Measurer {
@@ -26,6 +26,7 @@ impl Measurer {
             config: config.measure.clone(),
             whole_top_m: config.split.evidence.whole_top_m,
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
+            axis: AxisModel::shipped(),
         }
     }
 
@@ -87,13 +88,17 @@ impl Measurer {
         let mean_m: DVec3 = of().map(|p| p.position_m).sum::<DVec3>() / n;
         let first_ns = of().map(|p| p.time_ns).min().unwrap_or_default();
         let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
-        let (position_m, z_m) = match self.config.position {
-            PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z),
-            PositionMethod::ShiftedMean => (self.view(points, cluster, &[]).base_m, mean_m.z),
-            PositionMethod::Fitted => (self.view(points, cluster, priors).position_m(), mean_m.z),
+        let (position_m, z_m, covariance_m2) = match self.config.position {
+            PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z, None),
+            PositionMethod::ShiftedMean => (self.view(points, cluster, &[]).base_m, mean_m.z, None),
+            PositionMethod::Fitted => {
+                let (position_m, covariance_m2) = self.axis.locate(&self.view(points, cluster, priors));
+                (position_m, mean_m.z, Some(covariance_m2))
+            }
         };
         Detection {
             position_m,
+            covariance_m2,
             z_m,
             time_ns: first_ns + late_ns / cluster.len() as i64,
             points: cluster.len() as u32,
@@ -104,17 +109,15 @@ impl Measurer {
         }
     }
 
-    /// A cluster as the bias model sees it; who walks there is the nearest of `priors`.
+    /// A cluster as the model of the body axis sees it; who walks there is the nearest of `priors`.
     pub fn view(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> View {
-        let seen = cluster.iter().map(|&i| (&points[i as usize], away(&self.sensors_m, &points[i as usize])));
+        let seen = cluster.iter().map(|&i| &points[i as usize]);
         let mean_m =
-            seen.clone().map(|(p, _)| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
+            seen.clone().map(|p| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
         let off_m = |prior: &Prior| prior.position_m.distance(mean_m);
         let who = priors.iter().filter(|p| p.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
-        let heading = who
-            .filter(|prior| off_m(prior) < OWN_M && prior.velocity_mps.length() > WALKING_MPS)
-            .map(|prior| prior.velocity_mps.normalize());
-        View::new(seen, self.config.shift_m, heading)
+        let velocity_mps = who.filter(|prior| off_m(prior) < OWN_M).map(|prior| prior.velocity_mps);
+        View::new(seen, &self.sensors_m, self.config.shift_m, velocity_mps)
     }
 }
 

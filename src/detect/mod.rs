@@ -12,6 +12,7 @@ pub mod guided;
 pub mod evidence;
 pub mod split_merge;
 pub mod bias;
+pub mod axis;
 pub mod measure;
 
 pub use background::Background;
@@ -54,6 +55,9 @@ pub type Cluster = Vec<u32>;
 pub struct Detection {
     /// Ground point of the body axis, corrected for the side that was seen where the config says so.
     pub position_m: DVec2,
+    /// Covariance of its error in a single frame, the sway of the body included, m^2; `None` where the position was
+    /// found by a method that does not tell.
+    pub covariance_m2: Option<[[f64; 2]; 2]>,
     /// Mean height of the points above the floor (`hdl` tracks x, y and z).
     pub z_m: f64,
     /// Mean time of the points.

@@ -1,10 +1,10 @@
 //! Stage 1, second half: detections of frame after frame joined to tracks (paper, section IV-A).
 
+pub mod gait;
 pub mod kalman;
 pub mod association;
 pub mod visibility;
 mod height;
-pub mod gait;
 mod person;
 pub mod tracker;
 

@@ -5,9 +5,8 @@
 
 use std::collections::VecDeque;
 
-use super::gait::Sway;
 use super::height::Height;
-use super::kalman::{Filter, Mat2, State};
+use super::kalman::{Filter, Mat2, State, plus};
 use super::visibility::{Body, View};
 use super::{OBSERVED, Observed, Track};
 use crate::config::{Boxes, TrackConfig};
@@ -47,7 +46,6 @@ pub(super) struct Person {
     /// When the track was last given out.
     given_ns: i64,
     height: Height,
-    sway: Sway,
     /// The last detection's boxes, moved so that the detection's position is at the origin.
     aabb: Aabb,
     obb: Obb,
@@ -58,7 +56,8 @@ pub(super) struct Person {
 
 impl Person {
     pub(super) fn born(config: &TrackConfig, id: u64, detection: &Detection, time_ns: i64) -> Self {
-        let variance = noise(config, detection)[0][0];
+        let noise = plus(noise(config, detection), sway(config));
+        let variance = noise[0][0].max(noise[1][1]);
         let mut person = Self {
             id,
             filter: Filter::new(config, detection.position_m, detection.z_m, variance),
@@ -73,7 +72,6 @@ impl Person {
             heading_variance_rad2: ANY_HEADING_RAD2,
             given_ns: time_ns,
             height: Height::new(config.height_mean_m, config.height_sigma_m),
-            sway: Sway::new(config.sway_memory_s),
             aabb: Aabb::EMPTY,
             obb: Obb::from_aabb(&Aabb::EMPTY),
             extent_m: DVec2::splat(WIDTH_M),
@@ -83,14 +81,12 @@ impl Person {
         person
     }
 
-    /// The frame's detection of this person, `after_s` after the last frame; the filter stands at it.
-    /// Carries the person on.
-    pub(super) fn predict(&mut self, config: &TrackConfig, step_s: f64) {
-        let speed_mps = self.filter.state().velocity_mps().length();
-        self.sway.advance(speed_mps, self.height.mean_m(), step_s);
-        self.filter.predict(config, step_s);
+    /// Moves the filter on.
+    pub(super) fn predict(&mut self, config: &TrackConfig, dt_s: f64) {
+        self.filter.predict(config, self.height.mean_m(), dt_s);
     }
 
+    /// The frame's detection of this person, `after_s` after the last frame; the filter stands at it.
     pub(super) fn hit(
         &mut self,
         config: &TrackConfig,
@@ -99,12 +95,7 @@ impl Person {
         time_ns: i64,
         step_s: f64,
     ) {
-        let state = self.filter.state();
-        let left = state.velocity_mps().perp().normalize_or_zero();
-        let sway_m = self.sway.left_m();
-        self.sway.see(left.dot(detection.position_m - state.position_m()), state.velocity_mps().length());
-        let position_m = detection.position_m - left * sway_m;
-        self.filter.correct(position_m, detection.z_m, noise(config, detection));
+        self.filter.correct(detection.position_m, detection.z_m, noise(config, detection));
         let there = self.existence * config.hit_ratio;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.hits += 1;
@@ -167,7 +158,7 @@ impl Person {
             heading_sigma_rad: self.heading_variance_rad2.sqrt(),
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
-            gait: self.sway.gait(),
+            gait: self.filter.gait(),
             points: self.points,
             confirmed: self.confirmed && largest_sigma(state.position_covariance()) < config.told_sigma_max_m,
             aabb,
@@ -219,14 +210,22 @@ impl Person {
     }
 }
 
-/// Covariance of a detection's position: part of its error falls with the number of points, part with the share of
-/// the body that is seen.
+/// Covariance of a detection's position for the filter, which follows the sway itself: what the detection tells of
+/// its error counts in part; beside it a part that nothing mends, one that falls with the number of points, and one
+/// that falls with the share of the body that is seen.
 pub(super) fn noise(config: &TrackConfig, detection: &Detection) -> Mat2 {
     // 1 where hardly anything is seen, 0 from half the height on.
     let hidden = (1.0 - 2.0 * detection.aabb.size_m().z / config.height_mean_m).max(0.0);
     let variance = config.noise_floor_m.powi(2)
         + (config.hidden_noise_m * hidden).powi(2)
         + config.noise_per_point_m.powi(2) / f64::from(detection.points.max(1));
+    let told = detection.covariance_m2.unwrap_or_default();
+    plus(told.map(|row| row.map(|c| config.noise_share * c)), [[variance, 0.0], [0.0, variance]])
+}
+
+/// Covariance of a swaying body about the person's way, of a phase and direction that are not known.
+pub(super) fn sway(config: &TrackConfig) -> Mat2 {
+    let variance = 0.5 * (config.sway_left_m.powi(2) + config.sway_ahead_m.powi(2));
     [[variance, 0.0], [0.0, variance]]
 }
 

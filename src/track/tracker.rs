@@ -3,7 +3,7 @@
 use super::Track;
 use super::association::{FORBIDDEN, greedy, optimal};
 use super::kalman::{State, inverted, plus, quadratic};
-use super::person::{Person, noise};
+use super::person::{Person, noise, sway};
 use super::visibility::{Body, View, Visibility, detection_probability};
 use crate::config::{Assignment, GateOn, MeasuredAt, TrackConfig};
 use crate::detect::{Detection, Prior};
@@ -172,7 +172,7 @@ impl Tracker {
             }
             let mut person = Person::born(&self.config, self.next_id, detection, time_ns);
             let measured_ns = self.measured_ns(detection, i64::MIN, time_ns);
-            person.filter.predict(&self.config, seconds(measured_ns, time_ns));
+            person.predict(&self.config, seconds(measured_ns, time_ns));
             places.push(detection.position_m);
             self.people.push(person);
             self.next_id += 1;
@@ -196,7 +196,8 @@ fn pair_cost(config: &TrackConfig, person: &Person, after_s: f64, seen: f64, det
     let mut spread = state.position_covariance();
     let mut spread_z = person.filter.vertical.map(|z| z.P[0][0]);
     if config.gate_on == GateOn::Innovation {
-        let noise = noise(config, detection);
+        let slack = config.gate_slack_m.powi(2);
+        let noise = plus(plus(noise(config, detection), sway(config)), [[slack, 0.0], [0.0, slack]]);
         spread = plus(spread, noise);
         spread_z = spread_z.map(|z| z + noise[0][0]);
     }

@@ -98,7 +98,7 @@ impl Input {
         match reader.next_entry()? {
             Some(Entry::Config(text)) => {
                 let place = format!("{}: recorded configuration", file.display());
-                Ok(Some(Config::of_run(&text, &place)?.site))
+                Ok(Some(Config::site_of_run(&text, &place)?))
             }
             _ => Ok(None),
         }

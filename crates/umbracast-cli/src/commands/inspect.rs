@@ -114,8 +114,7 @@ fn recording(file: &Path, found: &mut Findings) -> Result<(), Error> {
     while let Some(entry) = reader.next_entry()? {
         let (topic, things) = match entry {
             Entry::Config(text) => {
-                let config = Config::of_run(&text, &file.display().to_string())?;
-                found.say("site", config.site.name);
+                found.say("site", Config::site_of_run(&text, &file.display().to_string())?.name);
                 continue;
             }
             Entry::Packets(sensor, packets) => (format!("/{sensor}/packets"), packets.len() as u64),
