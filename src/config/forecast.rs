@@ -22,6 +22,8 @@ pub struct ForecastConfig {
 pub enum ForecastMethod {
     /// The filtered state carried on.
     ConstantVelocity,
+    /// The same, and what a small network says of the departure from it.
+    Residual,
     /// The paper's network.
     Lstm,
 }

@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::lstm::OBSERVED_DISPLACEMENTS;
-use super::{Forecast, Gaussian2, Weights, constant_velocity};
+use super::{Forecast, Gaussian2, Residual, Weights, constant_velocity};
 use crate::config::{ForecastConfig, ForecastMethod, Rollout};
 use crate::geometry::DVec2;
 use crate::track::{OBSERVED, Observed, Track};
@@ -17,7 +17,15 @@ use crate::{Error, STEP_NS};
 #[derive(Debug)]
 pub struct Forecaster {
     config: ForecastConfig,
-    lstm: Option<Weights>,
+    network: Network,
+}
+
+/// What the method needs.
+#[derive(Debug)]
+enum Network {
+    None,
+    Residual(Residual),
+    Lstm(Weights),
 }
 
 impl Forecaster {
@@ -32,22 +40,27 @@ impl Forecaster {
                 "forecast.acceleration_psd_m2ps3: expected a number not below 0, found {psd}"
             )));
         }
-        let lstm = match (config.method, weights) {
-            (ForecastMethod::ConstantVelocity, _) => None,
-            (ForecastMethod::Lstm, Some(weights)) => Some(weights.clone()),
+        let network = match (config.method, weights) {
+            (ForecastMethod::ConstantVelocity, _) => Network::None,
+            (ForecastMethod::Residual, _) => Network::Residual(Residual::shipped()?),
+            (ForecastMethod::Lstm, Some(weights)) => Network::Lstm(weights.clone()),
             (ForecastMethod::Lstm, None) => {
                 return Err(Error::new("forecast.method = \"lstm\": expected its weights, found none"));
             }
         };
-        Ok(Self { config: config.clone(), lstm })
+        Ok(Self { config: config.clone(), network })
     }
 
     /// One forecast for each track, in the order of the tracks.
     pub fn forecast(&mut self, tracks: &[Track], forecasts: &mut Vec<Forecast>) {
         forecasts.clear();
+        if let Network::Residual(residual) = &self.network {
+            forecasts.extend((0..tracks.len()).map(|i| residual.forecast(tracks, i)));
+            return;
+        }
         let psd = self.config.acceleration_psd_m2ps3;
         forecasts.extend(tracks.iter().map(|track| constant_velocity::forecast(track, psd)));
-        if let Some(weights) = &self.lstm {
+        if let Network::Lstm(weights) = &self.network {
             self.by_lstm(weights, tracks, forecasts);
         }
     }
@@ -138,7 +151,7 @@ fn draw(displacement: &Gaussian2, generator: &mut Pcg64) -> DVec2 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::Config;
     use crate::forecast::lstm::tests::small_network;
@@ -149,7 +162,7 @@ mod tests {
     }
 
     /// A track that has walked along `way_m` up to and with frame `frame`.
-    fn track(id: u64, way_m: &[DVec2], frame: usize) -> Track {
+    pub(in crate::forecast) fn track(id: u64, way_m: &[DVec2], frame: usize) -> Track {
         let observed = (frame.saturating_sub(OBSERVED - 1)..=frame)
             .map(|k| seen((k as i64 + 1) * STEP_NS, way_m[k]))
             .collect::<VecDeque<_>>();
@@ -228,7 +241,7 @@ mod tests {
         let way = way();
         let mut other_way = way.clone();
         other_way[CHANGED_FROM..].iter_mut().for_each(|p| *p += DVec2::new(0.5, -0.5));
-        for method in [ForecastMethod::ConstantVelocity, ForecastMethod::Lstm] {
+        for method in [ForecastMethod::ConstantVelocity, ForecastMethod::Residual, ForecastMethod::Lstm] {
             let (mut one, mut other) =
                 (forecaster(method, Rollout::Mean, 1), forecaster(method, Rollout::Mean, 1));
             for frame in 0..way.len() {

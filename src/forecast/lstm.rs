@@ -6,10 +6,11 @@
 use std::fmt;
 use std::sync::Arc;
 
-use safetensors::{Dtype, SafeTensors};
+use safetensors::SafeTensors;
 
 use super::Gaussian2;
 use super::lstm_cell::{self, GROUP, GroupState, LANES, PackedCell};
+use super::tensors::tensor;
 use crate::geometry::DVec2;
 use crate::track::OBSERVED;
 use crate::{Error, STEPS};
@@ -154,27 +155,11 @@ fn sigma_m(raw: f64) -> f64 {
     f64::from(SIGMA_FLOOR_M) + f64::from(SIGMA_SCALE_M) * softplus
 }
 
-fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, Error> {
-    let wrong = |found: String| {
-        Error::new(format!("weights: {name}: expected f32 of shape {shape:?}, found {found}"))
-    };
-    let view = file.tensor(name).map_err(|_| wrong("no such tensor".to_owned()))?;
-    if view.dtype() != Dtype::F32 || view.shape() != shape {
-        return Err(wrong(format!("{:?} of shape {:?}", view.dtype(), view.shape())));
-    }
-    let values: Vec<f32> =
-        view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-    match values.iter().position(|value| !value.is_finite()) {
-        Some(at) => Err(wrong(format!("{} at place {at}", values[at]))),
-        None => Ok(values),
-    }
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use safetensors::serialize;
     use safetensors::tensor::TensorView;
+    use safetensors::{Dtype, serialize};
 
     type Tensors = Vec<(&'static str, Vec<usize>, Vec<f32>)>;
 

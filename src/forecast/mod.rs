@@ -2,6 +2,9 @@
 
 pub mod gaussian;
 pub mod constant_velocity;
+mod tensors;
+pub mod inputs;
+pub mod residual;
 mod lstm_cell;
 pub mod lstm;
 pub mod forecaster;
@@ -9,6 +12,7 @@ pub mod forecaster;
 pub use forecaster::Forecaster;
 pub use gaussian::Gaussian2;
 pub use lstm::Weights;
+pub use residual::Residual;
 
 use crate::STEPS;
 

@@ -56,7 +56,7 @@ pub enum Command {
     Inspect(Inspect),
     /// Print the commented default configuration, or check a file.
     Config(Config),
-    /// Fit the paper's LSTM on generated trajectories.
+    /// Fit the networks: the paper's LSTM, or the default forecast's residual.
     #[cfg(feature = "train")]
     Train(Train),
 }
@@ -325,35 +325,53 @@ pub struct Config {
     pub mode: Option<Mode>,
 }
 
+/// What `train` fits.
+#[cfg(feature = "train")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum What {
+    /// The paper's LSTM, on generated trajectories.
+    Lstm,
+    /// The default forecast's residual network, on tracks of simulated and replayed people.
+    Residual,
+}
+
 /// `train`
 #[cfg(feature = "train")]
 #[derive(Debug, Args)]
 pub struct Train {
-    /// Passes over the data.
-    #[arg(long, default_value_t = 30)]
-    pub epochs: usize,
-    /// Windows drawn in an epoch.
+    /// What to fit.
+    #[arg(default_value = "lstm")]
+    pub what: What,
+    /// Passes over the data: 30 for the LSTM, 15 for the residual.
+    #[arg(long)]
+    pub epochs: Option<usize>,
+    /// LSTM: windows drawn in an epoch.
     #[arg(long, default_value_t = 16_384)]
     pub windows: usize,
-    /// Windows in a batch; a whole number of batches makes an epoch.
+    /// LSTM: windows in a batch; a whole number of batches makes an epoch.
     #[arg(long, default_value_t = 128)]
     pub batch: usize,
-    /// Scenes to train and validate on.
-    #[arg(long, default_value_t = 500)]
-    pub scenes: u64,
+    /// Scenes to train and validate on: 500 for the LSTM, 36 for the residual.
+    #[arg(long)]
+    pub scenes: Option<u64>,
     /// Seed of the first scene; 1 to 99999.
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     pub first_scene: u64,
-    /// The crowds, taken in turn: orca-03, orca-06, mixed, pairs.
+    /// LSTM: the crowds, taken in turn: orca-03, orca-06, mixed, pairs.
     #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
     pub preset: Vec<Preset>,
+    /// Residual: recorded people to learn from beside the drawn crowds.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub trajectories: Vec<PathBuf>,
+    #[command(flatten)]
+    pub replay: Replay,
     /// Seed of the first weights and of the windows.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// The source's commit, for the card.
     #[arg(long)]
     pub commit: Option<String>,
-    /// Noise as a tracker makes it, in place of clean positions.
+    /// LSTM: noise as a tracker makes it, in place of clean positions.
     #[arg(long)]
     pub noise: bool,
     /// Where weights, card and checkpoints go; a checkpoint found there is continued.

@@ -2,7 +2,7 @@
 
 use burn::tensor::Gradients;
 
-use crate::network::Network;
+use crate::network::{Network, TENSORS};
 
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
@@ -10,24 +10,30 @@ const EPSILON: f64 = 1e-8;
 
 /// Running moments of every weight.
 #[derive(Debug, Clone)]
-pub struct Adam {
+pub struct Adam<const N: usize = TENSORS> {
     /// Of the gradients.
-    pub first: Network,
+    pub first: Network<N>,
     /// Of their squares.
-    pub second: Network,
+    pub second: Network<N>,
     /// Updates so far.
     pub updates: u64,
 }
 
-impl Adam {
+impl<const N: usize> Adam<N> {
     /// Before the first update.
-    pub fn new(network: &Network) -> Self {
+    pub fn new(network: &Network<N>) -> Self {
         let zero = Network { tensors: network.tensors.each_ref().map(|t| t.zeros_like()) };
         Self { first: zero.clone(), second: zero, updates: 0 }
     }
 
     /// The network after one step against its gradients, which are shortened to `longest` where they are longer.
-    pub fn update(&mut self, network: Network, gradients: Network, rate: f64, longest: f64) -> Network {
+    pub fn update(
+        &mut self,
+        network: Network<N>,
+        gradients: Network<N>,
+        rate: f64,
+        longest: f64,
+    ) -> Network<N> {
         self.updates += 1;
         let squares = gradients.tensors.iter().map(|g| g.clone().square().sum().into_scalar::<f32>());
         let length = squares.map(f64::from).sum::<f64>().sqrt();
@@ -51,7 +57,7 @@ impl Adam {
 }
 
 /// The gradient of every weight of a tracked network.
-pub fn gradients(network: &Network, mut gradients: Gradients) -> Network {
+pub fn gradients<const N: usize>(network: &Network<N>, mut gradients: Gradients) -> Network<N> {
     Network {
         tensors: network.tensors.each_ref().map(|weight| {
             weight.grad_remove(&mut gradients).unwrap_or_else(|| weight.clone().inner().zeros_like())

@@ -40,26 +40,18 @@ impl Size {
     }
 }
 
-/// The network, or anything with one number for each of its weights (a gradient, a moment).
+/// A network, or anything with one number for each of its weights (a gradient, a moment). By default the paper's.
 #[derive(Debug, Clone)]
-pub struct Network {
-    /// In the order of [`NAMES`].
-    pub tensors: [Tensor<2>; TENSORS],
+pub struct Network<const N: usize = TENSORS> {
+    /// In the order of their names.
+    pub tensors: [Tensor<2>; N],
 }
 
-/// What an LSTM layer carries from step to step, each [windows, units].
-struct State {
-    hidden: Tensor<2>,
-    cell: Tensor<2>,
-}
-
-impl Network {
-    /// As PyTorch starts its layers: every weight and bias uniform within one over the root of the layer's
-    /// inputs (for the LSTM: of its units).
-    pub fn fresh(size: Size, seed: u64, device: &Device) -> Self {
+impl<const N: usize> Network<N> {
+    /// As PyTorch starts its layers: every weight and bias uniform within one over the root of its layer's inputs
+    /// (for an LSTM: of its units). `shapes` are rows and columns; a bias is a row.
+    pub fn uniform(shapes: [[usize; 2]; N], fan: [usize; N], seed: u64, device: &Device) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed);
-        let fan = [2, 2, size.units, size.units, size.units, size.units, size.units, size.units];
-        let shapes = size.shapes();
         Self {
             tensors: std::array::from_fn(|i| {
                 let bound = 1.0 / (fan[i] as f32).sqrt();
@@ -73,6 +65,20 @@ impl Network {
     /// The same with gradients recorded.
     pub fn tracked(&self) -> Self {
         Self { tensors: self.tensors.each_ref().map(|t| t.clone().autodiff().require_grad()) }
+    }
+}
+
+/// What an LSTM layer carries from step to step, each [windows, units].
+struct State {
+    hidden: Tensor<2>,
+    cell: Tensor<2>,
+}
+
+impl Network {
+    /// The paper's network before training.
+    pub fn fresh(size: Size, seed: u64, device: &Device) -> Self {
+        let fan = [2, 2, size.units, size.units, size.units, size.units, size.units, size.units];
+        Self::uniform(size.shapes(), fan, seed, device)
     }
 
     /// Raw outputs of the head, [windows, 5] for each of `steps`, from the observed displacements, [windows, 2]

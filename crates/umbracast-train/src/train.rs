@@ -13,7 +13,7 @@ use umbracast_sim::crowd::Preset;
 
 use crate::adam::{Adam, gradients};
 use crate::card;
-use crate::network::{Network, Size, loss};
+use crate::network::{NAMES, Network, Size, loss};
 use crate::score::{Scores, score};
 use crate::weights::{from_safetensors, state, to_safetensors};
 use crate::windows::{Noise, Ways, Window};
@@ -207,7 +207,7 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&Progress)) -> Res
             keep(path, &run, options)?;
         }
     }
-    let safetensors = to_safetensors(&[("", &run.network)], None)?;
+    let safetensors = to_safetensors(&NAMES, &[("", &run.network)], None)?;
     let weights = umbracast::forecast::Weights::from_safetensors(&safetensors)?;
     let exact = Noise { white_m: 0.0, lasting_m: 0.0 };
     let mut scores = Vec::new();
@@ -298,7 +298,7 @@ fn keep(path: &Path, run: &Run, options: &TrainOptions) -> Result<(), Error> {
     }
     let networks = [("", &run.network), ("first.", &run.adam.first), ("second.", &run.adam.second)];
     let beside = path.with_extension("part");
-    fs::write(&beside, to_safetensors(&networks, Some(text))?).map_err(|e| at(&beside, &e))?;
+    fs::write(&beside, to_safetensors(&NAMES, &networks, Some(text))?).map_err(|e| at(&beside, &e))?;
     fs::rename(&beside, path).map_err(|e| at(path, &e))
 }
 

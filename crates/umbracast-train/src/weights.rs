@@ -33,14 +33,18 @@ impl View for Entry {
 }
 
 /// Networks as one safetensors file, each tensor's name after its network's prefix; biases have one dimension.
-/// `state`, if any, goes into the file's metadata.
+/// `names` are those of each network's tensors. `state`, if any, goes into the file's metadata.
 ///
 /// # Errors
 /// A tensor that cannot be read back from its device.
-pub fn to_safetensors(networks: &[(&str, &Network)], state: Option<String>) -> Result<Vec<u8>, Error> {
+pub fn to_safetensors<const N: usize>(
+    names: &[&str; N],
+    networks: &[(&str, &Network<N>)],
+    state: Option<String>,
+) -> Result<Vec<u8>, Error> {
     let mut entries = Vec::new();
     for (prefix, network) in networks {
-        for (name, tensor) in NAMES.iter().zip(&network.tensors) {
+        for (name, tensor) in names.iter().zip(&network.tensors) {
             let [rows, columns] = tensor.dims();
             let shape = if name.ends_with("weight") || name.contains("weight_") {
                 vec![rows, columns]

@@ -80,7 +80,8 @@ fn the_runtime_rolls_out_as_the_trainer_does() {
     for (size, seed) in [(SIZE, 3), (Size { embedded: 64, units: 512 }, 4)] {
         let network = Network::fresh(size, seed, &device);
         let outputs = network.roll_out(&frames(&device)[..OBSERVED_DISPLACEMENTS], STEPS);
-        let weights = Weights::from_safetensors(&to_safetensors(&[("", &network)], None).unwrap()).unwrap();
+        let weights =
+            Weights::from_safetensors(&to_safetensors(&NAMES, &[("", &network)], None).unwrap()).unwrap();
         let all = numbers("displacements");
         let observed: Vec<[DVec2; OBSERVED_DISPLACEMENTS]> = (0..WINDOWS)
             .map(|window| {

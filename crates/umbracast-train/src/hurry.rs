@@ -1,0 +1,98 @@
+//! Known ways walked otherwise: the whole crowd's clock runs fast, slows down, stands and sets off again, and
+//! everybody sways with the stride. Simulated people never run or brake as people in a hurry do, and recorded ones are
+//! few; of a crowd that keeps apart, whoever walks by the same clock keeps apart too.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use umbracast_sim::crowd::{Crowd, Trajectory};
+
+/// Of trajectories.
+const STEP_NS: i64 = 10_000_000;
+const STEP_S: f64 = 0.01;
+/// How fast the clock runs at most, drawn anew for each walk between two stands: 1.48 m/s (PedPy's corridor) becomes
+/// 1.6 to 2.8 m/s.
+const RATE: Range<f64> = 1.1..1.9;
+/// People stand, set off, walk and slow down for so long, seconds.
+const STAND_S: Range<f64> = 0.3..1.5;
+const SET_OFF_S: Range<f64> = 0.8..1.8;
+const WALK_S: Range<f64> = 2.0..6.0;
+const SLOW_DOWN_S: Range<f64> = 1.0..3.5;
+/// Bodies sway as people step: to both sides once a stride, and forward with each of its two steps. A stride goes so
+/// far, and the sway so far to each side and ahead at most, metres.
+const STRIDE_M: Range<f64> = 1.2..1.8;
+const SWAY_M: [f64; 2] = [0.012, 0.03];
+
+/// The crowd in a hurry. Nobody arrives: who reached the goal stands there.
+pub fn hurried(crowd: &Crowd, seed: u64) -> Crowd {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let clock_s = clock(crowd.duration_ns as f64 * 1e-9, &mut rng);
+    let trajectories = crowd.trajectories.iter().filter_map(|way| walked(way, &clock_s, &mut rng)).collect();
+    Crowd { trajectories, duration_ns: clock_s.len() as i64 * STEP_NS }
+}
+
+/// The way's time at every 10 ms, from 0 until `duration_s`.
+fn clock(duration_s: f64, rng: &mut Pcg64) -> Vec<f64> {
+    let mut times_s = vec![0.0];
+    let mut time_s = 0.0;
+    loop {
+        let [stand_s, set_off_s, walk_s, slow_down_s] =
+            [STAND_S, SET_OFF_S, WALK_S, SLOW_DOWN_S].map(|range| rng.random_range(range));
+        let top = rng.random_range(RATE);
+        // Slope 0 at both ends.
+        let eased = |share: f64| share * share * (3.0 - 2.0 * share);
+        let whole_s = stand_s + set_off_s + walk_s + slow_down_s;
+        for step in 0..(whole_s / STEP_S) as usize {
+            let at_s = step as f64 * STEP_S - stand_s;
+            let rising = eased((at_s / set_off_s).clamp(0.0, 1.0));
+            let falling = eased(((set_off_s + walk_s + slow_down_s - at_s) / slow_down_s).clamp(0.0, 1.0));
+            time_s += top * rising * falling * STEP_S;
+            if time_s > duration_s {
+                return times_s;
+            }
+            times_s.push(time_s);
+        }
+    }
+}
+
+fn walked(way: &Trajectory, clock_s: &[f64], rng: &mut Pcg64) -> Option<Trajectory> {
+    let stride_m = rng.random_range(STRIDE_M);
+    let sway_m = SWAY_M.map(|largest_m| rng.random_range(0.0..largest_m));
+    let (mut start_ns, mut last_m, mut phase) = (None, None, rng.random_range(0.0..TAU));
+    let mut positions_m = Vec::new();
+    for (step, &time_s) in clock_s.iter().enumerate() {
+        let Some((position_m, velocity_mps)) = way.at((time_s * 1e9) as i64) else { continue };
+        start_ns.get_or_insert(step as i64 * STEP_NS);
+        // A stride is walked, not waited for: who stands does not sway.
+        phase += TAU * position_m.distance(last_m.unwrap_or(position_m)) / stride_m;
+        last_m = Some(position_m);
+        // Slow people hardly sway: all of it from 1 m/s on.
+        let ahead = velocity_mps / velocity_mps.length().max(1.0);
+        let swayed_m = ahead * sway_m[0] * (2.0 * phase).sin() + ahead.perp() * sway_m[1] * phase.sin();
+        positions_m.push(position_m + swayed_m);
+    }
+    Some(Trajectory { start_ns: start_ns?, step_ns: STEP_NS, positions_m, arrived_ns: None, ..way.clone() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use umbracast_sim::crowd::{Preset, circle_crossing};
+
+    #[test]
+    fn who_hurries_runs_and_stands_but_jumps_nowhere() {
+        let crowd = hurried(&circle_crossing(Preset::Orca03, 3, 5.0, 1), 1);
+        assert_eq!(crowd.trajectories.len(), 3);
+        let (mut fastest_mps, mut slowest_mps) = (0.0_f64, f64::INFINITY);
+        for way in &crowd.trajectories {
+            for pair in way.positions_m.windows(2) {
+                let speed_mps = pair[0].distance(pair[1]) / STEP_S;
+                (fastest_mps, slowest_mps) = (fastest_mps.max(speed_mps), slowest_mps.min(speed_mps));
+            }
+        }
+        assert!(fastest_mps > 1.2 && fastest_mps < 4.0, "{fastest_mps} m/s");
+        assert!(slowest_mps < 0.01, "{slowest_mps} m/s");
+    }
+}

@@ -1,0 +1,73 @@
+//! The residual network learns what can be learned, and the runtime says what the tensors say.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use umbracast::STEPS;
+use umbracast::forecast::Residual;
+use umbracast::forecast::inputs::{INPUTS, Seen};
+use umbracast::forecast::residual::{OUTPUTS, UNITS};
+use umbracast::geometry::DVec2;
+use umbracast_train::departures::Score;
+use umbracast_train::network::Network;
+use umbracast_train::residual::{FitOptions, NAMES, fit, outputs};
+use umbracast_train::samples::Sample;
+use umbracast_train::weights::to_safetensors;
+
+fn seen(rng: &mut Pcg64) -> Seen {
+    let inputs = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
+    Seen { ahead: DVec2::X, inputs, sigmas: [0.02, 0.02, 0.1, 0.1] }
+}
+
+/// People who speed up by half of what the first input says, whose track errs as the filter thinks.
+fn sample(rng: &mut Pcg64) -> Sample {
+    let seen = seen(rng);
+    let mut draw = |sigma: f64| -> f64 { sigma * Distribution::<f64>::sample(&StandardNormal, &mut *rng) };
+    let errors = seen.sigmas.map(&mut draw);
+    let departure_m = std::array::from_fn(|step| {
+        let t = step as f64 * 0.1;
+        let along = 0.5 * f64::from(seen.inputs[0]) * t * t;
+        [(along + errors[0] + errors[2] * t) as f32, (errors[1] + errors[3] * t) as f32]
+    });
+    Sample { seen, departure_m }
+}
+
+#[test]
+fn a_law_is_learned_and_the_spread_is_honest() {
+    let mut rng = Pcg64::seed_from_u64(1);
+    let samples: Vec<Sample> = (0..4096).map(|_| sample(&mut rng)).collect();
+    let held_out: Vec<Sample> = (0..2048).map(|_| sample(&mut rng)).collect();
+    let weights = fit(&samples, FitOptions { seed: 1, epochs: 60 }, |_| {}).unwrap();
+    let score = Score::of(&Residual::from_safetensors(&weights).unwrap(), &held_out);
+    let last = STEPS - 1;
+    // 0.16 m of 0.20 m can be foreseen along; what the track errs cannot.
+    assert!(score.displacement_m[last] < 0.8 * score.carried_on_m[last], "{score:?}");
+    for step in 0..STEPS {
+        assert!((score.within[0][step] - 0.5).abs() < 0.06, "{score:?}");
+        assert!((score.within[1][step] - 0.9).abs() < 0.04, "{score:?}");
+    }
+}
+
+#[test]
+fn the_runtime_says_what_the_tensors_say() {
+    let device = Device::flex();
+    let shapes = [[UNITS, INPUTS], [1, UNITS], [UNITS, UNITS], [1, UNITS], [OUTPUTS, UNITS], [1, OUTPUTS]];
+    let network = Network::uniform(shapes, [INPUTS, INPUTS, UNITS, UNITS, UNITS, UNITS], 3, &device);
+    let runtime =
+        Residual::from_safetensors(&to_safetensors(&NAMES, &[("", &network)], None).unwrap()).unwrap();
+    let seen = seen(&mut Pcg64::seed_from_u64(2));
+    let signs = umbracast::forecast::inputs::mirror();
+    let rows: Vec<f32> = seen
+        .inputs
+        .into_iter()
+        .chain(std::array::from_fn::<f32, INPUTS, _>(|i| seen.inputs[i] * signs[i]))
+        .collect();
+    let rows = Tensor::<2>::from_data(TensorData::new(rows, [2, INPUTS]), &device);
+    let both: Vec<f32> = outputs(&network, rows).into_data().try_to_vec().unwrap();
+    for (i, found) in runtime.outputs(&seen).into_iter().enumerate() {
+        let mirrored = if (3..6).contains(&i) { -both[OUTPUTS + i] } else { both[OUTPUTS + i] };
+        let expected = 0.5 * (both[i] + mirrored);
+        assert!((found - expected).abs() < 1e-5, "output {i}: {found} and {expected}");
+    }
+}
