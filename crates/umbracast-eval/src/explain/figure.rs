@@ -55,7 +55,7 @@ fn rungs(story: &Story) -> Panel {
             Source::Known => LIGHT,
         };
         panel.series.push(series("", color, Mark::Line(14.0), vec![(0.5, y), (*f1, y)]));
-        panel.notes.push((f1 + 0.025, y - 0.22, format!("{f1:.3}")));
+        panel.notes.push((f1 + 0.03, y - 0.22, format!("{f1:.3}")));
     }
     panel
 }
