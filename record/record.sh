@@ -22,7 +22,10 @@ more() { # the same, added to the file
     "$@" --quiet 2>&1 | sed "s|${UMBRACAST_DATA:-/nowhere}|\$UMBRACAST_DATA|g; s|$scratch|/tmp|g" >>"$file" || true
 }
 
-# The headline: 40 test scenes, every mode, baselines, error budget, ladder.
+# The headline: what the default mode scores on 100 test scenes.
+record orca-03-100-scenes umbracast evaluate --scenes 100 --preset orca-03 --mode default --out "$scratch/headline"
+
+# 40 test scenes, every mode, baselines, error budget, ladder.
 record orca-40-scenes umbracast evaluate --scenes 20 --preset orca-03,orca-06 --out "$scratch/orca"
 # The page holds baselines, error budget and ladder too.
 sed "s|$scratch|/tmp|g" "$scratch/orca/report.html" >record/orca-40-scenes.html
@@ -32,7 +35,7 @@ record coverage umbracast coverage --out "$scratch/coverage"
 cp "$scratch/coverage/coverage.svg" record/coverage.svg
 
 # Other heights, a lost sensor, more people, pairs.
-record sites record/sites.sh 20 hdl,paper,default
+record sites record/sites.sh 20 default
 
 # Why the paper's figures are what they are.
 record/explain.sh
@@ -68,7 +71,7 @@ if [ -n "${UMBRACAST_DATA:-}" ]; then
     walkers="$UMBRACAST_DATA/circle_antipode"
     record circle-antipode umbracast evaluate --unit cm --fps 25 --out "$scratch/walkers" \
         --trajectories "$walkers/circle-10m-08-2.txt" "$walkers/circle-10m-16-2.txt"
-    record people record/people.sh 20 hdl,paper,default
+    record people record/people.sh 20 default
     frames="$UMBRACAST_DATA/logictronix_vlp16"
     site=config/sites/logictronix.toml
     : >record/logictronix.txt
