@@ -6,18 +6,7 @@ cd "$(dirname "$0")/.."
 : "${UMBRACAST_DATA:?expected the folder of the real data}"
 scenes="${1:-20}"
 modes="${2:-hdl,paper,default}"
-scratch="$(mktemp -d)"
-trap 'rm -rf "$scratch"' EXIT
-reports=()
-
-score() { # NAME ARGUMENTS...
-    local name="$1"
-    shift
-    mkdir "$scratch/$name"
-    reports+=("$scratch/$name")
-    printf '# %s: umbracast evaluate --mode %s %s\n' "$name" "$modes" "$*" | sed "s|$UMBRACAST_DATA|\$UMBRACAST_DATA|g"
-    umbracast evaluate --mode "$modes" "$@" --json --quiet >"$scratch/$name/scores.json"
-}
+source record/score.sh
 
 score plain --scenes "$scenes" --preset orca-03
 for kind in bag phone pockets child wheelchair; do
@@ -33,5 +22,4 @@ score pedpy --seconds 20 --trajectories "$UMBRACAST_DATA/pedpy/traj_UNI_CORR_500
     "$UMBRACAST_DATA/pedpy/030_c_56_h0.txt"
 score madras --trajectories "$UMBRACAST_DATA/madras/Topview_1A.csv" "$UMBRACAST_DATA/madras/Topview_1C.csv" \
     "$UMBRACAST_DATA/madras/Topview_2F.csv"
-echo
-umbracast compare "${reports[@]}"
+compare

@@ -265,7 +265,7 @@ fn the_order_of_detections_does_not_matter() {
 #[test]
 fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
     let mut config = Config::for_mode(Mode::Default).track;
-    (config.noise_floor_m, config.noise_per_point_m, config.noise_share) = (0.05, 0.0, 0.0);
+    (config.noise_floor_m, config.noise_share) = (0.05, 0.0);
     (config.sway_left_m, config.sway_ahead_m) = (0.0, 0.0);
     // One model and a walker who keeps to it: nothing but the filter's own account is tested.
     (config.acceleration_m2ps3, config.model_share, config.standing_share) = (vec![1e-6], vec![1.0], 0.0);

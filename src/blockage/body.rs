@@ -14,6 +14,7 @@ const HIP_SHARE: f64 = 0.53;
 const FULL_SWAY_HZ: f64 = 0.5;
 /// Gaits are known up to here: 2 m/s.
 const FASTEST_HZ: f64 = 2.0;
+
 /// How one body stands or walks at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Posture {

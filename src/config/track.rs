@@ -34,10 +34,8 @@ pub struct TrackConfig {
     pub follow_z: bool,
     /// How much of the variance that a detection tells of its position is no sway, which the filter follows.
     pub noise_share: f64,
-    /// Measurement noise of a detection with many points, one axis.
+    /// Measurement noise that nothing mends, one axis.
     pub noise_floor_m: f64,
-    /// Measurement noise that falls with the square root of the points, one axis.
-    pub noise_per_point_m: f64,
     /// Measurement noise added where hardly anything of a person's height is seen, one axis; none is where half is.
     pub hidden_noise_m: f64,
     /// A new track's position variance as a multiple of the measurement's.

@@ -4,7 +4,7 @@
 //! own sensor by a constant, and back along the person's way to the mean time of all points; the rest is left to
 //! [`super::axis`], which is told how the points lie, in a frame along the line of sight.
 
-use super::Point;
+use super::{Point, WALKING_MPS};
 use crate::geometry::{DVec2, DVec3};
 
 /// Numbers that stay when the scene is mirrored at the line of sight.
@@ -15,8 +15,6 @@ pub const ODD: usize = 14;
 const BANDS: [f64; 6] = [0.12, 0.3, 0.5, 0.62, 0.74, 0.86];
 /// The part whose extent tells more than its mean.
 const TRUNK: std::ops::Range<f64> = 0.5..0.86;
-/// Who walks slower may look anywhere.
-const WALKING_MPS: f64 = 0.3;
 
 /// A person's points as the model of the body axis sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]

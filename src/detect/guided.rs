@@ -3,7 +3,7 @@
 //! A body is wide in the trunk and long in the legs, so two people whose feet lie among each other come apart all
 //! the same. Without such knowledge nobody can tell four legs of two people from four people.
 
-use super::Prior;
+use super::{Prior, WALKING_MPS};
 use crate::geometry::{DVec2, DVec3};
 
 /// Passes of the assignment; it settles in two or three.
@@ -14,8 +14,6 @@ const GATE: f64 = 3.5;
 const MEAN_SIGMA_M: f64 = 0.1;
 /// The same for a single point.
 const POINT_SIGMA_M: f64 = 0.2;
-/// Who walks slower may look anywhere.
-const WALKING_MPS: f64 = 0.3;
 
 /// The place of each of `points` in `people`, if anybody's. `moved_m` are all points, each moved behind the surface
 /// that its sensor saw. k-means, where each person's place stays near the expected one and a body has a shape.

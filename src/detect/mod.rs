@@ -21,6 +21,9 @@ pub use split_merge::Clusterer;
 
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 
+/// Who walks slower may look anywhere.
+const WALKING_MPS: f64 = 0.3;
+
 /// A foreground point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {

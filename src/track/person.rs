@@ -211,14 +211,12 @@ impl Person {
 }
 
 /// Covariance of a detection's position for the filter, which follows the sway itself: what the detection tells of
-/// its error counts in part; beside it a part that nothing mends, one that falls with the number of points, and one
-/// that falls with the share of the body that is seen.
+/// its error counts in part; beside it a part that nothing mends, and one that falls with the share of the body that
+/// is seen.
 pub(super) fn noise(config: &TrackConfig, detection: &Detection) -> Mat2 {
     // 1 where hardly anything is seen, 0 from half the height on.
     let hidden = (1.0 - 2.0 * detection.aabb.size_m().z / config.height_mean_m).max(0.0);
-    let variance = config.noise_floor_m.powi(2)
-        + (config.hidden_noise_m * hidden).powi(2)
-        + config.noise_per_point_m.powi(2) / f64::from(detection.points.max(1));
+    let variance = config.noise_floor_m.powi(2) + (config.hidden_noise_m * hidden).powi(2);
     let told = detection.covariance_m2.unwrap_or_default();
     plus(told.map(|row| row.map(|c| config.noise_share * c)), [[variance, 0.0], [0.0, variance]])
 }
