@@ -269,7 +269,7 @@ pub fn note_truth(scene: u32, frame: &SceneFrame, truth: &mut SceneTruth) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::score::Predictor;
     use std::sync::atomic::{AtomicU64, Ordering};
@@ -279,19 +279,19 @@ mod tests {
     use umbracast_sim::body::kind::Kind;
     use umbracast_sim::crowd::Trajectory;
 
-    /// Three people who walk side by side for 2.5 s.
-    fn spec(scenes: u64) -> Spec {
+    /// `scenes` scenes of people who walk for so many frames; `at_m` gives the place of a person after so many steps of
+    /// 10 ms.
+    pub(crate) fn walk(scenes: u64, people: u32, frames: i32, at_m: impl Fn(f64, f64) -> DVec2) -> Spec {
         let way = |person: u32| Trajectory {
             person,
             start_ns: 0,
             step_ns: 10_000_000,
-            positions_m: (0..=250)
-                .map(|i| DVec2::new(0.01 * f64::from(i), 1.5 * f64::from(person)))
-                .collect(),
+            positions_m: (0..=10 * frames).map(|i| at_m(f64::from(person), f64::from(i))).collect(),
             arrived_ns: None,
             height_m: None,
         };
-        let crowd = Crowd { trajectories: (0..3).map(way).collect(), duration_ns: 25 * STEP_NS };
+        let duration_ns = i64::from(frames) * STEP_NS;
+        let crowd = Crowd { trajectories: (0..people).map(way).collect(), duration_ns };
         let scene = |seed| SceneSpec {
             group: "walk".to_owned(),
             seed,
@@ -302,9 +302,14 @@ mod tests {
             configs: vec![Config::for_mode(Mode::Default)],
             weights: None,
             scenes: (0..scenes).map(scene).collect(),
-            keep: Some(0),
+            keep: None,
             ladder: false,
         }
+    }
+
+    /// Three people who walk side by side for 2.5 s.
+    fn spec(scenes: u64) -> Spec {
+        Spec { keep: Some(0), ..walk(scenes, 3, 25, |person, i| DVec2::new(0.01 * i, 1.5 * person)) }
     }
 
     fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {

@@ -1,38 +1,13 @@
 use super::*;
-use crate::chain::{People, SceneSpec};
+use crate::chain::tests::walk;
 use crate::pooled;
 use crate::report;
+use umbracast::Config;
 use umbracast::geometry::DVec2;
-use umbracast::{Config, Mode, STEP_NS};
-use umbracast_sim::body::kind::Bodies;
-use umbracast_sim::crowd::{Crowd, Trajectory};
 
-/// Two people who walk one behind the other for 2.2 s, in `scenes` scenes.
+/// Two people who walk side by side for 2.2 s, in `scenes` scenes.
 fn spec(scenes: u64) -> Spec {
-    let way = |person: u32| Trajectory {
-        person,
-        start_ns: 0,
-        step_ns: 10_000_000,
-        positions_m: (0..=220)
-            .map(|i| DVec2::new(5.0 - f64::from(person), -1.0 + 0.01 * f64::from(i)))
-            .collect(),
-        arrived_ns: None,
-        height_m: None,
-    };
-    let crowd = Crowd { trajectories: (0..2).map(way).collect(), duration_ns: 22 * STEP_NS };
-    let scene = |seed| SceneSpec {
-        group: "walk".to_owned(),
-        seed,
-        people: People::Replayed(crowd.clone()),
-        bodies: Bodies::default(),
-    };
-    Spec {
-        configs: vec![Config::for_mode(Mode::Default)],
-        weights: None,
-        scenes: (0..scenes).map(scene).collect(),
-        keep: None,
-        ladder: true,
-    }
+    Spec { ladder: true, ..walk(scenes, 2, 22, |person, i| DVec2::new(5.0 - person, -1.0 + 0.01 * i)) }
 }
 
 fn experiment<'a>(spec: &'a Spec, folder: &Path) -> Experiment<'a> {
