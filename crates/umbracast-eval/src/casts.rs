@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use umbracast::blockage::Caster;
 use umbracast::config::{BlockageConfig, BlockageMethod, BoxKind};
-use umbracast::forecast::{Coupling, Forecast, Forecaster, Gaussian2, Weights, constant_velocity};
+use umbracast::forecast::{Coupling, Forecast, Gaussian2, Weights, constant_velocity};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use umbracast::track::{Gait, OBSERVED, Observed, Track};
 use umbracast::{Config, Error, STEP_S, STEPS};
@@ -13,6 +13,7 @@ use umbracast_io::rows::{PeopleRow, TrackRow};
 
 use crate::links::Said;
 use crate::scene::{Matching, SceneRun, TruthIndex};
+use crate::true_forecasts::TrueForecasts;
 
 /// Front to back and side to side of the box given to a person whom no track has measured (PAPER's ladder).
 const PERSON_BOX_M: [f64; 2] = [0.28, 0.46];
@@ -62,22 +63,23 @@ pub fn true_state(
     matching: &Matching,
     config: &Config,
     weights: Option<&Weights>,
+    made: &mut TrueForecasts,
 ) -> Result<Said, Error> {
-    let mut forecaster = Forecaster::new(&config.forecast, weights)?;
     let mut caster = Caster::new(&config.blockage, &config.site);
     let rows: BTreeMap<(u64, u64), &TrackRow> = run.tracks.iter().map(|r| ((r.frame, r.track), r)).collect();
-    let (mut said, mut forecasts, mut blockages) = (Said::default(), Vec::new(), Vec::new());
-    for &frame in &truth.frames {
-        let track = |row: &PeopleRow| {
-            let own = matching.get(&(frame, row.person)).and_then(|track| rows.get(&(frame, *track)));
-            match own {
-                Some(own) => with_true_state(truth, own, row, config.track.heading_speed_mps),
-                None => true_track(truth, row, person_box(row)),
-            }
-        };
-        let tracks: Vec<Track> = truth.people_of(frame).map(track).collect();
-        forecaster.forecast(&tracks, &mut forecasts);
-        caster.cast(&tracks, &forecasts, &mut blockages);
+    let (mut said, mut blockages) = (Said::default(), Vec::new());
+    let track = |row: &PeopleRow| {
+        let own = matching.get(&(row.frame, row.person)).and_then(|track| rows.get(&(row.frame, *track)));
+        match own {
+            Some(own) => with_true_state(truth, own, row, config.track.heading_speed_mps),
+            None => true_track(truth, row, person_box(row)),
+        }
+    };
+    let tracks: Vec<Vec<Track>> =
+        truth.frames.iter().map(|&frame| truth.people_of(frame).map(track).collect()).collect();
+    let forecasts = made.of(&config.forecast, weights, &tracks)?;
+    for ((&frame, tracks), forecasts) in truth.frames.iter().zip(&tracks).zip(forecasts) {
+        caster.cast(tracks, forecasts, &mut blockages);
         said.add(frame, &blockages);
     }
     Ok(said)
@@ -293,8 +295,32 @@ mod tests {
         let (truth, config) = crossing();
         let index = TruthIndex::new(&truth);
         let (run, matching) = (SceneRun::default(), Matching::new());
-        let said = true_state(&index, &run, &matching, &config, None).unwrap();
+        let made = &mut TrueForecasts::default();
+        let said = true_state(&index, &run, &matching, &config, None, made).unwrap();
         assert!(said_of_person_0(&said, &truth)[3]);
+    }
+
+    #[test]
+    fn forecasts_that_two_modes_share_are_those_that_each_would_make() {
+        let (truth, _) = crossing();
+        let index = TruthIndex::new(&truth);
+        let weights =
+            Weights::from_safetensors(include_bytes!("../../../models/paper_lstm.safetensors")).unwrap();
+        // Both follow person 1; the modes' tracks differ.
+        let matching = Matching::from([((9, 1), 7)]);
+        let run = |height_m, heading_rad| SceneRun {
+            tracks: vec![TrackRow { height_m, heading_rad, ..track_row(9, 7, -0.6, -0.5) }],
+            links: Vec::new(),
+        };
+        let mut shared = TrueForecasts::default();
+        let runs = [(Mode::Hdl, run(1.9, 0.3)), (Mode::Paper, run(1.6, 1.3)), (Mode::Default, run(1.7, 2.0))];
+        for (mode, run) in runs {
+            let config = Config::for_mode(mode);
+            let said = |made: &mut TrueForecasts| {
+                true_state(&index, &run, &matching, &config, Some(&weights), made).unwrap()
+            };
+            assert_eq!(said(&mut shared), said(&mut TrueForecasts::default()), "{}", mode.name());
+        }
     }
 
     /// Person 1 of the crossing at frame 9 and a track of it: off to the side, taller, and turned.

@@ -16,6 +16,7 @@ pub mod stage1;
 pub mod displacement;
 pub mod links;
 pub mod times;
+pub mod true_forecasts;
 pub mod casts;
 pub mod true_bodies;
 pub mod score;

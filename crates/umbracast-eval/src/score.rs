@@ -19,6 +19,7 @@ use crate::stage1::Stage1;
 use crate::tally::{LinkTally, Prediction};
 use crate::times::Times;
 use crate::true_bodies::true_bodies;
+use crate::true_forecasts::TrueForecasts;
 
 /// Who predicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -140,7 +141,7 @@ pub fn score_scene(
     };
     add(None, Predictor::Never, never(&instances));
     add(None, Predictor::PersistenceOfTruth, persistence_of_truth(&instances));
-    let mut modes = Vec::new();
+    let (mut modes, mut true_forecasts) = (Vec::new(), TrueForecasts::default());
     for ModeRun { config, rows, health } in runs {
         let mode = Some(config.mode);
         let matching = match_scene(&truth.people, &rows.tracks);
@@ -156,7 +157,7 @@ pub fn score_scene(
             Predictor::ConstantVelocityOfTruth,
             of_persons(casts::constant_velocity_of_truth(&index, config)),
         );
-        let true_state = casts::true_state(&index, rows, &matching, config, weights)?;
+        let true_state = casts::true_state(&index, rows, &matching, config, weights, &mut true_forecasts)?;
         add(mode, Predictor::TrueState, of_persons(true_state));
         add(mode, Predictor::TrueFuture, of_tracks(casts::true_future(&index, rows, &matching, config)));
         if let Some(walkers) = walkers {
