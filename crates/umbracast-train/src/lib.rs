@@ -8,6 +8,7 @@
 pub mod windows;
 pub mod network;
 pub mod adam;
+pub mod gradient;
 pub mod weights;
 pub mod score;
 pub mod card;

@@ -5,14 +5,16 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use burn::tensor::{Device, Tensor, TensorData};
-use glam::DVec2;
+use burn::tensor::Device;
 use umbracast::Error;
 use umbracast::STEPS;
 use umbracast_sim::crowd::Preset;
 
-use crate::adam::{Adam, gradients};
+use crate::adam::Adam;
 use crate::card;
+#[cfg(any(feature = "cuda", feature = "wgpu"))]
+use crate::gradient::recorded;
+use crate::gradient::{frames, written_out};
 use crate::network::{NAMES, Network, Size, loss};
 use crate::score::{Scores, score};
 use crate::weights::{from_safetensors, state, to_safetensors};
@@ -113,7 +115,7 @@ impl TrainOptions {
 /// Where the tensors live.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Processor {
-    /// One thread.
+    /// All threads of the pool that training is called from.
     Cpu,
     /// The first of NVIDIA's.
     #[cfg(feature = "cuda")]
@@ -131,6 +133,14 @@ impl Processor {
             Self::Cuda => Device::cuda(0),
             #[cfg(feature = "wgpu")]
             Self::Wgpu => Device::wgpu(Default::default()),
+        }
+    }
+
+    fn gradient(self, network: &Network, batch: &[Window], device: &Device) -> (f64, Network) {
+        match self {
+            Self::Cpu => written_out(network, batch, device),
+            #[cfg(any(feature = "cuda", feature = "wgpu"))]
+            _ => recorded(network, batch, device),
         }
     }
 }
@@ -188,13 +198,11 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&Progress)) -> Res
             validation_loss: None,
         };
         for batch in windows.chunks(options.batch) {
-            let tracked = run.network.tracked();
-            let loss = batch_loss(&tracked, batch, &device);
-            let gradients = gradients(&tracked, loss.backward());
-            total += f64::from(loss.into_scalar::<f32>());
+            let (loss, gradient) = options.processor.gradient(&run.network, batch, &device);
+            total += loss;
             let done = run.adam.updates as f64 / (options.epochs * batches) as f64;
             let rate = options.learning_rate * 0.5 * (1.0 + (PI * done).cos());
-            run.network = run.adam.update(run.network, gradients, rate, options.clip);
+            run.network = run.adam.update(run.network, gradient, rate, options.clip);
             report.batch += 1;
             report.training_loss = total / report.batch as f64;
             if report.batch == batches {
@@ -236,22 +244,14 @@ fn ways(scenes: &[(u64, Preset)], options: &TrainOptions) -> Result<Ways, Error>
     Ok(ways)
 }
 
-fn batch_loss(network: &Network, windows: &[Window], device: &Device) -> Tensor<1> {
-    let column = |displacement_m: &dyn Fn(&Window) -> DVec2| -> Tensor<2> {
-        let values: Vec<f32> =
-            windows.iter().flat_map(|window| displacement_m(window).as_vec2().to_array()).collect();
-        Tensor::from_data(TensorData::new(values, [windows.len(), 2]), device)
-    };
-    let observed: Vec<_> =
-        (0..windows[0].observed_m.len()).map(|i| column(&|window| window.observed_m[i])).collect();
-    let coming = (0..STEPS).map(|i| column(&|window| window.coming_m[i])).collect();
-    loss(network.roll_out(&observed, STEPS), coming)
-}
-
 fn mean_loss(network: &Network, windows: &[Window], batch: usize, device: &Device) -> f64 {
     let total: f64 = windows
         .chunks(batch)
-        .map(|batch| f64::from(batch_loss(network, batch, device).into_scalar::<f32>()) * batch.len() as f64)
+        .map(|batch| {
+            let (observed_m, coming_m) = frames(batch, device);
+            let loss = loss(network.roll_out(&observed_m, STEPS), coming_m);
+            f64::from(loss.into_scalar::<f32>()) * batch.len() as f64
+        })
         .sum();
     total / windows.len() as f64
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use umbracast::Error;
 use umbracast_train::departures::{ResidualOptions, train_residual};
 use umbracast_train::residual::FitOptions;
-use umbracast_train::{Noise, TrainOptions, TrainedModel, train};
+use umbracast_train::{Noise, Progress, TrainOptions, TrainedModel, train};
 
 use crate::args::{Common, Train, What};
 use crate::progress::bar;
@@ -74,13 +74,14 @@ pub fn fit(options: TrainOptions, folder: &Path, common: &Common) -> Result<Trai
     let options = TrainOptions { checkpoint: Some(folder.join("paper_lstm.checkpoint")), ..options };
     let batches = options.epochs * (options.windows_per_epoch / options.batch.max(1));
     let progress = bar(batches as u64, "training", common.quiet);
-    let model = train(&options, &mut |now| {
+    let mut told = |now: &Progress| {
         progress.set_position((now.epoch * now.batches + now.batch) as u64);
         progress.set_message(format!("loss {:.3}", now.training_loss));
         if let Some(loss) = now.validation_loss {
             progress.println(format!("epoch {} of {}: validation {loss:.4}", now.epoch + 1, now.epochs));
         }
-    })?;
+    };
+    let model = setup::with_threads(common.threads, || train(&options, &mut told))??;
     progress.finish_and_clear();
     setup::write(&folder.join("paper_lstm.safetensors"), &model.safetensors)?;
     setup::write(&folder.join("paper_lstm.md"), &model.card)?;
