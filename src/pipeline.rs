@@ -46,8 +46,9 @@ impl Outcome {
     }
 }
 
-/// The three stages with what each remembers.
-#[derive(Debug)]
+/// The three stages with what each remembers. A clone goes on by itself: one that has learned the empty scene
+/// serves many recordings.
+#[derive(Debug, Clone)]
 pub struct Pipeline {
     background: Background,
     clusterer: Clusterer,

@@ -14,7 +14,7 @@ use crate::{STEPS, Site};
 const TURNS_FROM_M: f64 = 0.03;
 
 /// Stage 3 with what it needs to know.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Caster {
     config: BlockageConfig,
     access_points_m: Vec<DVec3>,

@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 use crate::STEPS;
 
 /// By coordinate, then by sample: standard normal, or even in (0, 1) where said.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Draws {
     pub(super) state: [Vec<f64>; 4],
     pub(super) kicks: [[Vec<f64>; 2]; STEPS],

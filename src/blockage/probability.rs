@@ -35,7 +35,7 @@ pub struct Chances {
 }
 
 /// Samples of all people in one frame.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Sampler {
     samples: usize,
     /// By track: what a person's samples are made of, drawn once.
@@ -46,7 +46,7 @@ pub struct Sampler {
 }
 
 /// Samples of one person. Positions of step s, sample k at `s * samples + k`; step 0 is now.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct Ways {
     positions_m: Vec<DVec2>,
     /// By step: the heading's unit vector, to be turned by the sample's `turn`.

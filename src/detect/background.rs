@@ -5,11 +5,11 @@ use super::voxel::{VoxelMap, thin};
 use super::{Point, Prior};
 use crate::config::{BackgroundConfig, BackgroundMethod, DetectConfig};
 use crate::geometry::{DVec3, Pose};
-use crate::lidar::{Cloud, RangeImage, Scan, SensorPoint};
+use crate::lidar::{Azimuths, Cloud, RangeImage, Scan, SensorPoint};
 use crate::{Error, Frame, Health, Site};
 
 /// What the empty scene looks like to each sensor.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Background {
     config: BackgroundConfig,
     sensors: Vec<SensorModel>,
@@ -22,9 +22,10 @@ pub struct Background {
     map_scans: u32,
     keys: Vec<u64>,
     thinned: Vec<Point>,
+    azimuths: Azimuths,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct SensorModel {
     range_min_m: f32,
     range_max_m: f32,
@@ -86,6 +87,7 @@ impl Background {
             map_scans: 0,
             keys: Vec::new(),
             thinned: Vec::new(),
+            azimuths: Azimuths::of_a_turn(),
             config,
         })
     }
@@ -170,7 +172,9 @@ impl Background {
                     for (i, &range_m) in image.range_m.iter().enumerate() {
                         let (c, b) = (i / image.beams.len().max(1), i % image.beams.len().max(1));
                         if range_m != 0.0 && c < image.columns.len() && valid(range_m, health) {
-                            points.push(organised_point(scan, image, c, b, range_m));
+                            let position_m = image.tabled_point_m(&self.azimuths, c, b, f64::from(range_m));
+                            let time_ns = image.time_ns(c, b);
+                            points.push(to_site(&scan.site_from_sensor, scan.sensor, position_m, time_ns));
                         }
                     }
                 }

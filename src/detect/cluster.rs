@@ -6,7 +6,7 @@
 use crate::geometry::DVec2;
 
 /// Finds connected components; keeps its memory from frame to frame.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct PlanGrid {
     /// Row, column and point, sorted.
     keys: Vec<(i32, i32, u32)>,

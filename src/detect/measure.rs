@@ -11,7 +11,7 @@ use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 const OWN_M: f64 = 0.5;
 
 /// Turns clusters into detections.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Measurer {
     config: MeasureConfig,
     whole_top_m: f64,

@@ -48,7 +48,7 @@ struct Piece {
 }
 
 /// The pixels of one sensor, bin after bin, in each bin row after row: as the columns of a scan come.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct RangeModel {
     bins: usize,
     bins_per_cdeg: f32,

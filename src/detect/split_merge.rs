@@ -9,7 +9,7 @@ use crate::config::{ClusterConfig, DetectConfig, SplitConfig, SplitMethod};
 use crate::geometry::{DVec2, DVec3};
 
 /// Groups foreground points into people.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Clusterer {
     cluster: ClusterConfig,
     split: SplitConfig,

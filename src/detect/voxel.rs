@@ -8,7 +8,7 @@ use crate::geometry::{Aabb, DVec3};
 const VOXELS_MAX: usize = 1 << 28;
 
 /// How many points of the map lie in each voxel of the map's box.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct VoxelMap {
     bounds: Aabb,
     edge_m: f64,

@@ -14,14 +14,14 @@ use crate::track::{OBSERVED, Observed, Track};
 use crate::{Error, STEP_NS};
 
 /// Foresees.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Forecaster {
     config: ForecastConfig,
     network: Network,
 }
 
 /// What the method needs.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 enum Network {
     None,
     Residual(Residual),

@@ -9,4 +9,4 @@ pub mod assemble;
 pub use assemble::Assembler;
 pub use model::{Beam, Model};
 pub use packet::Packet;
-pub use scan::{Cloud, Column, Frame, RangeImage, Scan, SensorPoint};
+pub use scan::{Azimuths, Cloud, Column, Frame, RangeImage, Scan, SensorPoint};

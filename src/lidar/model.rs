@@ -12,6 +12,8 @@ use crate::geometry::DVec3;
 pub struct Beam {
     /// Above the horizon of the sensor, radians.
     pub elevation_rad: f64,
+    /// Sine and cosine of the elevation: clouds have 100,000 points a frame.
+    pub elevation_sin_cos: (f64, f64),
     /// Its origin above the sensor's origin, metres.
     pub z_offset_m: f64,
     /// When it fires after the column's first beam.
@@ -22,9 +24,8 @@ pub struct Beam {
 
 impl Beam {
     /// A point at `range_m` in the sensor's frame: x ahead at azimuth 0, azimuth clockwise from above.
-    pub fn point_m(&self, azimuth_rad: f64, range_m: f64) -> DVec3 {
-        let (sin_el, cos_el) = self.elevation_rad.sin_cos();
-        let (sin_az, cos_az) = azimuth_rad.sin_cos();
+    pub fn point_m(&self, azimuth_sin_cos: (f64, f64), range_m: f64) -> DVec3 {
+        let ((sin_el, cos_el), (sin_az, cos_az)) = (self.elevation_sin_cos, azimuth_sin_cos);
         DVec3::new(range_m * cos_el * cos_az, -range_m * cos_el * sin_az, range_m * sin_el + self.z_offset_m)
     }
 }
@@ -104,6 +105,7 @@ fn beams(elevation_deg: &[f64], z_offset_mm: &[f64], fire_period_ns: u32) -> Arc
         .enumerate()
         .map(|(i, (&elevation, &z))| Beam {
             elevation_rad: elevation.to_radians(),
+            elevation_sin_cos: elevation.to_radians().sin_cos(),
             z_offset_m: z * 1e-3,
             fire_offset_ns: i as u32 * fire_period_ns,
             ring: ring(elevation),
@@ -137,7 +139,7 @@ mod tests {
     #[test]
     fn azimuth_turns_clockwise_from_ahead() {
         let beam = Model::vlp_16().beams[15];
-        let right = beam.point_m(90_f64.to_radians(), 2.0);
+        let right = beam.point_m(90_f64.to_radians().sin_cos(), 2.0);
         let elevation_rad = 15_f64.to_radians();
         let expected = DVec3::new(0.0, -2.0 * elevation_rad.cos(), 2.0 * elevation_rad.sin() - 0.011_23);
         assert!((right - expected).length() < 1e-12, "{right}");

@@ -5,6 +5,9 @@ use std::sync::Arc;
 use super::Beam;
 use crate::geometry::{DVec3, Pose};
 
+/// Hundredths of a degree.
+const TURN_CDEG: i64 = 36_000;
+
 /// All scans of one period. Frame k covers k/10 s to (k+1)/10 s and closes at its end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
@@ -71,6 +74,24 @@ pub struct SensorPoint {
     pub reflectivity: f32,
 }
 
+/// Sine and cosine of every azimuth that a range image tells apart.
+#[derive(Debug, Clone)]
+pub struct Azimuths {
+    /// By hundredths of a degree.
+    sin_cos: Vec<(f64, f64)>,
+}
+
+impl Azimuths {
+    /// All of a turn.
+    pub fn of_a_turn() -> Self {
+        Self { sin_cos: (0..TURN_CDEG as u32).map(azimuth_sin_cos).collect() }
+    }
+}
+
+fn azimuth_sin_cos(azimuth_cdeg: u32) -> (f64, f64) {
+    (f64::from(azimuth_cdeg) * 0.01).to_radians().sin_cos()
+}
+
 impl RangeImage {
     /// Azimuth of beam `b` in column `c`, hundredths of a degree in [0, 36000), rounded to a whole one as the
     /// manufacturer's decoder does.
@@ -78,17 +99,54 @@ impl RangeImage {
         let column = &self.columns[c];
         let azimuth =
             column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * self.beams[b].fire_offset_ns as f32;
-        (azimuth.round() as i64).rem_euclid(36_000) as u32
+        // Rounds half away from zero as `round` does, which is a call where it is no instruction.
+        let azimuth = f64::from(azimuth);
+        ((azimuth + 0.5_f64.copysign(azimuth)) as i64).rem_euclid(TURN_CDEG) as u32
     }
 
     /// The point of beam `b` in column `c` at `range_m`, in the sensor's frame.
     pub fn point_m(&self, c: usize, b: usize, range_m: f64) -> DVec3 {
-        let azimuth_rad = (f64::from(self.azimuth_cdeg(c, b)) * 0.01).to_radians();
-        self.beams[b].point_m(azimuth_rad, range_m)
+        self.beams[b].point_m(azimuth_sin_cos(self.azimuth_cdeg(c, b)), range_m)
+    }
+
+    /// The same point, to the last bit, where there are many.
+    pub fn tabled_point_m(&self, azimuths: &Azimuths, c: usize, b: usize, range_m: f64) -> DVec3 {
+        self.beams[b].point_m(azimuths.sin_cos[self.azimuth_cdeg(c, b) as usize], range_m)
     }
 
     /// When beam `b` of column `c` fired.
     pub fn time_ns(&self, c: usize, b: usize) -> i64 {
         self.columns[c].time_ns + i64::from(self.beams[b].fire_offset_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lidar::Model;
+
+    #[test]
+    fn tabled_points_are_the_computed_ones_to_the_last_bit() {
+        let beams = Model::hdl_32e().beams;
+        let column =
+            |i| Column { time_ns: 0, azimuth_cdeg: i as f32 * 7.3, azimuth_rate_cdeg_per_ns: 3.6e-4 };
+        let columns: Vec<Column> = (0..5000).map(column).collect();
+        let rays = columns.len() * beams.len();
+        let image = RangeImage { beams, columns, range_m: vec![0.0; rays], reflectivity: vec![0; rays] };
+        let azimuths = Azimuths::of_a_turn();
+        for (c, b) in (0..image.columns.len()).map(|c| (c, c % image.beams.len())) {
+            assert_eq!(image.tabled_point_m(&azimuths, c, b, 12.34), image.point_m(c, b, 12.34));
+        }
+    }
+
+    #[test]
+    fn halves_of_an_azimuth_are_rounded_away_from_zero_and_a_turn_is_none() {
+        let azimuth_cdeg = |azimuth_cdeg| {
+            let columns = vec![Column { time_ns: 0, azimuth_cdeg, azimuth_rate_cdeg_per_ns: 0.0 }];
+            let beams = Model::vlp_16().beams;
+            RangeImage { beams, columns, range_m: vec![], reflectivity: vec![] }.azimuth_cdeg(0, 0)
+        };
+        let found = [0.499_999_97, 0.5, 2.5, -0.5, 35_999.5, 36_001.0].map(azimuth_cdeg);
+        assert_eq!(found, [0, 1, 3, 35_999, 0, 1]);
     }
 }

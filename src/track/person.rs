@@ -28,7 +28,7 @@ const STANDING_TURN_RAD2PS: f64 = 0.5;
 const WIDTH_M: f64 = 0.5;
 
 /// A track with everything behind it, at the time of the last frame.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Person {
     pub(super) id: u64,
     pub(super) filter: Filter,

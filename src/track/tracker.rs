@@ -11,7 +11,7 @@ use crate::geometry::DVec2;
 use crate::{Frame, Site};
 
 /// Follows people.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Tracker {
     config: TrackConfig,
     visibility: Visibility,

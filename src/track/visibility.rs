@@ -29,7 +29,7 @@ pub struct Body {
 }
 
 /// What stands still between sensors and people.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Visibility {
     pillars: Vec<(DVec2, f64)>,
     furniture: Vec<Obb>,
@@ -38,7 +38,7 @@ pub struct Visibility {
 }
 
 /// One scan's view.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Eye {
     origin_m: DVec3,
     sensor_from_site: Pose,
@@ -47,7 +47,7 @@ pub struct Eye {
 }
 
 /// Where the beams of a scan go.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Fan {
     /// Ascending.
     elevations_rad: Vec<f64>,

@@ -136,19 +136,20 @@ pub fn empty_frames(site: &Site) -> Result<Vec<Frame>, Error> {
     Ok(std::iter::from_fn(|| assembler.pop()).collect())
 }
 
-/// What all scenes share: the hall as the sensors see it, with nobody in it.
+/// What all scenes share: the hall as the sensors see it, and as every mode has learned it, with nobody in it.
 #[derive(Debug)]
 pub struct Chain<'a> {
     spec: &'a Spec,
     sensors: Sensors,
-    empty: Vec<Frame>,
+    /// One a mode, before its first frame.
+    pipelines: Vec<Pipeline>,
 }
 
 impl<'a> Chain<'a> {
     /// Traces the hall.
     ///
     /// # Errors
-    /// No mode, modes with different sites, a sensor that cannot be simulated.
+    /// No mode, modes with different sites, a sensor that cannot be simulated, a setting that cannot work.
     pub fn new(spec: &'a Spec) -> Result<Self, Error> {
         let Some(first) = spec.configs.first() else {
             return Err(Error::new("modes: expected one at least, found none"));
@@ -159,7 +160,14 @@ impl<'a> Chain<'a> {
                 "site: expected the same for every mode, found {site} for {mode}"
             )));
         }
-        Ok(Self { spec, sensors: Sensors::new(&first.site, TEST_SEEDS)?, empty: empty_frames(&first.site)? })
+        let empty = empty_frames(&first.site)?;
+        let learned = |config| {
+            let mut pipeline = Pipeline::new(config, spec.weights.as_ref())?;
+            empty.iter().for_each(|frame| pipeline.learn_empty(frame));
+            Ok(pipeline)
+        };
+        let pipelines = spec.configs.iter().map(learned).collect::<Result<_, Error>>()?;
+        Ok(Self { spec, sensors: Sensors::new(&first.site, TEST_SEEDS)?, pipelines })
     }
 
     /// Runs and scores one scene of the specification; `progress` is called after each frame.
@@ -172,12 +180,12 @@ impl<'a> Chain<'a> {
         let mut scene = scene.with_bodies(&scene_spec.bodies);
         let mut assembler = Assembler::new(site)?;
         let mut health = Health::default();
-        let mut lanes = Vec::new();
-        for config in &spec.configs {
-            let mut pipeline = Pipeline::new(config, spec.weights.as_ref())?;
-            self.empty.iter().for_each(|frame| pipeline.learn_empty(frame));
-            lanes.push(Lane { pipeline, rows: SceneRun::default(), health: Health::default() });
-        }
+        let lane = |pipeline: &Pipeline| Lane {
+            pipeline: pipeline.clone(),
+            rows: SceneRun::default(),
+            health: Health::default(),
+        };
+        let mut lanes: Vec<Lane> = self.pipelines.iter().map(lane).collect();
         let number = index as u32;
         let mut truth = SceneTruth::default();
         while let Some(frame) = scene.next_frame() {
@@ -194,13 +202,9 @@ impl<'a> Chain<'a> {
         let runs: Vec<ModeRun> = lanes.iter().zip(&spec.configs).map(mode_run).collect();
         let (weights, walkers) = (spec.weights.as_ref(), Some(scene.walkers()));
         let score = score_scene(number, &scene_spec.group, &truth, &runs, weights, walkers)?;
+        let ladder = spec.ladder.then(|| ladder::climb(&scene, &truth, site, scene_spec.seed));
         let kept =
             (spec.keep == Some(index)).then(|| (truth, lanes.into_iter().map(|lane| lane.rows).collect()));
-        let ladder = spec.ladder.then(|| {
-            let scene =
-                Scene::truth_only(scene_spec.crowd(), site, scene_spec.seed).with_bodies(&scene_spec.bodies);
-            ladder::climb(scene, site, scene_spec.seed)
-        });
         Ok(SceneResult { score, ladder, kept })
     }
 }

@@ -8,13 +8,12 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use umbracast::blockage::body::EllipticCylinder;
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb, slab};
-use umbracast::{STEP_S, STEPS, Site};
+use umbracast::{STEP_NS, STEP_S, STEPS, Site};
 use umbracast_sim::body::{PersonState, Surface, Walker};
 use umbracast_sim::random::stream;
 use umbracast_sim::scene::Scene;
 use umbracast_sim::truth::BodyMesh;
 
-use crate::chain::note_truth;
 use crate::instances::instances;
 use crate::links::Said;
 use crate::scene::{SceneTruth, TruthIndex};
@@ -114,18 +113,15 @@ pub struct LadderRow {
     pub onset_f1: Option<f64>,
 }
 
-/// Lets every oracle say its word on a scene that has not been played yet. `seed` is that of the errors, the
-/// same for every rung, so that rungs differ by their sizes alone.
-pub fn climb(mut scene: Scene, site: &Site, seed: u64) -> SceneLadder {
-    let (mut truth, mut moments) = (SceneTruth::default(), Vec::new());
-    while let Some(frame) = scene.next_frame() {
-        note_truth(0, &frame, &mut truth);
-        moments.push(Moment::new(scene.walkers(), frame.time_ns));
-    }
+/// Lets every oracle say its word on a scene that has been played; `truth` is what was so. `seed` is that of the
+/// errors, the same for every rung, so that rungs differ by their sizes alone.
+pub fn climb(scene: &Scene, truth: &SceneTruth, site: &Site, seed: u64) -> SceneLadder {
+    let moments: Vec<Moment> =
+        (1..=scene.frames() as i64).map(|k| Moment::new(scene.walkers(), k * STEP_NS)).collect();
     let rng = stream(seed, "ladder errors", 0);
     let errors = lasting_errors(moments.len(), scene.walkers().len(), ERROR_KEPT, rng);
     let play = Play { site, walkers: scene.walkers(), moments, errors };
-    let instances = instances(&TruthIndex::new(&truth));
+    let instances = instances(&TruthIndex::new(truth));
     let tallies = |oracle: &Oracle| {
         let said = play.ask(oracle).of_persons(&instances);
         LinkTally::each(&instances, &said, site.access_points.len() as u32)
@@ -337,14 +333,19 @@ impl Play<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::note_truth;
     use umbracast::Config;
     use umbracast_sim::crowd::{Preset, circle_crossing};
 
     #[test]
     fn knowing_more_of_the_body_scores_higher_and_errors_score_lower() {
         let site = Config::default().site;
-        let scene = Scene::truth_only(circle_crossing(Preset::Orca03, 10, 12.5, 100_001), &site, 100_001);
-        let rows = rows(&[&climb(scene, &site, 1)], &site);
+        let mut scene = Scene::truth_only(circle_crossing(Preset::Orca03, 10, 12.5, 100_001), &site, 100_001);
+        let mut truth = SceneTruth::default();
+        while let Some(frame) = scene.next_frame() {
+            note_truth(0, &frame, &mut truth);
+        }
+        let rows = rows(&[&climb(&scene, &truth, &site, 1)], &site);
         let f1 = |name: &str| {
             let found = |r: &&LadderRow| r.oracle.contains(name) && r.access_point == "side" && r.window == 3;
             rows.iter().find(found).unwrap().f1.unwrap()

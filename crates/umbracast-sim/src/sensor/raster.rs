@@ -4,6 +4,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use umbracast::geometry::{DVec2, DVec3, Pose};
+use umbracast::lidar::Azimuths;
 
 use super::head::Head;
 use super::view::View;
@@ -33,6 +34,7 @@ pub struct Painter {
     start_m: Vec<DVec3>,
     end_m: Vec<DVec3>,
     bounds: Vec<Bounds>,
+    azimuths: Azimuths,
 }
 
 /// A beam as triangles are compared with it.
@@ -87,6 +89,7 @@ impl Painter {
             start_m: Vec::new(),
             end_m: Vec::new(),
             bounds: Vec::new(),
+            azimuths: Azimuths::of_a_turn(),
         }
     }
 
@@ -234,8 +237,9 @@ impl Painter {
         let passed_ns = (view.image.time_ns(c, b) - pass.start_ns) as f64;
         let share = (passed_ns / (pass.end_ns - pass.start_ns).max(1) as f64).min(1.0);
         let triangle_m = corners.map(|i| self.start_m[i].lerp(self.end_m[i], share));
-        let origin_m = view.image.point_m(c, b, 0.0);
-        let direction = view.image.point_m(c, b, 1.0) - origin_m;
+        let along = |range_m| view.image.tabled_point_m(&self.azimuths, c, b, range_m);
+        let origin_m = along(0.0);
+        let direction = along(1.0) - origin_m;
         if let Some(range_m) = meet(origin_m, direction, triangle_m) {
             view.show(c, b, range_m as f32, REFLECTIVITY, person);
         }
