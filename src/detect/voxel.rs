@@ -63,9 +63,14 @@ pub fn thin(points: &mut Vec<Point>, edge_m: f64, keys: &mut Vec<u64>, thinned: 
     // A key holds z, y and x of the voxel in 14 bits each (1.6 km at 0.1 m) and the point in the rest.
     const AXIS_BITS: u32 = 14;
     const INDEX_BITS: u32 = 64 - 3 * AXIS_BITS;
+    const HALF_AXIS: i64 = 1 << (AXIS_BITS - 1);
     points.truncate(1 << INDEX_BITS);
-    let part =
-        |c: f64| ((c / edge_m).floor() as i64 + (1 << (AXIS_BITS - 1))).clamp(0, (1 << AXIS_BITS) - 1) as u64;
+    let part = |c: f64| {
+        // Rounded down; `floor` is a call where it is no instruction.
+        let cell = (c / edge_m).clamp(-HALF_AXIS as f64, (HALF_AXIS - 1) as f64);
+        let toward_zero = cell as i64;
+        (toward_zero - i64::from(toward_zero as f64 > cell) + HALF_AXIS) as u64
+    };
     keys.clear();
     keys.extend(points.iter().zip(0..).map(|(p, i): (_, u64)| {
         let [x, y, z] = p.position_m.to_array().map(part);
@@ -74,11 +79,15 @@ pub fn thin(points: &mut Vec<Point>, edge_m: f64, keys: &mut Vec<u64>, thinned: 
     keys.sort_unstable();
     thinned.clear();
     for voxel in keys.chunk_by(|a, b| a >> INDEX_BITS == b >> INDEX_BITS) {
-        let of = || voxel.iter().map(|key| &points[(key & ((1 << INDEX_BITS) - 1)) as usize]);
-        let Some(&first) = of().next() else { continue };
-        let late_ns: i64 = of().map(|p| p.time_ns - first.time_ns).sum();
+        let mut of = voxel.iter().map(|key| &points[(key & ((1 << INDEX_BITS) - 1)) as usize]);
+        let Some(&first) = of.next() else { continue };
+        let (mut sum_m, mut late_ns) = (first.position_m, 0);
+        for point in of {
+            sum_m += point.position_m;
+            late_ns += point.time_ns - first.time_ns;
+        }
         thinned.push(Point {
-            position_m: of().map(|p| p.position_m).sum::<DVec3>() / voxel.len() as f64,
+            position_m: sum_m / voxel.len() as f64,
             time_ns: first.time_ns + late_ns / voxel.len() as i64,
             sensor: first.sensor,
         });
