@@ -15,7 +15,7 @@ fn config(samples: usize) -> Config {
     config.site.access_points.truncate(1);
     config.site.access_points[0].position_m = [0.0, 0.0, 1.0];
     config.blockage.samples = samples;
-    config.blockage.size_sigma_share = 0.0;
+    config.blockage.girth_sigma = 0.0;
     config.blockage.height_sigma_m = 0.0;
     config.blockage.heading_sigma_deg = 0.0;
     let share = |half_m: f64| half_m / HEIGHT_M;
@@ -51,6 +51,8 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         heading_sigma_rad: 0.0,
         height_m: HEIGHT_M,
         height_sigma_m: 0.0,
+        girth: 1.0,
+        girth_sigma: 0.0,
         gait: Gait::UNKNOWN,
         points: 30,
         confirmed: true,

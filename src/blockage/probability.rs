@@ -244,6 +244,7 @@ impl Traits {
     ) -> Self {
         let height_sigma_m = track.height_sigma_m.hypot(config.height_sigma_m);
         let height_m = (track.height_m + height_sigma_m * draws.height[k]).max(0.5);
+        let girth_sigma = track.girth_sigma.hypot(config.girth_sigma);
         let speed_mps = (velocity + drift).length();
         let trunk_rad = config.heading_sigma_deg.to_radians();
         let turn_rad = if velocity.length() > FACES_FROM_MPS {
@@ -256,7 +257,7 @@ impl Traits {
         Self {
             turn: DVec2::from_angle(turn_rad),
             height_m,
-            girth: (1.0 + config.size_sigma_share * draws.girth[k]).clamp(0.5, 1.8),
+            girth: (track.girth + girth_sigma * draws.girth[k]).clamp(0.5, 1.8),
             speed_mps,
             phase_rad: phases.at(draws.phase[k]),
             phase_step_rad: if stride_m > 0.0 { TAU * speed_mps * STEP_S / stride_m } else { 0.0 },

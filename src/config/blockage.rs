@@ -18,9 +18,9 @@ pub struct BlockageConfig {
     pub seed: u64,
     /// What a ray meets.
     pub body: BodyConfig,
-    /// One standard deviation of the girth, as a share of it.
-    pub size_sigma_share: f64,
-    /// One standard deviation of the height.
+    /// What bodies differ in from the tracks' girth: one standard deviation, as a share of the body.
+    pub girth_sigma: f64,
+    /// The same of the height.
     pub height_sigma_m: f64,
     /// One standard deviation of the heading.
     pub heading_sigma_deg: f64,

@@ -175,6 +175,8 @@ pub(super) mod tests {
             heading_sigma_rad: 0.0,
             height_m: 1.75,
             height_sigma_m: 0.0,
+            girth: 1.0,
+            girth_sigma: 0.0,
             gait: crate::track::Gait::UNKNOWN,
             points: 30,
             confirmed: true,

@@ -1,6 +1,7 @@
 //! Stage 1, second half: detections of frame after frame joined to tracks (paper, section IV-A).
 
 pub mod gait;
+pub mod girth;
 pub mod kalman;
 pub mod association;
 pub mod visibility;
@@ -38,6 +39,10 @@ pub struct Track {
     pub height_m: f64,
     /// One standard deviation of `height_m`.
     pub height_sigma_m: f64,
+    /// Depths and widths of the body beside those of a usual one of this height: 1.
+    pub girth: f64,
+    /// One standard deviation of `girth`.
+    pub girth_sigma: f64,
     /// Where in the stride, as the sway of the trunk tells it.
     pub gait: Gait,
     /// Points of this frame's detection; 0 while it coasts.

@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use super::girth::Girth;
 use super::height::Height;
 use super::kalman::{Filter, Mat2, State, plus};
 use super::visibility::{Body, View};
@@ -46,6 +47,7 @@ pub(super) struct Person {
     /// When the track was last given out.
     given_ns: i64,
     height: Height,
+    girth: Girth,
     /// The last detection's boxes, moved so that the detection's position is at the origin.
     aabb: Aabb,
     obb: Obb,
@@ -72,6 +74,7 @@ impl Person {
             heading_variance_rad2: ANY_HEADING_RAD2,
             given_ns: time_ns,
             height: Height::new(config.height_mean_m, config.height_sigma_m),
+            girth: Girth::default(),
             aabb: Aabb::EMPTY,
             obb: Obb::from_aabb(&Aabb::EMPTY),
             extent_m: DVec2::splat(WIDTH_M),
@@ -149,6 +152,7 @@ impl Person {
         }
         self.observed.push_back(Observed { time_ns, position_m, velocity_mps });
         let (aabb, obb) = self.boxes(config, &state);
+        let (girth, girth_sigma) = self.girth.factor();
         Track {
             id: self.id,
             position_m,
@@ -158,6 +162,8 @@ impl Person {
             heading_sigma_rad: self.heading_variance_rad2.sqrt(),
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
+            girth,
+            girth_sigma,
             gait: self.filter.gait(),
             points: self.points,
             confirmed: self.confirmed && largest_sigma(state.position_covariance()) < config.told_sigma_max_m,
@@ -186,6 +192,8 @@ impl Person {
     fn see(&mut self, detection: &Detection, view: &View, step_s: f64, config: &TrackConfig) {
         self.points = detection.points;
         self.height.see(detection.top_m, view.beams_per_m_at_top);
+        let speed_mps = self.filter.state().velocity_mps().length();
+        self.girth.see(detection, view, self.height.mean_m(), speed_mps);
         self.aabb = detection.aabb.moved_by(-detection.position_m);
         self.obb = detection.obb.moved_by(-detection.position_m, 0.0);
         let new = 1.0 - (-step_s / config.box_average_s).exp();

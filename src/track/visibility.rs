@@ -60,6 +60,8 @@ struct Fan {
 pub struct View {
     /// Returns expected from all sensors together.
     pub returns: f64,
+    /// The same if nobody and nothing stood between.
+    pub returns_alone: f64,
     /// Beams that meet a metre of upright head, all sensors together.
     pub beams_per_m_at_top: f64,
     /// Upper end of the highest part of the body that beams meet, above the floor.
@@ -124,12 +126,14 @@ impl Visibility {
                 let (low, high) = (z(slice), z(slice + 1));
                 for side in [-0.5, 0.5] {
                     let foot = body.position_m + across * (side * BODY_RADIUS_M);
+                    let beams = eye.beams_between(foot.extend(low), foot.extend(high));
+                    let returns = beams * eye.columns_on(foot.extend(low)) * 0.5;
+                    view.returns_alone += returns;
                     if free(foot.extend(0.5 * (low + high))) {
-                        let beams = eye.beams_between(foot.extend(low), foot.extend(high));
                         if beams > 0.0 {
                             view.top_m = view.top_m.max(high);
                         }
-                        view.returns += beams * eye.columns_on(foot.extend(low)) * 0.5;
+                        view.returns += returns;
                         if slice + 1 == SLICES {
                             view.beams_per_m_at_top += 0.5 * beams / (high - low);
                         }

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use umbracast::blockage::body::{self, Posture};
 use umbracast::config::{BlockageConfig, BodyConfig};
 use umbracast::geometry::{DVec2, DVec3};
+use umbracast::track::girth::PRIOR_SIGMA;
 use umbracast::{Config, Error};
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables;
@@ -147,7 +148,8 @@ fn probability(body: &BodyConfig, config: &BlockageConfig, case: &Case) -> f64 {
         case.near.iter().any(|p| {
             let turns = (k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person);
             let posture = Posture {
-                girth: 1.0 + config.size_sigma_share * NORMAL[(k + p.person as usize) % POSTURES],
+                girth: 1.0
+                    + PRIOR_SIGMA.hypot(config.girth_sigma) * NORMAL[(k + p.person as usize) % POSTURES],
                 speed_mps: p.vx_mps.hypot(p.vy_mps),
                 phase_rad: TAU * turns,
                 swing: 1.0,

@@ -7,6 +7,7 @@ use umbracast::blockage::Caster;
 use umbracast::config::{BlockageConfig, BlockageMethod, BoxKind};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2, Weights, constant_velocity};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+use umbracast::track::girth::PRIOR_SIGMA;
 use umbracast::track::{Gait, OBSERVED, Observed, Track};
 use umbracast::{Config, Error, STEP_S, STEPS};
 use umbracast_io::rows::{PeopleRow, TrackRow};
@@ -142,9 +143,8 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, heading_
     let walks = track.velocity_mps.length() > heading_speed_mps;
     let (heading_rad, heading_sigma_rad) =
         if walks { (track.velocity_mps.to_angle(), 0.0) } else { (own.heading_rad, own.heading_sigma_rad) };
-    let (height_m, height_sigma_m) = (own.height_m, own.height_sigma_m);
-    let gait = track_of(own).gait;
-    Track { heading_rad, heading_sigma_rad, height_m, height_sigma_m, gait, ..track }
+    let Track { height_m, height_sigma_m, girth, girth_sigma, gait, .. } = track_of(own);
+    Track { heading_rad, heading_sigma_rad, height_m, height_sigma_m, girth, girth_sigma, gait, ..track }
 }
 
 /// A track at the true positions of its person, now and at every step. The present is moved as well: a body
@@ -192,6 +192,8 @@ pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb))
         heading_sigma_rad: 0.0,
         height_m: row.height_m,
         height_sigma_m: 0.0,
+        girth: 1.0,
+        girth_sigma: PRIOR_SIGMA,
         gait: Gait::UNKNOWN,
         points: row.returns,
         confirmed: true,
@@ -246,6 +248,8 @@ fn track_of(row: &TrackRow) -> Track {
         heading_sigma_rad: row.heading_sigma_rad,
         height_m: row.height_m,
         height_sigma_m: row.height_sigma_m,
+        girth: row.girth,
+        girth_sigma: row.girth_sigma,
         gait: Gait { phase_rad: row.gait_phase_rad, concentration: row.gait_concentration },
         points: row.points,
         confirmed: row.confirmed,

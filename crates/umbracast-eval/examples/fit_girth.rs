@@ -1,0 +1,149 @@
+//! Fits the numbers of `umbracast::track::girth` on simulated people: what the extents of detections in free sight tell
+//! of how wide a person's trunk is for the height. Prints them in the order of the source.
+//!
+//! `cargo run --release -p umbracast-eval --example fit_girth -- [SCENES]`, tuning seeds from 135,000 on.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use umbracast::config::Config;
+use umbracast::geometry::{DVec2, DVec3};
+use umbracast::lidar::{Assembler, Packet};
+use umbracast::track::Track;
+use umbracast::track::visibility::{Body, Visibility};
+use umbracast::{Error, Health, Pipeline};
+use umbracast_sim::body::Walker;
+use umbracast_sim::crowd::{Preset, circle_crossing};
+use umbracast_sim::scene::Scene;
+
+const FIRST_SEED: u64 = 135_000;
+/// As `umbracast::track::girth` has them.
+const RETURNS_MIN: f64 = 6.0;
+const FREE_SHARE: f64 = 0.97;
+const WALKS_FROM_MPS: f64 = 0.5;
+/// A track nearer than this to a person is that person's.
+const OWN_M: f64 = 0.3;
+/// Where on a body, in shares of the height, the trunk with the arms is measured.
+const TRUNK: [f64; 2] = [0.7, 0.8];
+
+/// One detection of a person: extent over height, speed.
+type Seen = (f64, f64);
+
+/// Logarithm of the trunk's width over the height, and every frame.
+type Person = (f64, Vec<Seen>);
+
+fn main() -> Result<(), Error> {
+    let scenes: u64 = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(12);
+    let people: Result<Vec<Vec<Person>>, Error> = (0..scenes).into_par_iter().map(watch).collect();
+    let people: Vec<Person> = people?.concat().into_iter().filter(|(_, seen)| seen.len() >= 60).collect();
+    let all: Vec<Seen> = people.iter().flat_map(|(_, seen)| seen.iter().copied()).collect();
+    let (per_mps, standing) = line(all.iter().map(|&(share, speed)| (speed, share)));
+    let off = |&(share, speed): &Seen| share - standing - per_mps * speed;
+    let mean_off = |seen: &[Seen]| seen.iter().map(off).sum::<f64>() / seen.len() as f64;
+    let mean_girth = people.iter().map(|p| p.0).sum::<f64>() / people.len() as f64;
+    let prior = root_mean(people.iter().map(|p| p.0 - mean_girth));
+    let (per_girth, base) = line(people.iter().map(|(girth, seen)| (girth - mean_girth, mean_off(seen))));
+    // Errors of means over so many frames at the beginning: a variance that lasts and one that falls.
+    let error2 = |frames: usize| {
+        let error = |(girth, seen): &Person| {
+            let first = &seen[..frames.min(seen.len())];
+            mean_off(first) - base - per_girth * (girth - mean_girth)
+        };
+        root_mean(people.iter().map(error)).powi(2)
+    };
+    let (few, many) = (20, 150);
+    let share = few as f64 / many as f64;
+    let lasting2 = ((error2(many) - share * error2(few)) / (1.0 - share)).max(0.0);
+    let frame2 = (error2(few) - lasting2) * few as f64;
+    println!("{} people, {} frames", people.len(), all.len());
+    println!("PRIOR_SIGMA {prior:.3}\nSHARE_STANDING {standing:.3}\nSHARE_PER_MPS {per_mps:.3}");
+    println!(
+        "SHARE_PER_GIRTH {per_girth:.3}\nFRAME_SIGMA {:.3}\nLASTING_SIGMA {:.4}",
+        frame2.sqrt(),
+        lasting2.sqrt()
+    );
+    Ok(())
+}
+
+/// Everybody in a scene.
+fn watch(scene: u64) -> Result<Vec<Person>, Error> {
+    let (config, seed) = (Config::default(), FIRST_SEED + scene);
+    let preset = [Preset::Orca03, Preset::Mixed][scene as usize % 2];
+    let mut scene = Scene::new(circle_crossing(preset, 10, 12.5, seed), &config.site, seed)?;
+    let walkers = scene.walkers().to_vec();
+    let visibility = Visibility::new(&config.site);
+    let mut pipeline = Pipeline::new(&config, None)?;
+    let mut assembler = Assembler::new(&config.site)?;
+    for packets in Scene::empty(&config.site, seed, 20)? {
+        push(&mut assembler, &packets);
+        while let Some(frame) = assembler.pop() {
+            pipeline.learn_empty(&frame);
+        }
+    }
+    let mut assembler = Assembler::new(&config.site)?;
+    let mut seen: BTreeMap<usize, Vec<Seen>> = BTreeMap::new();
+    while let Some(now) = scene.next_frame() {
+        push(&mut assembler, &now.packets);
+        while let Some(frame) = assembler.pop() {
+            let outcome = pipeline.step(&frame);
+            let eyes = visibility.eyes(&frame);
+            let body = |t: &Track| Body { position_m: t.position_m, height_m: t.height_m };
+            let bodies: Vec<Body> = outcome.tracks.iter().map(body).collect();
+            for (track, body) in outcome.tracks.iter().zip(&bodies).filter(|(track, _)| track.points > 0) {
+                let view = visibility.view(&eyes, body, &bodies);
+                let free = view.returns > FREE_SHARE * view.returns_alone && view.returns > RETURNS_MIN;
+                let speed_mps = track.velocity_mps.length();
+                let nearest = outcome
+                    .detections
+                    .iter()
+                    .filter(|d| d.whole && d.points == track.points)
+                    .min_by(|a, b| away(a.position_m, track).total_cmp(&away(b.position_m, track)));
+                let own = walkers.iter().position(|walker| {
+                    walker.state_at(frame.time_ns).is_some_and(|s| away(s.position_m, track) < OWN_M)
+                });
+                let (Some(detection), Some(own)) = (nearest, own) else { continue };
+                if free && speed_mps > WALKS_FROM_MPS {
+                    let extent_m = detection.obb.half_m.x + detection.obb.half_m.y;
+                    seen.entry(own).or_default().push((extent_m / track.height_m, speed_mps));
+                }
+            }
+        }
+    }
+    Ok(seen.into_iter().map(|(own, seen)| (girth(&walkers[own]), seen)).collect())
+}
+
+fn away(position_m: DVec2, track: &Track) -> f64 {
+    position_m.distance(track.position_m)
+}
+
+/// Logarithm of the width of the trunk, arms included, over the height of a body that stands upright.
+fn girth(walker: &Walker) -> f64 {
+    let mut vertices: Vec<DVec3> = Vec::new();
+    walker.upright_mesh(DVec2::ZERO, 0.0, &mut vertices);
+    let height_m = vertices.iter().fold(0.0, |top: f64, v| top.max(v.z));
+    let trunk = vertices.iter().filter(|v| (TRUNK[0] * height_m..TRUNK[1] * height_m).contains(&v.z));
+    let (right_m, left_m) = trunk.fold((0.0, 0.0), |(a, b): (f64, f64), v| (a.min(v.y), b.max(v.y)));
+    ((left_m - right_m) / height_m).ln()
+}
+
+fn push(assembler: &mut Assembler, packets: &[Vec<Packet>]) {
+    let mut all: Vec<(usize, &Packet)> =
+        packets.iter().enumerate().flat_map(|(sensor, list)| list.iter().map(move |p| (sensor, p))).collect();
+    all.sort_by_key(|(sensor, packet)| (packet.time_ns, *sensor));
+    for (sensor, packet) in all {
+        assembler.push(sensor, packet, &mut Health::default());
+    }
+}
+
+/// Slope and value at 0 of the line of least squares through (x, y).
+fn line(points: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    let [n, x, y, xx, xy] =
+        points.fold([0.0; 5], |s, (x, y)| [s[0] + 1.0, s[1] + x, s[2] + y, s[3] + x * x, s[4] + x * y]);
+    let slope = (n * xy - x * y) / (n * xx - x * x);
+    (slope, (y - slope * x) / n)
+}
+
+fn root_mean(errors: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = errors.fold((0.0, 0.0), |(sum, n), e| (sum + e * e, n + 1.0));
+    (sum / n).sqrt()
+}
