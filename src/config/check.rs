@@ -32,6 +32,12 @@ pub(super) fn check(config: &Config) -> Result<(), Error> {
             return Err(Error::new(format!("{key}: expected more than 0, found {value}")));
         }
     }
+    if !(0.0..1.0).contains(&track.children_share) {
+        return Err(Error::new(format!(
+            "track.children_share: expected 0 or more and less than 1, found {}",
+            track.children_share
+        )));
+    }
     let mut bottom = 0.0;
     for slice in &blockage.body.slices {
         if !(slice.top > bottom && slice.half_depth > 0.0 && slice.half_width > 0.0) {
@@ -67,6 +73,7 @@ mod tests {
             ("[track]\nmodel_share = [1.0]", "model_share"),
             ("[detect.cluster]\nradius_m = 0.0", "detect.cluster.radius_m"),
             ("[track]\nheight_sigma_m = nan", "track.height_sigma_m"),
+            ("[track]\nchildren_share = 1.0", "track.children_share"),
             ("[blockage]\nsamples = 0", "blockage.samples"),
             (
                 "[blockage.body]\nslices = [{ top = 0.0, half_depth = 0.1, half_width = 0.1, ahead = 0.0 }]",

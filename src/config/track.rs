@@ -88,10 +88,12 @@ pub struct TrackConfig {
     pub heading_speed_mps: f64,
     /// Whose size the boxes have.
     pub boxes: Boxes,
-    /// Mean standing height of people, with shoes.
+    /// Mean standing height of adults, with shoes.
     pub height_mean_m: f64,
     /// Its standard deviation.
     pub height_sigma_m: f64,
+    /// Chance that somebody new is a child, or sits: of any height up to 1.5 m. Below 1.
+    pub children_share: f64,
     /// Time over which the width of a box is averaged.
     pub box_average_s: f64,
 }

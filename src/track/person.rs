@@ -73,7 +73,7 @@ impl Person {
             heading_rad: 0.0,
             heading_variance_rad2: ANY_HEADING_RAD2,
             given_ns: time_ns,
-            height: Height::new(config.height_mean_m, config.height_sigma_m),
+            height: Height::new(config.height_mean_m, config.height_sigma_m, config.children_share),
             girth: Girth::default(),
             aabb: Aabb::EMPTY,
             obb: Obb::from_aabb(&Aabb::EMPTY),
