@@ -17,9 +17,10 @@ score cmu-walk --scenes "$scenes" --preset orca-03 --bodies cmu-walk \
 walkers="$UMBRACAST_DATA/circle_antipode"
 score antipode --unit cm --fps 25 --trajectories "$walkers/circle-10m-08-2.txt" "$walkers/circle-10m-16-2.txt" \
     "$walkers/circle-10m-32-2x.txt" "$walkers/circle-10m-64-2x.txt"
-# The corridor fills and empties; of the bottleneck the part in which people wait and push through.
-score pedpy --seconds 20 --trajectories "$UMBRACAST_DATA/pedpy/traj_UNI_CORR_500_01.txt" \
-    "$UMBRACAST_DATA/pedpy/030_c_56_h0.txt"
+# Of the bottlenecks the part in which people wait and push through; the corridor's people trained the residual.
+score bottleneck --seconds 20 --trajectories "$UMBRACAST_DATA/pedpy/030_c_56_h0.txt" \
+    "$UMBRACAST_DATA/pedpy/040_c_56_h-.txt"
+score trained-on --seconds 20 --trajectories "$UMBRACAST_DATA/pedpy/traj_UNI_CORR_500_01.txt"
 score madras --trajectories "$UMBRACAST_DATA/madras/Topview_1A.csv" "$UMBRACAST_DATA/madras/Topview_1C.csv" \
     "$UMBRACAST_DATA/madras/Topview_2F.csv"
 compare

@@ -72,6 +72,7 @@ if [ -n "${UMBRACAST_DATA:-}" ]; then
     record circle-antipode umbracast evaluate --unit cm --fps 25 --out "$scratch/walkers" \
         --trajectories "$walkers/circle-10m-08-2.txt" "$walkers/circle-10m-16-2.txt"
     record people record/people.sh 20 default
+    record forecasts record/forecasts.sh 20
     frames="$UMBRACAST_DATA/logictronix_vlp16"
     site=config/sites/logictronix.toml
     : >record/logictronix.txt
@@ -85,6 +86,9 @@ if [ -n "${UMBRACAST_DATA:-}" ]; then
         done
     done
 fi
+
+# Killed and started again.
+record resume record/resume.sh
 
 # The paper's experiment whole: an hour on two cores. REPRODUCE names a folder in which an earlier try is gone on with.
 reproduced="${REPRODUCE:-$scratch/reproduce}"

@@ -8,7 +8,7 @@ score() { # NAME ARGUMENTS...
     shift
     mkdir "$scratch/$name"
     reports+=("$scratch/$name")
-    printf '# %s: umbracast evaluate --mode %s %s\n' "$name" "$modes" "$*" | sed "s|${UMBRACAST_DATA:-/nowhere}|\$UMBRACAST_DATA|g"
+    printf '# %s: umbracast evaluate --mode %s %s\n' "$name" "$modes" "$*" | sed "s|${UMBRACAST_DATA:-/nowhere}|\$UMBRACAST_DATA|g; s|$scratch|/tmp|g"
     umbracast evaluate --mode "$modes" "$@" --json --quiet >"$scratch/$name/scores.json"
 }
 

@@ -8,7 +8,7 @@ modes="${2:-hdl,paper,default}"
 source record/score.sh
 
 score default --scenes "$scenes" --preset orca-03
-for site in height-3 height-5 height-6 height-8 lost-sensor; do
+for site in height-3 height-5 height-6 height-8 lost-sensor out-of-step; do
     score "$site" --scenes "$scenes" --preset orca-03 --site "config/sites/$site.toml"
 done
 score people-20 --scenes "$scenes" --preset orca-03 --people 20

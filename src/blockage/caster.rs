@@ -103,7 +103,7 @@ impl Caster {
                     blocked: std::array::from_fn(|w| p[w] >= self.config.threshold[w]),
                     p,
                     onset_s: if blocked_now { none } else { chances.onset_s },
-                    duration_s: if blocked_now { chances.clear_s } else { none },
+                    duration_s: if blocked_now { chances.clear_s } else { chances.clear_again_s },
                 });
             }
         }

@@ -28,6 +28,7 @@ pub struct Blockage {
     /// 10, 50 and 90 % quantiles of the time until a link in sight now is blocked, seconds, in whole steps. `None`
     /// where it lies beyond the last step, where the link is blocked now, and where the method is binary.
     pub onset_s: [Option<f64>; 3],
-    /// The same of the time until a link blocked now is clear. `None` where the link is in sight now as well.
+    /// The same of the time until the blockage is over: the one that is, or the first that comes. `None` as well where
+    /// none comes with a chance of 10 % or more.
     pub duration_s: [Option<f64>; 3],
 }

@@ -32,6 +32,9 @@ pub struct Chances {
     pub onset_s: [Option<f64>; 3],
     /// Quantiles of the time until it is clear, over the samples in which it is blocked now.
     pub clear_s: [Option<f64>; 3],
+    /// Quantiles of the time until it is clear again, over the samples in which it is in sight now and will be
+    /// blocked. `None` where the chance of that is too small for an onset.
+    pub clear_again_s: [Option<f64>; 3],
 }
 
 /// Samples of all people in one frame.
@@ -55,6 +58,7 @@ struct Ways {
     /// By step: middle of the samples and how far the farthest lies from it.
     center_m: [DVec2; STEPS + 1],
     spread_m: [f64; STEPS + 1],
+    height_min_m: f64,
     height_max_m: f64,
     reach_m: f64,
 }
@@ -101,11 +105,16 @@ impl Sampler {
         let first = |bits: u16| bits.trailing_zeros();
         let onsets = blocked.iter().filter(|&&at| at & 1 == 0).map(|&at| first(at));
         let clears = blocked.iter().filter(|&&at| at & 1 == 1).map(|&at| first(!at & ALL_STEPS));
+        // From the first blocked step on.
+        let coming = blocked.iter().filter(|&&at| at & 1 == 0 && at != 0);
+        let again = coming.map(|&at| first(!at & ALL_STEPS & (u16::MAX << first(at))));
+        let onset_s = quantiles_s(onsets);
         Chances {
             p_now: share(1),
             p: std::array::from_fn(|w| share((1 << (w + 2)) - 2)),
-            onset_s: quantiles_s(onsets),
+            onset_s,
             clear_s: quantiles_s(clears),
+            clear_again_s: if onset_s[0].is_some() { quantiles_s(again) } else { [None; 3] },
         }
     }
 
@@ -170,10 +179,12 @@ fn may_block(ap_m: DVec3, ue: &Ue, q: &Ways, p: &Ways, step: usize) -> bool {
     if p.center_m[step].distance_squared(start + along * t) > reach * reach {
         return false;
     }
-    // The ray comes down to the UE: near the access point it passes over everybody's head.
+    // The ray comes down to the UE: near the access point it passes over everybody's head. It is lowest towards the
+    // lowest UE, at one end of the stretch near `p`.
     let slack = (reach / along.length().max(1e-6)).min(1.0);
-    let low = ap_m.z + (ue.height_share * q.height_max_m - ap_m.z) * (t + slack).min(1.0);
-    low.min(ap_m.z.max(ue.height_share * q.height_max_m)) <= p.height_max_m
+    let rise_m = ue.height_share * q.height_min_m - ap_m.z;
+    let lowest_m = ap_m.z + (rise_m * (t - slack).max(0.0)).min(rise_m * (t + slack).min(1.0));
+    lowest_m <= p.height_max_m
 }
 
 impl Ways {
@@ -204,6 +215,7 @@ impl Ways {
                 self.positions_m[s * samples + k] = mean_m + offset;
             }
         }
+        self.height_min_m = self.traits.iter().fold(f64::INFINITY, |a, b| a.min(b.height_m));
         self.height_max_m = self.traits.iter().fold(0.0, |a, b| a.max(b.height_m));
         let girth_max = self.traits.iter().fold(1.0, |a: f64, b| a.max(b.girth));
         let fastest_mps = self.traits.iter().fold(0.0, |a: f64, b| a.max(b.speed_mps));

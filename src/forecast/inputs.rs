@@ -18,6 +18,8 @@ const PER_NEIGHBOUR: usize = 7;
 const SPEED_MPS: f64 = 1.5;
 const SPEED_CHANGE_MPS: f64 = 0.3;
 const SIGMAS: [f64; 4] = [0.02, 0.02, 0.1, 0.1];
+/// No track is surer; a state that is known altogether is read as the surest the network has met.
+const SIGMAS_MIN: [f64; 4] = [0.004, 0.004, 0.02, 0.02];
 /// Nobody evades what is further ahead than this.
 const HORIZON_S: f64 = 4.0;
 /// What a second until the closest approach weighs against a metre between the two then.
@@ -86,15 +88,16 @@ pub fn mirror() -> [f32; INPUTS] {
     signs
 }
 
-/// A spread of less than 0.1 mm is that of a known state; its logarithm must stay finite.
+/// Standard deviations of position and velocity, along and across.
 fn sigmas(track: &Track, ahead: DVec2) -> [f64; 4] {
     let p = &track.covariance;
     let along = |at: usize, d: DVec2| {
         let variance =
             p[at][at] * d.x * d.x + 2.0 * p[at][at + 1] * d.x * d.y + p[at + 1][at + 1] * d.y * d.y;
-        variance.max(1e-8).sqrt()
+        variance.max(0.0).sqrt()
     };
-    [along(0, ahead), along(0, ahead.perp()), along(2, ahead), along(2, ahead.perp())]
+    let found = [along(0, ahead), along(0, ahead.perp()), along(2, ahead), along(2, ahead.perp())];
+    from_fn(|i| found[i].max(SIGMAS_MIN[i]))
 }
 
 /// Where another person is and how the two of them will meet.
@@ -176,6 +179,16 @@ pub(super) mod tests {
         let (one, other) = (see(&three_people(|p| p), 0), see(&three_people(turned), 0));
         assert!(largest_difference(&one.inputs, &other.inputs) < 1e-4);
         assert!(one.inputs.iter().filter(|&&value| value != 0.0).count() > INPUTS * 3 / 4);
+    }
+
+    #[test]
+    fn a_known_state_is_read_as_the_surest_track_and_not_as_one_never_met() {
+        let mut tracks = three_people(|p| p);
+        tracks[0].covariance = [[0.0; 4]; 4];
+        let known = see(&tracks, 0);
+        (0..4).for_each(|i| tracks[0].covariance[i][i] = SIGMAS_MIN[i].powi(2));
+        assert!(largest_difference(&known.inputs, &see(&tracks, 0).inputs) < 1e-6);
+        assert_eq!(known.sigmas, SIGMAS_MIN);
     }
 
     #[test]

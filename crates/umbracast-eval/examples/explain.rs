@@ -8,7 +8,7 @@
 use std::env::args;
 
 use rayon::prelude::*;
-use umbracast::config::{BoxKind, Rollout};
+use umbracast::config::{BoxKind, ForecastMethod, Rollout};
 use umbracast::forecast::Weights;
 use umbracast::site::AccessPoint;
 use umbracast::{Config, Error, Mode, STEPS};
@@ -139,7 +139,7 @@ fn whole_chain(scenes: usize, weights: &Weights) -> Result<Chain, Error> {
     let mut blockage = blockage_table(scenes);
     let mut displacement = displacement_table("Table I and our own tracks");
     let mut found = Vec::new();
-    for (i, (name, _)) in runs.iter().enumerate() {
+    for (i, (name, config)) in runs.iter().enumerate() {
         let links = side_links(&results, i);
         blockage.rows.extend([3, 8].map(|w| {
             let c = &links.windows[w - 1].all;
@@ -149,7 +149,11 @@ fn whole_chain(scenes: usize, weights: &Weights) -> Result<Chain, Error> {
         }));
         let scenes: Vec<_> = results.iter().map(|scene| scene.score.modes[i].displacement).collect();
         let steps = means_m(&scenes);
-        displacement.rows.push(displacement_row(&format!("LSTM on the tracks of {name}"), &steps));
+        let forecast = match config.forecast.method {
+            ForecastMethod::Lstm => "LSTM on the tracks",
+            _ => "own forecast",
+        };
+        displacement.rows.push(displacement_row(&format!("{forecast} of {name}"), &steps));
         found.push((links.windows[2].all.f1().unwrap_or(f64::NAN), steps));
     }
     let climbed: Vec<_> = results.iter().filter_map(|scene| scene.ladder.as_ref()).collect();

@@ -6,6 +6,8 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::tally::Counts;
 
+/// Fewer scenes tell nothing of how scenes differ: drawn anew they give their own scores back.
+const SCENES_MIN: usize = 5;
 /// How often the scenes are drawn anew.
 const RESAMPLES: usize = 1000;
 /// Where the generator starts: the same scores give the same intervals.
@@ -49,9 +51,9 @@ impl Bootstrap {
         Self { draws: (0..RESAMPLES).map(|_| draw()).collect(), scenes }
     }
 
-    /// The sums of each resample of the scenes; `sums[i]` is scene i's. Empty with fewer than two scenes.
+    /// The sums of each resample of the scenes; `sums[i]` is scene i's. Empty with fewer than [`SCENES_MIN`] scenes.
     pub fn resampled<T: Pooled>(&self, sums: &[T]) -> Vec<T> {
-        if self.scenes < 2 || sums.len() != self.scenes {
+        if self.scenes < SCENES_MIN || sums.len() != self.scenes {
             return Vec::new();
         }
         let resample = |times: &Vec<u32>| {
@@ -105,8 +107,9 @@ mod tests {
     }
 
     #[test]
-    fn one_scene_has_no_interval() {
+    fn few_scenes_have_no_interval() {
         assert_eq!(interval_of(&[scene(3, 1)], Counts::recall), None);
+        assert_eq!(interval_of(&[scene(3, 1); 4], Counts::recall), None);
     }
 
     #[test]

@@ -164,7 +164,7 @@ fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow) -> (Tra
     (track, Forecast { track: own.track, steps, coupling: CERTAIN })
 }
 
-/// A track with its own forecast and the spread that the forecaster gave it.
+/// A track with its own forecast. Its spread is that of a constant velocity: tables do not hold the joint one.
 fn with_own_future(own: &TrackRow, acceleration_psd: f64) -> (Track, Forecast) {
     let track = track_of(own);
     let coupling =

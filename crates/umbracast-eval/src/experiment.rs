@@ -2,7 +2,9 @@
 //! rest. Scenes may be run here and there; together they give the same bytes as one run.
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use rayon::prelude::*;
 use umbracast::Error;
@@ -173,11 +175,14 @@ impl<'a> Experiment<'a> {
         }
     }
 
-    /// The file appears under its name when it is whole; two writers of one scene do not meet.
+    /// The file appears under its name when it is whole; two writers of one scene do not meet, though they be the
+    /// same process number on two machines.
     fn write(&self, scene: usize, bytes: &[u8]) -> Result<(), Error> {
         let path = self.path(&self.folder, scene);
-        let part = path.with_extension(format!("part-{}", std::process::id()));
-        fs::write(&part, bytes)
+        let since = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default().as_nanos();
+        let part = path.with_extension(format!("part-{}-{since}", std::process::id()));
+        fs::File::create_new(&part)
+            .and_then(|mut file| file.write_all(bytes))
             .and_then(|()| fs::rename(&part, &path))
             .map_err(|e| Error::new(e.to_string()).within(path.display()))
     }

@@ -134,7 +134,7 @@ pub struct ModeScores {
     /// Shares within the 50 and the 90 % region by step.
     pub coverage: Vec<Option<[f64; 2]>>,
     /// When links are blocked and clear again, one an access point, in the site's order.
-    pub times: Vec<[TimeScores; 2]>,
+    pub times: Vec<[TimeScores; 3]>,
     /// What was skipped, all scenes.
     pub health: Health,
 }
@@ -306,7 +306,7 @@ fn mode_scores(bootstrap: &Bootstrap, scenes: &[&SceneScore], m: usize) -> ModeS
     scenes.iter().for_each(|scene| health.add(&scene.modes[m].health));
     let times = |a: usize| {
         let pooled = Times::pooled(scenes.iter().filter_map(|scene| scene.modes[m].times.get(a)));
-        [&pooled.onset, &pooled.duration].map(TimeScores::of)
+        [&pooled.onset, &pooled.duration, &pooled.again].map(TimeScores::of)
     };
     ModeScores {
         mode: scenes[0].modes[m].mode,

@@ -22,13 +22,15 @@ pub struct TimeTally {
     pub errors_s: Vec<f64>,
 }
 
-/// Both kinds.
+/// All kinds.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Times {
     /// From in sight to blocked.
     pub onset: TimeTally,
     /// From blocked to in sight.
     pub duration: TimeTally,
+    /// From in sight, through the first blockage that comes, to in sight again; where one came.
+    pub again: TimeTally,
 }
 
 impl Times {
@@ -47,15 +49,16 @@ impl Times {
             let track = matching.get(&(i.frame, i.person));
             let row = track.and_then(|track| rows.get(&(i.frame, i.access_point, *track)));
             let (Some(row), Some(times)) = (row, all.get_mut(i.access_point as usize)) else { continue };
+            let clear = |step: &usize| {
+                truth.link(i.frame + *step as u64, i.person, i.access_point).is_some_and(|link| !link.blocked)
+            };
             if i.blocked_now {
-                let clear = |step: &usize| {
-                    truth
-                        .link(i.frame + *step as u64, i.person, i.access_point)
-                        .is_some_and(|link| !link.blocked)
-                };
                 times.duration.add(&row.duration_s, (1..=STEPS).find(clear));
-            } else {
-                times.onset.add(&row.onset_s, i.first_blocked);
+                continue;
+            }
+            times.onset.add(&row.onset_s, i.first_blocked);
+            if let Some(first) = i.first_blocked {
+                times.again.add(&row.duration_s, (first..=STEPS).find(clear));
             }
         }
         all
@@ -67,6 +70,7 @@ impl Times {
         for scene in scenes {
             pooled.onset.append(&scene.onset);
             pooled.duration.append(&scene.duration);
+            pooled.again.append(&scene.again);
         }
         pooled
     }
@@ -140,11 +144,13 @@ mod tests {
         let run = SceneRun { tracks: Vec::new(), links };
         let matching: Matching = (0..60).map(|frame| ((frame, 0), 7)).collect();
         let times = Times::each(&index, &instances, &run, &matching, 1);
-        let [Times { onset, duration }] = &times[..] else { panic!("one access point") };
+        let [Times { onset, duration, again }] = &times[..] else { panic!("one access point") };
         // Frames 26, 27 and 28 come 0.2 to 0.4 s before it; 31, 32 and 33 before it is over.
         assert_eq!((onset.covered, duration.covered, duration.told), (3, 3, 5));
         // Onsets at 0.1 to 0.9 s against 0.3 s.
         assert!((onset.mean_error_s().unwrap() - (0.2 + 0.1 + 2.1) / 9.0).abs() < 1e-9);
         assert!((duration.median_error_s().unwrap() - 0.1).abs() < 1e-9);
+        // In sight at frame 21 to 29 before it; over within 0.9 s from frame 26 on, never as soon as 0.4 s.
+        assert_eq!((again.told, again.covered, again.errors_s.len()), (9, 0, 4));
     }
 }

@@ -87,7 +87,7 @@ pub struct LinkRow {
     pub p: [f64; STEPS],
     /// 10, 50 and 90 % quantiles of the time until the link is blocked; null where it is now or not within the steps.
     pub onset_s: [Option<f64>; 3],
-    /// The same of the time until the link is clear; null where it is now or not within the steps.
+    /// The same of the time until the blockage that is or comes first is over; null where that is not within the steps.
     pub duration_s: [Option<f64>; 3],
 }
 

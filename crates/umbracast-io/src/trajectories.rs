@@ -40,6 +40,16 @@ pub enum Unit {
     Centimetre,
 }
 
+impl Unit {
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Metre => "m",
+            Self::Centimetre => "cm",
+        }
+    }
+}
+
 /// What a file may leave open. What is given here goes before what the file says.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Options {

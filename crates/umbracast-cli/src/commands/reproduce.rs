@@ -11,7 +11,7 @@ use umbracast_eval::experiment::{Experiment, Shard};
 use umbracast_eval::pooled;
 use umbracast_eval::report::{self, Context};
 
-use crate::args::{Common, Reproduce};
+use crate::args::{Common, Replay, Reproduce};
 use crate::commands::evaluate::explanations;
 use crate::progress::SceneClock;
 use crate::run_json::{RunJson, Stopwatch};
@@ -176,9 +176,17 @@ fn command(args: &Reproduce, scenes: usize) -> String {
     } else {
         command += " --trajectories";
         args.trajectories.iter().for_each(|file| command += &format!(" {}", file.display()));
+        let Replay { fps, unit, smooth, seconds } = &args.replay;
+        fps.iter().for_each(|hz| command += &format!(" --fps {hz}"));
+        unit.iter().for_each(|unit| command += &format!(" --unit {}", unit.name()));
+        command += &format!(" --smooth {smooth}");
+        seconds.iter().for_each(|seconds| command += &format!(" --seconds {seconds}"));
     }
     command += &format!(" --seed {seed}");
     args.site.site.iter().for_each(|file| command += &named("--site", file));
+    args.weights.iter().for_each(|file| command += &named("--weights", file));
+    #[cfg(feature = "train")]
+    command.push_str(if args.train { " --train" } else { "" });
     command
 }
 

@@ -85,16 +85,15 @@ pub fn to_text(scores: &Scores) -> String {
     shown.extend((scores.groups.len() > 1).then(|| tables::presets(scores)));
     shown.extend([tables::tracking(group), tables::displacement(group)]);
     shown.extend(tables::losses(group));
-    shown.extend((scores.groups.len() > 1).then(|| tables::figures_by_preset(scores)));
+    shown.push(tables::figures_by_preset(scores));
     shown.iter().map(Table::to_text).collect::<Vec<_>>().join("\n")
 }
 
-/// The paper's experiment for a terminal: the boxes at 300 and 800 ms, then figures with intervals.
+/// The paper's experiment for a terminal: the boxes at 300 and 800 ms.
 pub fn boxes_to_text(scores: &Scores) -> String {
     let Some(group) = scores.headline() else { return String::new() };
     let boxes = |access_point| tables::boxes(group, access_point, &[3, 8]);
-    let mut shown: Vec<Table> = group.access_points().into_iter().map(boxes).collect();
-    shown.extend((scores.groups.len() == 1).then(|| tables::figures_by_preset(scores)));
+    let shown: Vec<Table> = group.access_points().into_iter().map(boxes).collect();
     shown.iter().map(Table::to_text).collect::<Vec<_>>().join("\n")
 }
 

@@ -246,8 +246,9 @@ pub fn times(group: &Group) -> Table {
         ["mode", "access point", "time until", "links", "in 10 to 90 %", "median error, s", "mean error, s"];
     let mut table = Table::new("Time to blockage and its duration", 3, &header);
     for mode in &group.modes {
-        for (access_point, both) in group.access_points().into_iter().zip(&mode.times) {
-            for (until, scores) in ["blocked", "clear"].into_iter().zip(both).filter(|(_, s)| s.told > 0) {
+        for (access_point, kinds) in group.access_points().into_iter().zip(&mode.times) {
+            let until = ["blocked", "clear", "clear again"];
+            for (until, scores) in until.into_iter().zip(kinds).filter(|(_, s)| s.told > 0) {
                 table.rows.push(vec![
                     mode.mode.name().to_owned(),
                     access_point.to_owned(),
@@ -261,8 +262,8 @@ pub fn times(group: &Group) -> Table {
         }
     }
     table.noted(
-        "Of links in sight, the time until they are blocked; of blocked ones, until they are clear. Links: those \
-         with a chance of 10 % or more that it happens within 900 ms. Share of them between the 10 and the 90 % \
+        "Of links in sight, the time until they are blocked; of blocked ones, until they are clear; of links in sight \
+         that come to be blocked, until they are clear again. Links: those with a chance of 10 % or more that it happens within 900 ms. Share of them between the 10 and the 90 % \
          quantile (times are whole steps of 100 ms, so more than 80 %), and the error of the 50 % quantile where it \
          happened.",
     )
