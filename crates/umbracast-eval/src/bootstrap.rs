@@ -51,7 +51,7 @@ impl Bootstrap {
         Self { draws: (0..RESAMPLES).map(|_| draw()).collect(), scenes }
     }
 
-    /// The sums of each resample of the scenes; `sums[i]` is scene i's. Empty with fewer than [`SCENES_MIN`] scenes.
+    /// The sums of each resample of the scenes; `sums[i]` is scene i's. Empty with fewer than five scenes.
     pub fn resampled<T: Pooled>(&self, sums: &[T]) -> Vec<T> {
         if self.scenes < SCENES_MIN || sums.len() != self.scenes {
             return Vec::new();
