@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn the_text_shows_what_was_scored_beside_what_was_published() {
-        let text = to_text(&scores(&Config::for_mode(Mode::Default), &["orca-03", "orca-03"]));
+        let text = to_text(&scores(&Config::for_mode(Mode::Default), &["orca-03"; 5]));
         // Warned from frame 21 for a blockage at 30: right at w = 9, early before; nothing is missed.
         let row = text.lines().find(|line| line.contains("900 ms") && line.contains("default")).unwrap();
         assert!(row.contains("1.000 [1.000, 1.000]"), "{row}");
