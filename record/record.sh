@@ -90,9 +90,10 @@ fi
 # Killed and started again.
 record resume record/resume.sh
 
-# The paper's experiment whole: an hour on two cores. REPRODUCE names a folder in which an earlier try is gone on with.
+# The paper's experiment whole, training first: an hour on two cores. REPRODUCE names a folder in which an earlier try is gone on with.
 reproduced="${REPRODUCE:-$scratch/reproduce}"
-record reproduce umbracast reproduce --out "$reproduced"
+cargo build --release -p umbracast-cli --features train
+record reproduce umbracast reproduce --train --out "$reproduced"
 sed -i "s|$reproduced|/tmp/reproduce|g" record/reproduce.txt
 cp "$reproduced/report.html" record/reproduce.html
 cp "$reproduced/boxes.svg" record/reproduce-boxes.svg

@@ -22,7 +22,8 @@ pub struct Background {
     map_scans: u32,
     keys: Vec<u64>,
     thinned: Vec<Point>,
-    azimuths: Azimuths,
+    /// For the voxels, which take every point of a frame; made with the first.
+    azimuths: Option<Azimuths>,
 }
 
 #[derive(Debug, Clone)]
@@ -87,7 +88,7 @@ impl Background {
             map_scans: 0,
             keys: Vec::new(),
             thinned: Vec::new(),
-            azimuths: Azimuths::of_a_turn(),
+            azimuths: None,
             config,
         })
     }
@@ -160,6 +161,7 @@ impl Background {
     /// All points of a frame in the site frame, thinned where the config says so.
     fn all_points(&mut self, frame: &Frame, health: &mut Health, points: &mut Vec<Point>) {
         points.clear();
+        let azimuths = self.azimuths.get_or_insert_with(Azimuths::of_a_turn);
         for scan in &frame.scans {
             let Some(sensor) = self.sensors.get(scan.sensor) else { continue };
             let valid = |r: f32, health: &mut Health| {
@@ -172,7 +174,7 @@ impl Background {
                     for (i, &range_m) in image.range_m.iter().enumerate() {
                         let (c, b) = (i / image.beams.len().max(1), i % image.beams.len().max(1));
                         if range_m != 0.0 && c < image.columns.len() && valid(range_m, health) {
-                            let position_m = image.tabled_point_m(&self.azimuths, c, b, f64::from(range_m));
+                            let position_m = image.tabled_point_m(azimuths, c, b, f64::from(range_m));
                             let time_ns = image.time_ns(c, b);
                             points.push(to_site(&scan.site_from_sensor, scan.sensor, position_m, time_ns));
                         }

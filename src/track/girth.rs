@@ -24,6 +24,13 @@ const RETURNS_MIN: f64 = 6.0;
 const FREE_SHARE: f64 = 0.97;
 const WALKS_FROM_MPS: f64 = 0.5;
 
+/// Half depth and half width of the returns of somebody who walks in free sight, as a share of the height.
+pub fn share(detection: &Detection, view: &View, height_m: f64, speed_mps: f64) -> Option<f64> {
+    let free = view.returns > FREE_SHARE * view.returns_alone && view.returns > RETURNS_MIN;
+    let extent_m = detection.obb.half_m.x + detection.obb.half_m.y;
+    (free && detection.whole && speed_mps > WALKS_FROM_MPS).then(|| extent_m / height_m)
+}
+
 /// What extents have told.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Girth {
@@ -35,11 +42,9 @@ pub(super) struct Girth {
 impl Girth {
     /// Takes the detection of a body that looks like `view`.
     pub(super) fn see(&mut self, detection: &Detection, view: &View, height_m: f64, speed_mps: f64) {
-        let free = view.returns > FREE_SHARE * view.returns_alone && view.returns > RETURNS_MIN;
-        if free && detection.whole && speed_mps > WALKS_FROM_MPS {
-            let extent_m = detection.obb.half_m.x + detection.obb.half_m.y;
+        if let Some(share) = share(detection, view, height_m, speed_mps) {
             self.frames += 1.0;
-            self.sum += extent_m / height_m - SHARE_STANDING - SHARE_PER_MPS * speed_mps;
+            self.sum += share - SHARE_STANDING - SHARE_PER_MPS * speed_mps;
         }
     }
 

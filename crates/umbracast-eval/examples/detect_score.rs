@@ -14,6 +14,7 @@ use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::track::Tracker;
 use umbracast::{Frame, Health, Site};
+use umbracast_eval::chain::push;
 use umbracast_sim::crowd::{Preset, circle_crossing, pairs};
 use umbracast_sim::scene::{PersonTruth, Scene};
 
@@ -186,16 +187,6 @@ fn away(site: &Site, p: DVec2) -> DVec2 {
     let from = site.sensors.iter().map(|s| DVec2::new(s.position_m[0], s.position_m[1]));
     let nearest = from.min_by(|a, b| a.distance_squared(p).total_cmp(&b.distance_squared(p)));
     nearest.map_or(DVec2::ZERO, |s| (p - s).normalize_or_zero())
-}
-
-fn push(assembler: &mut Assembler, packets: &[Vec<Packet>], health: &mut Health) {
-    // Sensors send at the same time: packets are taken in order of time.
-    let mut all: Vec<(usize, &Packet)> =
-        packets.iter().enumerate().flat_map(|(sensor, list)| list.iter().map(move |p| (sensor, p))).collect();
-    all.sort_by_key(|(sensor, packet)| (packet.time_ns, *sensor));
-    for (sensor, packet) in all {
-        assembler.push(sensor, packet, health);
-    }
 }
 
 fn assemble(site: &Site, revolutions: Vec<Vec<Vec<Packet>>>) -> Vec<Frame> {

@@ -18,9 +18,10 @@ use umbracast::detect::axis::{AxisModel, OUTPUTS, UNIT_M};
 use umbracast::detect::bias::{EVEN, ODD, View};
 use umbracast::detect::{Background, Clusterer, Measurer};
 use umbracast::geometry::DVec2;
-use umbracast::lidar::{Assembler, Packet};
+use umbracast::lidar::Assembler;
 use umbracast::track::Tracker;
 use umbracast::{Error, Health};
+use umbracast_eval::chain::push;
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs};
 use umbracast_sim::scene::Scene;
 
@@ -153,7 +154,7 @@ fn watch(crowd: Crowd, seed: u64, config: &Config) -> Result<Vec<Sample>, Error>
     let mut tracker = Tracker::new(&config.track, &config.site);
     let mut empty = Assembler::new(&config.site)?;
     for packets in Scene::empty(&config.site, seed, 20)? {
-        push(&mut empty, &packets);
+        push(&mut empty, &packets, &mut health);
         while let Some(frame) = empty.pop() {
             background.learn_empty(&frame);
         }
@@ -163,7 +164,7 @@ fn watch(crowd: Crowd, seed: u64, config: &Config) -> Result<Vec<Sample>, Error>
     let mut assembler = Assembler::new(&config.site)?;
     let (mut points, mut clusters, mut detections, mut tracks) = (vec![], vec![], vec![], vec![]);
     while let Some(now) = scene.next_frame() {
-        push(&mut assembler, &now.packets);
+        push(&mut assembler, &now.packets, &mut health);
         while let Some(frame) = assembler.pop() {
             let priors = tracker.priors(frame.time_ns);
             background.foreground(&frame, &priors, &mut health, &mut points);
@@ -185,15 +186,6 @@ fn watch(crowd: Crowd, seed: u64, config: &Config) -> Result<Vec<Sample>, Error>
         }
     }
     Ok(samples)
-}
-
-fn push(assembler: &mut Assembler, packets: &[Vec<Packet>]) {
-    let mut all: Vec<(usize, &Packet)> =
-        packets.iter().enumerate().flat_map(|(sensor, list)| list.iter().map(move |p| (sensor, p))).collect();
-    all.sort_by_key(|(sensor, packet)| (packet.time_ns, *sensor));
-    for (sensor, packet) in all {
-        assembler.push(sensor, packet, &mut Health::default());
-    }
 }
 
 /// Adam on the negative log-likelihood of the true offsets.

@@ -8,19 +8,17 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use umbracast::config::Config;
 use umbracast::geometry::{DVec2, DVec3};
-use umbracast::lidar::{Assembler, Packet};
+use umbracast::lidar::Assembler;
 use umbracast::track::Track;
+use umbracast::track::girth::share;
 use umbracast::track::visibility::{Body, Visibility};
 use umbracast::{Error, Health, Pipeline};
+use umbracast_eval::chain::{empty_frames, push};
 use umbracast_sim::body::Walker;
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 
 const FIRST_SEED: u64 = 135_000;
-/// As `umbracast::track::girth` has them.
-const RETURNS_MIN: f64 = 6.0;
-const FREE_SHARE: f64 = 0.97;
-const WALKS_FROM_MPS: f64 = 0.5;
 /// A track nearer than this to a person is that person's.
 const OWN_M: f64 = 0.3;
 /// Where on a body, in shares of the height, the trunk with the arms is measured.
@@ -73,17 +71,11 @@ fn watch(scene: u64) -> Result<Vec<Person>, Error> {
     let walkers = scene.walkers().to_vec();
     let visibility = Visibility::new(&config.site);
     let mut pipeline = Pipeline::new(&config, None)?;
-    let mut assembler = Assembler::new(&config.site)?;
-    for packets in Scene::empty(&config.site, seed, 20)? {
-        push(&mut assembler, &packets);
-        while let Some(frame) = assembler.pop() {
-            pipeline.learn_empty(&frame);
-        }
-    }
-    let mut assembler = Assembler::new(&config.site)?;
+    empty_frames(&config.site, seed)?.iter().for_each(|frame| pipeline.learn_empty(frame));
+    let (mut assembler, mut health) = (Assembler::new(&config.site)?, Health::default());
     let mut seen: BTreeMap<usize, Vec<Seen>> = BTreeMap::new();
     while let Some(now) = scene.next_frame() {
-        push(&mut assembler, &now.packets);
+        push(&mut assembler, &now.packets, &mut health);
         while let Some(frame) = assembler.pop() {
             let outcome = pipeline.step(&frame);
             let eyes = visibility.eyes(&frame);
@@ -91,7 +83,6 @@ fn watch(scene: u64) -> Result<Vec<Person>, Error> {
             let bodies: Vec<Body> = outcome.tracks.iter().map(body).collect();
             for (track, body) in outcome.tracks.iter().zip(&bodies).filter(|(track, _)| track.points > 0) {
                 let view = visibility.view(&eyes, body, &bodies);
-                let free = view.returns > FREE_SHARE * view.returns_alone && view.returns > RETURNS_MIN;
                 let speed_mps = track.velocity_mps.length();
                 let nearest = outcome
                     .detections
@@ -102,10 +93,8 @@ fn watch(scene: u64) -> Result<Vec<Person>, Error> {
                     walker.state_at(frame.time_ns).is_some_and(|s| away(s.position_m, track) < OWN_M)
                 });
                 let (Some(detection), Some(own)) = (nearest, own) else { continue };
-                if free && speed_mps > WALKS_FROM_MPS {
-                    let extent_m = detection.obb.half_m.x + detection.obb.half_m.y;
-                    seen.entry(own).or_default().push((extent_m / track.height_m, speed_mps));
-                }
+                let share = share(detection, &view, track.height_m, speed_mps);
+                seen.entry(own).or_default().extend(share.map(|share| (share, speed_mps)));
             }
         }
     }
@@ -124,15 +113,6 @@ fn girth(walker: &Walker) -> f64 {
     let trunk = vertices.iter().filter(|v| (TRUNK[0] * height_m..TRUNK[1] * height_m).contains(&v.z));
     let (right_m, left_m) = trunk.fold((0.0, 0.0), |(a, b): (f64, f64), v| (a.min(v.y), b.max(v.y)));
     ((left_m - right_m) / height_m).ln()
-}
-
-fn push(assembler: &mut Assembler, packets: &[Vec<Packet>]) {
-    let mut all: Vec<(usize, &Packet)> =
-        packets.iter().enumerate().flat_map(|(sensor, list)| list.iter().map(move |p| (sensor, p))).collect();
-    all.sort_by_key(|(sensor, packet)| (packet.time_ns, *sensor));
-    for (sensor, packet) in all {
-        assembler.push(sensor, packet, &mut Health::default());
-    }
 }
 
 /// Slope and value at 0 of the line of least squares through (x, y).

@@ -12,10 +12,11 @@ use std::path::Path;
 
 use umbracast::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point};
 use umbracast::geometry::DVec2;
-use umbracast::lidar::{Assembler, Frame, Packet};
+use umbracast::lidar::{Assembler, Frame};
 use umbracast::track::{Track, Tracker};
 use umbracast::{Config, Error, Health, Mode, Site};
 use umbracast_eval::bootstrap::Pooled;
+use umbracast_eval::chain::{empty_frames, push};
 use umbracast_eval::matching::match_scene;
 use umbracast_eval::stage1::Stage1;
 use umbracast_io::rows::{PeopleRow, TrackRow, of_track};
@@ -176,20 +177,15 @@ impl Stage {
 
 fn run_scene(crowd: Crowd, site: &Site, seed: u64, contenders: &mut [Contender]) -> Result<(), Error> {
     let mut stages = contenders.iter().map(|c| Stage::new(&c.config)).collect::<Result<Vec<_>, _>>()?;
-    let mut assembler = Assembler::new(site)?;
-    for packets in Scene::empty(site, seed + 1_000_000, 20)? {
-        push(&mut assembler, &packets);
-    }
-    assembler.finish();
-    while let Some(frame) = assembler.pop() {
+    for frame in empty_frames(site, seed + 1_000_000)? {
         stages.iter_mut().for_each(|stage| stage.background.learn_empty(&frame));
     }
-    let mut assembler = Assembler::new(site)?;
+    let (mut assembler, mut health) = (Assembler::new(site)?, Health::default());
     let mut scene = Scene::new(crowd, site, seed)?;
     loop {
         let truth = scene.next_frame();
         match &truth {
-            Some(truth) => push(&mut assembler, &truth.packets),
+            Some(truth) => push(&mut assembler, &truth.packets, &mut health),
             None => assembler.finish(),
         }
         while let Some(frame) = assembler.pop() {
@@ -221,10 +217,4 @@ fn run_scene(crowd: Crowd, site: &Site, seed: u64, contenders: &mut [Contender])
     }
     contenders.iter_mut().for_each(Contender::count_scene);
     Ok(())
-}
-
-fn push(assembler: &mut Assembler, packets: &[Vec<Packet>]) {
-    for (sensor, packets) in packets.iter().enumerate() {
-        packets.iter().for_each(|packet| assembler.push(sensor, packet, &mut Health::default()));
-    }
 }

@@ -122,14 +122,14 @@ pub fn run(spec: &Spec, progress: impl Fn(Progress) + Sync) -> Result<Vec<SceneR
     scenes.with_max_len(1).map(|index| chain.scene(index, &progress)).collect()
 }
 
-/// The frames of the hall without people.
+/// The frames of the hall without people; `seed` is that of the sensors' noise.
 ///
 /// # Errors
 /// A sensor that cannot be simulated.
-pub fn empty_frames(site: &Site) -> Result<Vec<Frame>, Error> {
+pub fn empty_frames(site: &Site, seed: u64) -> Result<Vec<Frame>, Error> {
     let mut assembler = Assembler::new(site)?;
     let mut health = Health::default();
-    for packets in Scene::empty(site, TEST_SEEDS, EMPTY_FRAMES)? {
+    for packets in Scene::empty(site, seed, EMPTY_FRAMES)? {
         push(&mut assembler, &packets, &mut health);
     }
     assembler.finish();
@@ -160,7 +160,7 @@ impl<'a> Chain<'a> {
                 "site: expected the same for every mode, found {site} for {mode}"
             )));
         }
-        let empty = empty_frames(&first.site)?;
+        let empty = empty_frames(&first.site, TEST_SEEDS)?;
         let learned = |config| {
             let mut pipeline = Pipeline::new(config, spec.weights.as_ref())?;
             empty.iter().for_each(|frame| pipeline.learn_empty(frame));

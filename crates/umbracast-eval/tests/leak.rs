@@ -3,7 +3,7 @@
 use umbracast::config::ForecastMethod;
 use umbracast::lidar::{Assembler, Frame};
 use umbracast::{Config, Health, Mode, Outcome, Pipeline};
-use umbracast_eval::chain::{empty_frames, push};
+use umbracast_eval::chain::{TEST_SEEDS, empty_frames, push};
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 
@@ -32,7 +32,7 @@ fn outcomes(config: &Config, empty: &[Frame], frames: &[Frame]) -> Vec<Outcome> 
 fn other_frames_later_change_nothing_before() {
     let mut config = Config::for_mode(Mode::Default);
     config.forecast.method = ForecastMethod::Residual;
-    let empty = empty_frames(&config.site).unwrap();
+    let empty = empty_frames(&config.site, TEST_SEEDS).unwrap();
     let (one, mut other) = (frames(&config, 100_001), frames(&config, 100_002));
     other.splice(..CHANGED_FROM, one[..CHANGED_FROM].iter().cloned());
     let (expected, found) = (outcomes(&config, &empty, &one), outcomes(&config, &empty, &other));

@@ -11,7 +11,7 @@ use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Frame};
 use umbracast::track::Track;
 use umbracast::{Config, Error, Health, Pipeline, STEP_S, STEPS};
-use umbracast_eval::chain::{EMPTY_FRAMES, note_truth, push};
+use umbracast_eval::chain::{empty_frames, note_truth, push};
 use umbracast_eval::matching::match_scene;
 use umbracast_eval::scene::{SceneTruth, TruthIndex};
 use umbracast_io::rows;
@@ -90,16 +90,8 @@ fn of_scene(scene: &SampleScene, config: &Config) -> Result<Vec<Sample>, Error> 
     config.site.access_points.clear();
     config.site.sensors.iter_mut().for_each(|sensor| sensor.position_m[2] += scene.raised_m);
     let mut pipeline = Pipeline::new(&config, None)?;
-    let mut assembler = Assembler::new(&config.site)?;
-    let mut health = Health::default();
-    for packets in Scene::empty(&config.site, scene.seed, EMPTY_FRAMES)? {
-        push(&mut assembler, &packets, &mut health);
-    }
-    assembler.finish();
-    while let Some(frame) = assembler.pop() {
-        pipeline.learn_empty(&frame);
-    }
-    let mut assembler = Assembler::new(&config.site)?;
+    empty_frames(&config.site, scene.seed)?.iter().for_each(|frame| pipeline.learn_empty(frame));
+    let (mut assembler, mut health) = (Assembler::new(&config.site)?, Health::default());
     let mut simulated = Scene::new(scene.crowd.clone(), &config.site, scene.seed)?;
     let (mut truth, mut tracks) = (SceneTruth::default(), Vec::new());
     let mut seen: BTreeMap<(u64, u64), (Seen, [DVec2; 2])> = BTreeMap::new();
