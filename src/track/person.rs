@@ -58,7 +58,7 @@ pub(super) struct Person {
 
 impl Person {
     pub(super) fn born(config: &TrackConfig, id: u64, detection: &Detection, time_ns: i64) -> Self {
-        let noise = plus(noise(config, detection), sway(config));
+        let noise = plus(noise(config, detection, &View::default()), sway(config));
         let variance = noise[0][0].max(noise[1][1]);
         let mut person = Self {
             id,
@@ -98,7 +98,7 @@ impl Person {
         time_ns: i64,
         step_s: f64,
     ) {
-        self.filter.correct(detection.position_m, detection.z_m, noise(config, detection));
+        self.filter.correct(detection.position_m, detection.z_m, noise(config, detection, view));
         let there = self.existence * config.hit_ratio;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.hits += 1;
@@ -221,9 +221,11 @@ impl Person {
 /// Covariance of a detection's position for the filter, which follows the sway itself: what the detection tells of
 /// its error counts in part; beside it a part that nothing mends, and one that falls with the share of the body that
 /// is seen.
-pub(super) fn noise(config: &TrackConfig, detection: &Detection) -> Mat2 {
-    // 1 where hardly anything is seen, 0 from half the height on.
-    let hidden = (1.0 - 2.0 * detection.aabb.size_m().z / config.height_mean_m).max(0.0);
+pub(super) fn noise(config: &TrackConfig, detection: &Detection, view: &View) -> Mat2 {
+    // 1 where hardly anything is seen, 0 from half the height and half the returns in free sight on.
+    let low = 1.0 - 2.0 * detection.aabb.size_m().z / config.height_mean_m;
+    let few = 1.0 - 2.0 * f64::from(detection.points) / view.returns_alone.max(f64::MIN_POSITIVE);
+    let hidden = low.max(few).max(0.0);
     let variance = config.noise_floor_m.powi(2) + (config.hidden_noise_m * hidden).powi(2);
     let told = detection.covariance_m2.unwrap_or_default();
     plus(told.map(|row| row.map(|c| config.noise_share * c)), [[variance, 0.0], [0.0, variance]])

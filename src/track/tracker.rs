@@ -119,7 +119,7 @@ impl Tracker {
             let after_s = seconds(last_ns, self.measured_ns(detection, last_ns, time_ns));
             let existence = if self.config.visibility { person.existence } else { 1.0 };
             let seen = existence * expected[p].detection_probability;
-            pair_cost(&self.config, person, after_s, seen, detection)
+            pair_cost(&self.config, person, after_s, seen, detection, &expected[p].view)
         };
         match self.config.assignment {
             Assignment::Greedy => greedy(self.people.len(), detections.len(), cost),
@@ -190,14 +190,21 @@ impl Tracker {
 
 /// Twice the negative log-likelihood that a person gave a detection, less that it went unseen and the detection is
 /// somebody's who is new. [`FORBIDDEN`] outside the gate. `seen` is the chance that the person is there and seen.
-fn pair_cost(config: &TrackConfig, person: &Person, after_s: f64, seen: f64, detection: &Detection) -> f64 {
+fn pair_cost(
+    config: &TrackConfig,
+    person: &Person,
+    after_s: f64,
+    seen: f64,
+    detection: &Detection,
+    view: &View,
+) -> f64 {
     let state = person.filter.state_after(config, after_s);
     let apart = detection.position_m - state.position_m();
     let mut spread = state.position_covariance();
     let mut spread_z = person.filter.vertical.map(|z| z.P[0][0]);
     if config.gate_on == GateOn::Innovation {
         let slack = config.gate_slack_m.powi(2);
-        let noise = plus(plus(noise(config, detection), sway(config)), [[slack, 0.0], [0.0, slack]]);
+        let noise = plus(plus(noise(config, detection, view), sway(config)), [[slack, 0.0], [0.0, slack]]);
         spread = plus(spread, noise);
         spread_z = spread_z.map(|z| z + noise[0][0]);
     }

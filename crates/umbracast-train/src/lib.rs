@@ -13,7 +13,6 @@ pub mod weights;
 pub mod score;
 pub mod card;
 pub mod train;
-pub mod hurry;
 pub mod samples;
 pub mod residual;
 pub mod departures;

@@ -15,10 +15,8 @@ use umbracast_eval::chain::{empty_frames, note_truth, push};
 use umbracast_eval::matching::match_scene;
 use umbracast_eval::scene::{SceneTruth, TruthIndex};
 use umbracast_io::rows;
-use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, mixed};
+use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, hurried, mixed};
 use umbracast_sim::scene::Scene;
-
-use crate::hurry::hurried;
 
 /// A track at a frame, and its person's way from there.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,6 +2,7 @@
 
 pub mod orca;
 pub mod circle;
+mod hurry;
 pub mod mixed;
 pub mod replay;
 
@@ -11,6 +12,7 @@ use umbracast::Error;
 use umbracast::geometry::DVec2;
 
 pub use circle::circle_crossing;
+pub use hurry::hurried;
 pub use mixed::pairs;
 pub use replay::{Recorded, replay};
 

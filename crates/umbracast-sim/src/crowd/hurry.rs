@@ -5,13 +5,13 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
+use super::circle::STEP_NS;
+use super::{Crowd, Trajectory};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use umbracast_sim::crowd::{Crowd, Trajectory};
 
 /// Of trajectories.
-const STEP_NS: i64 = 10_000_000;
-const STEP_S: f64 = 0.01;
+const STEP_S: f64 = STEP_NS as f64 * 1e-9;
 /// How fast the clock runs at most, drawn anew for each walk between two stands: 1.48 m/s (PedPy's corridor) becomes
 /// 1.6 to 2.8 m/s.
 const RATE: Range<f64> = 1.1..1.9;
@@ -79,7 +79,7 @@ fn walked(way: &Trajectory, clock_s: &[f64], rng: &mut Pcg64) -> Option<Trajecto
 #[cfg(test)]
 mod tests {
     use super::*;
-    use umbracast_sim::crowd::{Preset, circle_crossing};
+    use crate::crowd::{Preset, circle_crossing};
 
     #[test]
     fn who_hurries_runs_and_stands_but_jumps_nowhere() {
