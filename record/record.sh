@@ -71,6 +71,7 @@ if [ -n "${UMBRACAST_DATA:-}" ]; then
     walkers="$UMBRACAST_DATA/circle_antipode"
     record circle-antipode umbracast evaluate --unit cm --fps 25 --out "$scratch/walkers" \
         --trajectories "$walkers/circle-10m-08-2.txt" "$walkers/circle-10m-16-2.txt"
+    record walkers record/walkers.sh
     record people record/people.sh 6 default
     record forecasts record/forecasts.sh 20
     frames="$UMBRACAST_DATA/logictronix_vlp16"
