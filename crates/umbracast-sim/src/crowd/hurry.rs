@@ -18,7 +18,7 @@ const RATE: Range<f64> = 1.1..1.9;
 /// People stand, set off, walk and slow down for so long, seconds.
 const STAND_S: Range<f64> = 0.3..1.5;
 const SET_OFF_S: Range<f64> = 0.8..1.8;
-const WALK_S: Range<f64> = 2.0..6.0;
+const WALK_S: Range<f64> = 4.0..12.0;
 const SLOW_DOWN_S: Range<f64> = 1.0..3.5;
 /// Bodies sway as people step: to both sides once a stride, and forward with each of its two steps. A stride goes so
 /// far, and the sway so far to each side and ahead at most, metres.
