@@ -148,6 +148,18 @@ fn a_pair_half_a_metre_apart_is_two_tracks_in_default_and_one_in_hdl() {
 }
 
 #[test]
+fn two_tracks_on_the_halves_of_one_body_become_one() {
+    // They meet at 0.135 m/s: nearer than two trunks can stand from 3.7 s on.
+    let ahead = DVec2::new(1.0, 0.0);
+    let halves = [(DVec2::new(-5.0, 0.0), ahead), (DVec2::new(-5.0, 0.8), ahead - DVec2::new(0.0, 0.135))];
+    let config = Config::for_mode(Mode::Default).track;
+    for seed in 0..10 {
+        let all = follow(&config, World { noise_m: 0.01, ..world(&halves, seed) }, 46);
+        assert_eq!((all[35].len(), all[45].len()), (2, 1), "seed {seed}");
+    }
+}
+
+#[test]
 fn who_is_out_of_sight_for_long_is_not_told_but_known_again() {
     let config = Config::for_mode(Mode::Default).track;
     let mut tracker = Tracker::new(&config, &open_site());

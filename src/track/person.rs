@@ -242,3 +242,34 @@ fn largest_sigma(spread: Mat2) -> f64 {
     let (mean, half) = (0.5 * (spread[0][0] + spread[1][1]), 0.5 * (spread[0][0] - spread[1][1]));
     (mean + half.hypot(spread[0][1])).max(0.0).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+
+    /// Variance for the filter of a whole body's height with so many returns, where a body in free sight gives 40.
+    fn variance_m2(points: u32) -> f64 {
+        let config = Config::default().track;
+        let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.4, config.height_mean_m) };
+        let detection = Detection {
+            position_m: DVec2::ZERO,
+            covariance_m2: None,
+            z_m: 0.9,
+            time_ns: 0,
+            points,
+            whole: true,
+            top_m: config.height_mean_m,
+            aabb,
+            obb: Obb::from_aabb(&aabb),
+        };
+        noise(&config, &detection, &View { returns_alone: 40.0, ..View::default() })[0][0]
+    }
+
+    #[test]
+    fn few_returns_of_who_stands_behind_others_are_hardly_believed() {
+        assert_eq!(variance_m2(20), variance_m2(40));
+        assert!(variance_m2(8) > 4.0 * variance_m2(20), "{} {}", variance_m2(8), variance_m2(20));
+        assert!(variance_m2(2) > variance_m2(8));
+    }
+}
