@@ -117,9 +117,7 @@ impl Tracker {
                 return FORBIDDEN;
             }
             let after_s = seconds(last_ns, self.measured_ns(detection, last_ns, time_ns));
-            let existence = if self.config.visibility { person.existence } else { 1.0 };
-            let seen = existence * expected[p].detection_probability;
-            pair_cost(&self.config, person, after_s, seen, detection, &expected[p].view)
+            pair_cost(&self.config, person, &expected[p], after_s, detection)
         };
         match self.config.assignment {
             Assignment::Greedy => greedy(self.people.len(), detections.len(), cost),
@@ -189,14 +187,13 @@ impl Tracker {
 }
 
 /// Twice the negative log-likelihood that a person gave a detection, less that it went unseen and the detection is
-/// somebody's who is new. [`FORBIDDEN`] outside the gate. `seen` is the chance that the person is there and seen.
+/// somebody's who is new. [`FORBIDDEN`] outside the gate.
 fn pair_cost(
     config: &TrackConfig,
     person: &Person,
+    expected: &Expected,
     after_s: f64,
-    seen: f64,
     detection: &Detection,
-    view: &View,
 ) -> f64 {
     let state = person.filter.state_after(config, after_s);
     let apart = detection.position_m - state.position_m();
@@ -204,7 +201,8 @@ fn pair_cost(
     let mut spread_z = person.filter.vertical.map(|z| z.P[0][0]);
     if config.gate_on == GateOn::Innovation {
         let slack = config.gate_slack_m.powi(2);
-        let noise = plus(plus(noise(config, detection, view), sway(config)), [[slack, 0.0], [0.0, slack]]);
+        let noise =
+            plus(plus(noise(config, detection, &expected.view), sway(config)), [[slack, 0.0], [0.0, slack]]);
         spread = plus(spread, noise);
         spread_z = spread_z.map(|z| z + noise[0][0]);
     }
@@ -219,6 +217,9 @@ fn pair_cost(
     if mahalanobis > config.gate_chi2 || apart_squared > config.gate_m * config.gate_m {
         return FORBIDDEN;
     }
+    // That the person is there and seen.
+    let existence = if config.visibility { person.existence } else { 1.0 };
+    let seen = existence * expected.detection_probability;
     let unseen = (1.0 - seen).max(1e-3);
     let ratio = seen.max(1e-3) / (unseen * config.new_per_m2 * std::f64::consts::TAU);
     mahalanobis + det.ln() - 2.0 * ratio.ln()
