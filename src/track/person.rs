@@ -224,7 +224,10 @@ impl Person {
 pub(super) fn noise(config: &TrackConfig, detection: &Detection, view: &View) -> Mat2 {
     // 1 where hardly anything is seen, 0 from half the height and half the returns in free sight on.
     let low = 1.0 - 2.0 * detection.aabb.size_m().z / config.height_mean_m;
-    let few = 1.0 - 2.0 * f64::from(detection.points) / view.returns_alone.max(f64::MIN_POSITIVE);
+    let few = match view.beams_known {
+        true => 1.0 - 2.0 * f64::from(detection.points) / view.returns_alone.max(f64::MIN_POSITIVE),
+        false => 0.0,
+    };
     let hidden = low.max(few).max(0.0);
     let variance = config.noise_floor_m.powi(2) + (config.hidden_noise_m * hidden).powi(2);
     let told = detection.covariance_m2.unwrap_or_default();
@@ -249,7 +252,7 @@ mod tests {
     use crate::Config;
 
     /// Variance for the filter of a whole body's height with so many returns, where a body in free sight gives 40.
-    fn variance_m2(points: u32) -> f64 {
+    fn variance_m2(points: u32, beams_known: bool) -> f64 {
         let config = Config::default().track;
         let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.4, config.height_mean_m) };
         let detection = Detection {
@@ -263,13 +266,23 @@ mod tests {
             aabb,
             obb: Obb::from_aabb(&aabb),
         };
-        noise(&config, &detection, &View { returns_alone: 40.0, ..View::default() })[0][0]
+        noise(&config, &detection, &View { returns_alone: 40.0, beams_known, ..View::default() })[0][0]
     }
 
     #[test]
     fn few_returns_of_who_stands_behind_others_are_hardly_believed() {
-        assert_eq!(variance_m2(20), variance_m2(40));
-        assert!(variance_m2(8) > 4.0 * variance_m2(20), "{} {}", variance_m2(8), variance_m2(20));
-        assert!(variance_m2(2) > variance_m2(8));
+        assert_eq!(variance_m2(20, true), variance_m2(40, true));
+        assert!(
+            variance_m2(8, true) > 4.0 * variance_m2(20, true),
+            "{} {}",
+            variance_m2(8, true),
+            variance_m2(20, true)
+        );
+        assert!(variance_m2(2, true) > variance_m2(8, true));
+    }
+
+    #[test]
+    fn few_returns_of_unknown_beams_are_believed_for_nobody_knows_how_many_there_should_be() {
+        assert_eq!(variance_m2(8, false), variance_m2(40, false));
     }
 }

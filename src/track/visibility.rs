@@ -62,6 +62,8 @@ pub struct View {
     pub returns: f64,
     /// The same if nobody and nothing stood between.
     pub returns_alone: f64,
+    /// Whether both were counted from the sensors' beams; a guess otherwise.
+    pub beams_known: bool,
     /// Beams that meet a metre of upright head, all sensors together.
     pub beams_per_m_at_top: f64,
     /// Upper end of the highest part of the body that beams meet, above the floor.
@@ -105,7 +107,7 @@ impl Visibility {
 
     /// What `body` gives to all `eyes` while `others` stand round it.
     pub fn view(&self, eyes: &[Eye], body: &Body, others: &[Body]) -> View {
-        let mut view = View::default();
+        let mut view = View { beams_known: eyes.iter().all(|eye| eye.fan.is_some()), ..View::default() };
         for eye in eyes {
             let near = |point: DVec2, radius: f64| {
                 distance_to_segment(point, eye.origin_m.truncate(), body.position_m) < radius + BODY_RADIUS_M

@@ -1,5 +1,5 @@
-//! Known ways walked otherwise: the whole crowd's clock runs fast, slows down, stands and sets off again, and
-//! everybody sways with the stride. Simulated people never run or brake as people in a hurry do, and recorded ones are
+//! Known ways walked otherwise: the whole crowd's clock runs fast, slows down, stands and sets off again, everybody
+//! sways with the stride and wanders a little off the way. Simulated people never run or brake as people in a hurry do, and recorded ones are
 //! few; of a crowd that keeps apart, whoever walks by the same clock keeps apart too.
 
 use std::f64::consts::TAU;
@@ -24,6 +24,11 @@ const SLOW_DOWN_S: Range<f64> = 1.0..3.5;
 /// far, and the sway so far to each side and ahead at most, metres.
 const STRIDE_M: Range<f64> = 1.2..1.8;
 const SWAY_M: [f64; 2] = [0.012, 0.03];
+/// Nobody keeps to a line: standard deviation of the way wandered off, to each side and ahead, metres, and how often
+/// it comes and goes. Without it a forecast trusts people's ways more than theirs deserve.
+const WANDER_M: f64 = 0.02;
+const WANDER_HZ: Range<f64> = 0.25..0.8;
+const WAVES: usize = 4;
 
 /// The crowd in a hurry. Nobody arrives: who reached the goal stands there.
 pub fn hurried(crowd: &Crowd, seed: u64) -> Crowd {
@@ -60,6 +65,7 @@ fn clock(duration_s: f64, rng: &mut Pcg64) -> Vec<f64> {
 fn walked(way: &Trajectory, clock_s: &[f64], rng: &mut Pcg64) -> Option<Trajectory> {
     let stride_m = rng.random_range(STRIDE_M);
     let sway_m = SWAY_M.map(|largest_m| rng.random_range(0.0..largest_m));
+    let wander = [Wander::drawn(rng), Wander::drawn(rng)];
     let (mut start_ns, mut last_m, mut phase) = (None, None, rng.random_range(0.0..TAU));
     let mut positions_m = Vec::new();
     for (step, &time_s) in clock_s.iter().enumerate() {
@@ -71,9 +77,27 @@ fn walked(way: &Trajectory, clock_s: &[f64], rng: &mut Pcg64) -> Option<Trajecto
         // Slow people hardly sway: all of it from 1 m/s on.
         let ahead = velocity_mps / velocity_mps.length().max(1.0);
         let swayed_m = ahead * sway_m[0] * (2.0 * phase).sin() + ahead.perp() * sway_m[1] * phase.sin();
-        positions_m.push(position_m + swayed_m);
+        let at_s = step as f64 * STEP_S;
+        let wandered_m = ahead * wander[0].at_m(at_s) + ahead.perp() * wander[1].at_m(at_s);
+        positions_m.push(position_m + swayed_m + wandered_m);
     }
     Some(Trajectory { start_ns: start_ns?, step_ns: STEP_NS, positions_m, arrived_ns: None, ..way.clone() })
+}
+
+/// A sum of waves: size in metres, frequency in hertz, phase.
+struct Wander([[f64; 3]; WAVES]);
+
+impl Wander {
+    fn drawn(rng: &mut Pcg64) -> Self {
+        let size_m = WANDER_M * (2.0 / WAVES as f64).sqrt();
+        Self(std::array::from_fn(|_| {
+            [size_m * rng.random_range(0.3..1.5), rng.random_range(WANDER_HZ), rng.random_range(0.0..TAU)]
+        }))
+    }
+
+    fn at_m(&self, time_s: f64) -> f64 {
+        self.0.iter().map(|[size_m, pace_hz, phase]| size_m * (TAU * pace_hz * time_s + phase).sin()).sum()
+    }
 }
 
 #[cfg(test)]
