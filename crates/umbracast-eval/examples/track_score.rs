@@ -11,7 +11,6 @@ use std::fs::read_to_string;
 use std::path::Path;
 
 use umbracast::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point};
-use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Frame};
 use umbracast::track::{Track, Tracker};
 use umbracast::{Config, Error, Health, Mode, Site};
@@ -73,8 +72,9 @@ struct Contender {
     name: String,
     config: Config,
     sums: Stage1,
-    /// Sums over matches: squared Mahalanobis distances of position and velocity, squared height errors, number.
-    honesty: [f64; 4],
+    /// Squared height errors of matches, and their number.
+    height_m2: f64,
+    heights: f64,
     people: Vec<PeopleRow>,
     tracks: Vec<TrackRow>,
 }
@@ -86,7 +86,8 @@ impl Contender {
             name,
             config,
             sums: Stage1::default(),
-            honesty: [0.0; 4],
+            height_m2: 0.0,
+            heights: 0.0,
             people: Vec::new(),
             tracks: Vec::new(),
         }
@@ -99,13 +100,8 @@ impl Contender {
             let Some(&id) = matching.get(&(person.frame, person.person)) else { continue };
             let own = |track: &&TrackRow| track.frame == person.frame && track.track == id;
             let Some(t) = self.tracks.iter().find(own) else { continue };
-            let c = t.covariance;
-            let position = DVec2::new(t.x_m - person.x_m, t.y_m - person.y_m);
-            let velocity = DVec2::new(t.vx_mps - person.vx_mps, t.vy_mps - person.vy_mps);
-            self.honesty[0] += squared_mahalanobis([c[0], c[1], c[4]], position);
-            self.honesty[1] += squared_mahalanobis([c[7], c[8], c[9]], velocity);
-            self.honesty[2] += (t.height_m - person.height_m).powi(2);
-            self.honesty[3] += 1.0;
+            self.height_m2 += (t.height_m - person.height_m).powi(2);
+            self.heights += 1.0;
         }
         self.people.clear();
         self.tracks.clear();
@@ -114,7 +110,6 @@ impl Contender {
     fn print(&self) {
         let s = &self.sums;
         let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
-        let [p, v, h, n] = self.honesty;
         println!(
             "{:24} {:.4} {:.4} {:.4} {:.4} {:.4}  {:6.2} {:.4} {:.4}   {:5.2} {:5.2}  {:.3}  {:.3?}",
             self.name,
@@ -126,16 +121,12 @@ impl Contender {
             or_nan(s.switches_per_scene()),
             or_nan(s.position_rmse_m()),
             or_nan(s.velocity_rmse_mps()),
-            p / n,
-            v / n,
-            (h / n).sqrt(),
+            or_nan(s.position_nees()),
+            or_nan(s.velocity_nees()),
+            (self.height_m2 / self.heights).sqrt(),
             s.recall_by_returns().map(or_nan),
         );
     }
-}
-
-fn squared_mahalanobis([xx, xy, yy]: [f64; 3], d: DVec2) -> f64 {
-    (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / (xx * yy - xy * xy)
 }
 
 /// Stage 1 alone, as the pipeline runs it.

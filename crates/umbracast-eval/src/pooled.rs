@@ -1,6 +1,6 @@
 //! The scores: sums of all scenes pooled, by preset and together, with intervals by bootstrap over scenes.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use umbracast::{Health, Mode, STEPS, Site};
 
 use crate::bootstrap::{Bootstrap, Pooled, interval};
@@ -16,7 +16,7 @@ use crate::times::{TimeTally, Times};
 pub const ALL: &str = "all";
 
 /// A score and where it lies in 95 % of resamples of the scenes. Null where it is not defined.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Of all scenes pooled.
     pub value: Option<f64>,
@@ -119,6 +119,10 @@ pub struct ModeScores {
     pub position_rmse_m: Estimate,
     /// Of the 2-D velocity error of matches.
     pub velocity_rmse_mps: Estimate,
+    /// [`Stage1::position_nees`].
+    pub position_nees: Estimate,
+    /// [`Stage1::velocity_nees`].
+    pub velocity_nees: Estimate,
     /// Recall of persons with no, 1 to 5, 6 and more returns.
     pub recall_by_returns: [Option<f64>; 3],
     /// Share of stage-3 instances' persons with a confirmed track.
@@ -319,6 +323,8 @@ fn mode_scores(bootstrap: &Bootstrap, scenes: &[&SceneScore], m: usize) -> ModeS
         switches_per_scene: of_tracks(Stage1::switches_per_scene),
         position_rmse_m: of_tracks(Stage1::position_rmse_m),
         velocity_rmse_mps: of_tracks(Stage1::velocity_rmse_mps),
+        position_nees: of_tracks(Stage1::position_nees),
+        velocity_nees: of_tracks(Stage1::velocity_nees),
         recall_by_returns: tracks.recall_by_returns(),
         tracked_share: displacement.estimate(Displacement::tracked_share),
         scored_share: forecasts.scored_share(),

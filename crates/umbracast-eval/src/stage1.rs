@@ -34,6 +34,10 @@ pub struct Stage1 {
     pub distance_m2: f64,
     /// Squared differences of the velocities of matches.
     pub velocity_m2ps2: f64,
+    /// Squared errors of position and of velocity over the covariances that the tracks claim.
+    pub nees: [f64; 2],
+    /// Matches whose tracks claim both.
+    pub claimed: u64,
     /// Matches of the best one-to-one choice of tracks over the scene, within the gate.
     pub identity_matches: u64,
     /// At each threshold of the similarity.
@@ -73,6 +77,10 @@ impl Stage1 {
                 sums.distance_m2 += apart_m * apart_m;
                 sums.velocity_m2ps2 +=
                     (person.vx_mps - track.vx_mps).powi(2) + (person.vy_mps - track.vy_mps).powi(2);
+                if let Some(errors) = normalised_errors(person, track) {
+                    sums.nees.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error);
+                    sums.claimed += 1;
+                }
                 yesterday.insert(person.person, track.track);
                 let before = last.insert(person.person, track.track);
                 sums.switches += u64::from(before.is_some_and(|before| before != track.track));
@@ -137,6 +145,17 @@ impl Stage1 {
         (self.matches > 0).then(|| (self.velocity_m2ps2 / self.matches as f64).sqrt())
     }
 
+    /// Mean squared position error over the covariance that the track claims for it: 2 if the tracker is honest,
+    /// more if it is too sure (Bar-Shalom's normalised estimation error squared).
+    pub fn position_nees(&self) -> Option<f64> {
+        (self.claimed > 0).then(|| self.nees[0] / self.claimed as f64)
+    }
+
+    /// The same of velocities.
+    pub fn velocity_nees(&self) -> Option<f64> {
+        (self.claimed > 0).then(|| self.nees[1] / self.claimed as f64)
+    }
+
     /// Switches a scene.
     pub fn switches_per_scene(&self) -> Option<f64> {
         ratio(self.switches, self.scenes)
@@ -149,6 +168,18 @@ impl Stage1 {
             self.hota.iter().map(at).sum::<f64>() / ALPHAS as f64
         })
     }
+}
+
+/// Squared Mahalanobis distances of position and velocity; nothing where a covariance is not positive definite.
+fn normalised_errors(person: &PeopleRow, track: &TrackRow) -> Option<[f64; 2]> {
+    let squared = |[xx, xy, yy]: [f64; 3], [x, y]: [f64; 2]| {
+        let determinant = xx * yy - xy * xy;
+        (xx > 0.0 && determinant > 0.0).then(|| (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant)
+    };
+    let c = track.covariance;
+    let position = squared([c[0], c[1], c[4]], [track.x_m - person.x_m, track.y_m - person.y_m])?;
+    let velocity = squared([c[7], c[8], c[9]], [track.vx_mps - person.vx_mps, track.vy_mps - person.vy_mps])?;
+    Some([position, velocity])
 }
 
 fn class(person: &PeopleRow) -> usize {
@@ -172,6 +203,8 @@ impl Pooled for Stage1 {
             distance_m: sum(self.distance_m, other.distance_m),
             distance_m2: sum(self.distance_m2, other.distance_m2),
             velocity_m2ps2: sum(self.velocity_m2ps2, other.velocity_m2ps2),
+            nees: std::array::from_fn(|i| sum(self.nees[i], other.nees[i])),
+            claimed: count(self.claimed, other.claimed),
             identity_matches: count(self.identity_matches, other.identity_matches),
             hota: std::array::from_fn(|a| HotaSums {
                 pairs: count(self.hota[a].pairs, other.hota[a].pairs),
@@ -252,6 +285,25 @@ mod tests {
         let nothing = Stage1::of(&people, &[]);
         assert_eq!((nothing.mota(), nothing.idf1(), nothing.motp_m()), (Some(0.0), Some(0.0), None));
         assert_eq!((nothing.hota(), nothing.precision()), (Some(0.0), None));
+    }
+
+    #[test]
+    fn errors_of_one_standard_deviation_along_each_axis_are_honest() {
+        let people = truth_of(1, 10, |_, _| false).people;
+        let honest = |row: &PeopleRow, covariance| {
+            let track = track_row(row.frame, 0, row.x_m + 0.3, row.y_m - 0.2);
+            let (vx_mps, vy_mps) = (row.vx_mps + 0.1, row.vy_mps + 0.4);
+            TrackRow { vx_mps, vy_mps, covariance, ..track }
+        };
+        // Upper triangle of (x, y, vx, vy).
+        let claims = [0.09, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.01, 0.0, 0.16];
+        let tracks: Vec<TrackRow> = people.iter().map(|row| honest(row, claims)).collect();
+        let sums = Stage1::of(&people, &tracks);
+        for nees in [sums.position_nees(), sums.velocity_nees()] {
+            assert!((nees.unwrap() - 2.0).abs() < 1e-9, "{nees:?}");
+        }
+        let claims_nothing: Vec<TrackRow> = people.iter().map(|row| honest(row, [0.0; 10])).collect();
+        assert_eq!(Stage1::of(&people, &claims_nothing).position_nees(), None);
     }
 
     #[test]

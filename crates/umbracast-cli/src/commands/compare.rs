@@ -16,7 +16,7 @@ pub fn run(args: &Compare, common: &Common) -> Result<Ending, Error> {
     }
     match common.json {
         true => say::line(format_args!("{:#}", serde_json::json!(rows))),
-        false => say::text(&compare::table(&rows).to_text()),
+        false => say::text(&compare::to_text(&rows)),
     }
     Ok(Ending::Done)
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use umbracast::{Error, Mode};
 
 use super::tables::{Table, number};
+use crate::pooled::Estimate;
 use crate::score::Predictor;
 
 /// One mode in one group of scenes of one report.
@@ -18,23 +19,23 @@ pub struct Row {
     /// Whose run.
     pub mode: Mode,
     /// Share of persons in frames who are tracked.
-    pub recall: Option<f64>,
+    pub recall: Estimate,
     /// CLEAR.
-    pub mota: Option<f64>,
+    pub mota: Estimate,
     /// F1 of identities.
-    pub idf1: Option<f64>,
+    pub idf1: Estimate,
     /// A scene.
-    pub switches: Option<f64>,
+    pub switches: Estimate,
     /// Root mean square of the 2-D error, metres.
-    pub position_m: Option<f64>,
+    pub position_m: Estimate,
     /// The same of the velocity, metres a second.
-    pub velocity_mps: Option<f64>,
+    pub velocity_mps: Estimate,
     /// Mean displacement of the forecast at 900 ms, metres.
-    pub displacement_m: Option<f64>,
+    pub displacement_m: Estimate,
     /// F1 at 300 ms by access point.
-    pub f1: Vec<(String, Option<f64>)>,
+    pub f1: Vec<(String, Estimate)>,
     /// The same over links in sight when it was said.
-    pub onset_f1: Vec<(String, Option<f64>)>,
+    pub onset_f1: Vec<(String, Estimate)>,
     /// Scans of sensors that were not there.
     pub scans_missing: u64,
 }
@@ -64,26 +65,21 @@ struct Links {
 #[derive(Deserialize)]
 struct Window {
     w: usize,
-    f1: Score,
-    onset_f1: Score,
+    f1: Estimate,
+    onset_f1: Estimate,
 }
 
 #[derive(Deserialize)]
 struct Stage1 {
     mode: Mode,
-    recall: Score,
-    mota: Score,
-    idf1: Score,
-    switches_per_scene: Score,
-    position_rmse_m: Score,
-    velocity_rmse_mps: Score,
-    displacement_m: Vec<Score>,
+    recall: Estimate,
+    mota: Estimate,
+    idf1: Estimate,
+    switches_per_scene: Estimate,
+    position_rmse_m: Estimate,
+    velocity_rmse_mps: Estimate,
+    displacement_m: Vec<Estimate>,
     health: Health,
-}
-
-#[derive(Deserialize)]
-struct Score {
-    value: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -105,10 +101,10 @@ pub fn rows(name: &str, scores_json: &[u8]) -> Result<Vec<Row>, Error> {
 
 fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
     let own = |links: &&Links| links.mode == Some(scores.mode) && links.predictor == Predictor::Run.name();
-    let at_300_ms = |score: fn(&Window) -> &Score| {
+    let at_300_ms = |score: fn(&Window) -> Estimate| {
         let of = |links: &Links| {
             let window = links.windows.iter().find(|window| window.w == 3);
-            (links.access_point.clone(), window.and_then(|window| score(window).value))
+            (links.access_point.clone(), window.map(score).unwrap_or_default())
         };
         group.links.iter().filter(own).map(of).collect()
     };
@@ -117,21 +113,35 @@ fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
         group: group.name.clone(),
         scenes: group.scenes,
         mode: scores.mode,
-        recall: scores.recall.value,
-        mota: scores.mota.value,
-        idf1: scores.idf1.value,
-        switches: scores.switches_per_scene.value,
-        position_m: scores.position_rmse_m.value,
-        velocity_mps: scores.velocity_rmse_mps.value,
-        displacement_m: scores.displacement_m.last().and_then(|score| score.value),
-        f1: at_300_ms(|window| &window.f1),
-        onset_f1: at_300_ms(|window| &window.onset_f1),
+        recall: scores.recall,
+        mota: scores.mota,
+        idf1: scores.idf1,
+        switches: scores.switches_per_scene,
+        position_m: scores.position_rmse_m,
+        velocity_mps: scores.velocity_rmse_mps,
+        displacement_m: scores.displacement_m.last().copied().unwrap_or_default(),
+        f1: at_300_ms(|window| window.f1),
+        onset_f1: at_300_ms(|window| window.onset_f1),
         scans_missing: scores.health.sensors_missing,
     }
 }
 
-/// One line a row; a column for each access point that any of them has.
-pub fn table(rows: &[Row]) -> Table {
+/// The values, one line a row, and below them the 95 % intervals of the rows that have them. A column for each access
+/// point that any row has.
+pub fn to_text(rows: &[Row]) -> String {
+    let title = "Detection, tracking, displacement of the forecast, and F1 of blockage within 300 ms";
+    let values = table(title, rows, |estimate, digits| number(estimate.value, digits));
+    let several: Vec<Row> = rows.iter().filter(|row| row.recall.interval.is_some()).cloned().collect();
+    let intervals = table("95 % intervals of the same", &several, |estimate, digits| {
+        estimate.interval.map_or("-".to_owned(), |[low, high]| format!("{low:.digits$}..{high:.digits$}"))
+    });
+    match several.is_empty() {
+        true => values.to_text(),
+        false => values.to_text() + "\n" + &intervals.to_text(),
+    }
+}
+
+fn table(title: &str, rows: &[Row], text: impl Fn(Estimate, usize) -> String) -> Table {
     let mut access_points: Vec<&str> = Vec::new();
     for (name, _) in rows.iter().flat_map(|row| &row.f1) {
         if !access_points.contains(&name.as_str()) {
@@ -151,7 +161,6 @@ pub fn table(rows: &[Row]) -> Table {
         "velocity, m/s",
         "900 ms, m",
     ];
-    let title = "Detection, tracking, displacement of the forecast, and F1 of blockage within 300 ms";
     let mut table = Table::new(title, 3, &header);
     table.header.extend(access_points.iter().map(|name| format!("F1 {name}")));
     table.header.extend(access_points.iter().map(|name| format!("onset {name}")));
@@ -159,13 +168,12 @@ pub fn table(rows: &[Row]) -> Table {
     for row in rows {
         let mut cells = vec![row.name.clone(), row.group.clone(), row.mode.name().to_owned()];
         cells.push(row.scenes.to_string());
-        cells.extend([row.recall, row.mota, row.idf1].map(|score| number(score, 3)));
-        cells.push(number(row.switches, 2));
-        let metres = [row.position_m, row.velocity_mps, row.displacement_m];
-        cells.extend(metres.map(|score| number(score, 3)));
+        cells.extend([row.recall, row.mota, row.idf1].map(|score| text(score, 3)));
+        cells.push(text(row.switches, 2));
+        cells.extend([row.position_m, row.velocity_mps, row.displacement_m].map(|score| text(score, 3)));
         for scores in [&row.f1, &row.onset_f1] {
-            let of = |name: &&str| scores.iter().find(|(own, _)| own == name).and_then(|(_, f1)| *f1);
-            cells.extend(access_points.iter().map(|name| number(of(name), 3)));
+            let of = |name: &&str| scores.iter().find(|(own, _)| own == name).map(|(_, f1)| *f1);
+            cells.extend(access_points.iter().map(|name| text(of(name).unwrap_or_default(), 3)));
         }
         cells.push(row.scans_missing.to_string());
         table.rows.push(cells);
@@ -198,8 +206,9 @@ mod tests {
         let json = to_json(&pool(&[&scene], &["side".to_owned()]));
         let rows = rows("lost", json.as_bytes()).unwrap();
         assert_eq!((rows.len(), rows[0].scans_missing), (1, 12));
-        assert_eq!(rows[0].f1, [("side".to_owned(), Some(1.0))]);
-        let text = table(&rows).to_text();
+        assert_eq!((rows[0].f1[0].0.as_str(), rows[0].f1[0].1.value), ("side", Some(1.0)));
+        let text = to_text(&rows);
+        assert!(!text.contains("intervals"), "of a single scene: {text}");
         let line = text.lines().last().unwrap();
         assert!(line.starts_with("lost    orca-03  default") && text.contains("F1 side"), "{text}");
         assert!(super::rows("lost", b"{}").unwrap_err().to_string().contains("groups"));

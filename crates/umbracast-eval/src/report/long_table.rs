@@ -75,6 +75,8 @@ fn of_group(group: &Group, csv: &mut String) {
             ("switches_per_scene", mode.switches_per_scene),
             ("position_rmse_m", mode.position_rmse_m),
             ("velocity_rmse_mps", mode.velocity_rmse_mps),
+            ("position_nees", mode.position_nees),
+            ("velocity_nees", mode.velocity_nees),
             ("tracked_share", mode.tracked_share),
         ];
         tracking.into_iter().for_each(|(name, estimate)| row(of, None, name, estimate));

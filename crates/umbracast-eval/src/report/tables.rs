@@ -177,6 +177,8 @@ pub fn tracking(group: &Group) -> Table {
         ">= 6 returns",
         "1 to 5",
         "none",
+        "NEES",
+        "of velocity",
     ];
     let mut table = Table::new("Detection and tracking", 1, &header);
     for mode in &group.modes {
@@ -187,12 +189,13 @@ pub fn tracking(group: &Group) -> Table {
         row.push(number(mode.position_rmse_m.value, 3));
         row.push(number(mode.velocity_rmse_mps.value, 3));
         row.extend(mode.recall_by_returns.iter().rev().map(|&recall| number(recall, 3)));
+        row.extend([mode.position_nees, mode.velocity_nees].map(|nees| number(nees.value, 2)));
         table.rows.push(row);
     }
     table.noted(
         "Everybody in the scene from the first frame, confirmed tracks, gate 0.5 m, HOTA similarity 1 - d / 1 m. \
-         Switches a scene. Position and velocity: root mean square of the 2-D error. Last columns: recall by \
-         returns on the body.",
+         Switches a scene. Position and velocity: root mean square of the 2-D error. Then recall by returns \
+         on the body. NEES: squared errors over the covariance that the tracks claim, 2 if they are honest.",
     )
 }
 
@@ -328,6 +331,8 @@ pub fn figures_by_preset(scores: &Scores) -> Table {
         figure("switches a scene", 2, |m, _| m.switches_per_scene),
         figure("position RMSE, m", 3, |m, _| m.position_rmse_m),
         figure("velocity RMSE, m/s", 3, |m, _| m.velocity_rmse_mps),
+        figure("NEES of positions (honest: 2)", 2, |m, _| m.position_nees),
+        figure("NEES of velocities (honest: 2)", 2, |m, _| m.velocity_nees),
     ];
     for (h, published) in [(1, "0.22"), (3, "0.34"), (9, "0.96")] {
         let name = format!("displacement at {}, m", window(h));
