@@ -67,12 +67,17 @@ impl Measurer {
     /// True for what may be a part of somebody who is expected there.
     fn is_expected(&self, aabb: &Aabb, priors: &[Prior]) -> bool {
         let c = &self.config;
-        let (size_m, middle_m) = (aabb.size_m(), aabb.center_m().truncate());
+        let (length_m, middle_m) = (aabb.size_m().truncate().length(), aabb.center_m().truncate());
+        // A wheelchair is longer than a stride, and who sits in it lower than who walks.
+        let longest_m = |prior: &Prior| match prior.height_m < c.seated_height_m {
+            true => c.seated_diagonal_max_m,
+            false => c.diagonal_max_m,
+        };
         let near = |prior: &Prior| {
             let reach_m = c.expected_m + prior.position_sigma_m.min(c.expected_m);
-            prior.confirmed && prior.position_m.distance(middle_m) < reach_m
+            prior.confirmed && prior.position_m.distance(middle_m) < reach_m && length_m < longest_m(prior)
         };
-        size_m.truncate().length() < c.diagonal_max_m && aabb.max_m.z < c.top_max_m && priors.iter().any(near)
+        aabb.max_m.z < c.top_max_m && priors.iter().any(near)
     }
 
     fn detection(
