@@ -173,6 +173,7 @@ fn eigenvectors(symmetric: DMat3) -> DMat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Config;
 
     #[test]
     fn eigenvectors_turn_a_matrix_diagonal() {
@@ -186,6 +187,37 @@ mod tests {
         let off = d.x_axis.y.abs() + d.x_axis.z.abs() + d.y_axis.z.abs();
         assert!(off < 1e-12, "{d}");
         assert!((v.determinant() - 1.0).abs() < 1e-12);
+    }
+
+    /// What the default settings find of points in a box of 1 m by 0.95 m by 1.3 m that somebody `height_m` tall is
+    /// expected in.
+    fn found_of_a_wheelchair(height_m: f64) -> usize {
+        let corner =
+            |k: usize| DVec3::new((k % 2) as f64, 0.95 * (k / 2 % 2) as f64, 0.1 + 0.4 * (k % 4) as f64);
+        let points: Vec<Point> =
+            (0..16).map(|k| Point { position_m: corner(k), time_ns: 0, sensor: 0 }).collect();
+        let cluster: Cluster = (0..16).collect();
+        let sitting = Prior {
+            position_m: DVec2::new(0.5, 0.475),
+            velocity_mps: DVec2::X,
+            position_sigma_m: 0.1,
+            height_m,
+            confirmed: true,
+        };
+        let config = Config::default();
+        let mut detections = Vec::new();
+        Measurer::new(&config.detect, &config.site).detections(
+            &points,
+            &[cluster],
+            &[sitting],
+            &mut detections,
+        );
+        detections.len()
+    }
+
+    #[test]
+    fn who_sits_in_a_wheelchair_is_not_too_long_once_known() {
+        assert_eq!((found_of_a_wheelchair(1.34), found_of_a_wheelchair(1.75)), (1, 0));
     }
 
     #[test]
