@@ -36,7 +36,8 @@ pub struct TrackConfig {
     pub noise_share: f64,
     /// Measurement noise that nothing mends, one axis.
     pub noise_floor_m: f64,
-    /// Measurement noise added where hardly anything of a person's height is seen, one axis; none is where half is.
+    /// Measurement noise added where hardly anything of a person is seen, one axis; none is where half the height and
+    /// half the returns of a body in free sight are.
     pub hidden_noise_m: f64,
     /// A new track's position variance as a multiple of the measurement's.
     pub birth_variance_per_noise: f64,

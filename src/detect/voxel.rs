@@ -29,7 +29,8 @@ impl VoxelMap {
         map
     }
 
-    /// Counts the points of one more scan; what lies outside the first one's box is left out.
+    /// Counts the points of one more scan; what lies outside the first one's box is left out or falls
+    /// into the row on its other side.
     pub fn add(&mut self, points: &[Point]) {
         for point in points {
             // A point on the far face falls into the next row, as in the original.

@@ -20,7 +20,7 @@ pub const ALL: &str = "all";
 pub struct Estimate {
     /// Of all scenes pooled.
     pub value: Option<f64>,
-    /// Lower and upper end; null with a single scene.
+    /// Lower and upper end; null with fewer than five scenes.
     pub interval: Option<[f64; 2]>,
 }
 

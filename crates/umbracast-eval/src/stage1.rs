@@ -146,7 +146,8 @@ impl Stage1 {
     }
 
     /// Mean squared position error over the covariance that the track claims for it: 2 if the tracker is honest,
-    /// more if it is too sure (Bar-Shalom's normalised estimation error squared).
+    /// more if it is too sure (Bar-Shalom's normalised estimation error squared). Of matches, so no error counts beyond
+    /// the gate: with covariances nearly as wide as that, honest is less.
     pub fn position_nees(&self) -> Option<f64> {
         (self.claimed > 0).then(|| self.nees[0] / self.claimed as f64)
     }

@@ -9,6 +9,7 @@ use super::circle::STEP_NS;
 use super::{Crowd, Trajectory};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use umbracast::geometry::DVec2;
 
 /// Of trajectories.
 const STEP_S: f64 = STEP_NS as f64 * 1e-9;
@@ -29,6 +30,8 @@ const SWAY_M: [f64; 2] = [0.012, 0.03];
 const WANDER_M: f64 = 0.02;
 const WANDER_HZ: Range<f64> = 0.25..0.8;
 const WAVES: usize = 4;
+/// Who stops comes to rest, and who sets off begins to sway and wander, with this time constant.
+const SETTLE_S: f64 = 0.15;
 
 /// The crowd in a hurry. Nobody arrives: who reached the goal stands there.
 pub fn hurried(crowd: &Crowd, seed: u64) -> Crowd {
@@ -67,15 +70,19 @@ fn walked(way: &Trajectory, clock_s: &[f64], rng: &mut Pcg64) -> Option<Trajecto
     let sway_m = SWAY_M.map(|largest_m| rng.random_range(0.0..largest_m));
     let wander = [Wander::drawn(rng), Wander::drawn(rng)];
     let (mut start_ns, mut last_m, mut phase) = (None, None, rng.random_range(0.0..TAU));
+    let (mut heading, mut swaying) = (DVec2::X, 0.0);
     let mut positions_m = Vec::new();
     for (step, &time_s) in clock_s.iter().enumerate() {
         let Some((position_m, velocity_mps)) = way.at((time_s * 1e9) as i64) else { continue };
         start_ns.get_or_insert(step as i64 * STEP_NS);
         // A stride is walked, not waited for: who stands does not sway.
-        phase += TAU * position_m.distance(last_m.unwrap_or(position_m)) / stride_m;
+        let walked_m = position_m.distance(last_m.unwrap_or(position_m));
+        phase += TAU * walked_m / stride_m;
         last_m = Some(position_m);
-        // Slow people hardly sway: all of it from 1 m/s on.
-        let ahead = velocity_mps / velocity_mps.length().max(1.0);
+        // Slow people hardly sway, those who stand not at all: all of it from 1 m/s on.
+        swaying += ((walked_m / STEP_S).min(1.0) - swaying) * STEP_S / SETTLE_S;
+        heading = velocity_mps.try_normalize().unwrap_or(heading);
+        let ahead = heading * swaying;
         let swayed_m = ahead * sway_m[0] * (2.0 * phase).sin() + ahead.perp() * sway_m[1] * phase.sin();
         let at_s = step as f64 * STEP_S;
         let wandered_m = ahead * wander[0].at_m(at_s) + ahead.perp() * wander[1].at_m(at_s);
@@ -118,5 +125,22 @@ mod tests {
         }
         assert!(fastest_mps > 1.2 && fastest_mps < 4.0, "{fastest_mps} m/s");
         assert!(slowest_mps < 0.01, "{slowest_mps} m/s");
+    }
+
+    #[test]
+    fn nobody_wanders_while_the_clock_stands() {
+        let crowd = circle_crossing(Preset::Orca03, 3, 5.0, 1);
+        let clock_s = clock(crowd.duration_ns as f64 * 1e-9, &mut Pcg64::seed_from_u64(1));
+        let settled = (4.0 * SETTLE_S / STEP_S) as usize;
+        let standing: Vec<usize> =
+            (settled..clock_s.len()).filter(|&step| clock_s[step] - clock_s[step - settled] < 1e-3).collect();
+        assert!(!standing.is_empty());
+        for way in hurried(&crowd, 1).trajectories {
+            let first = (way.start_ns / STEP_NS) as usize;
+            for step in standing.iter().filter_map(|step| step.checked_sub(first)).filter(|&step| step > 0) {
+                let speed_mps = way.positions_m[step].distance(way.positions_m[step - 1]) / STEP_S;
+                assert!(speed_mps < 0.05, "{speed_mps} m/s at step {step}");
+            }
+        }
     }
 }
