@@ -1,7 +1,7 @@
 //! Values of the right kind that cannot work.
 
 use super::Config;
-use crate::Error;
+use crate::{Error, Site};
 
 /// Refuses them with key, what was expected and what was found.
 pub(super) fn check(config: &Config) -> Result<(), Error> {
@@ -57,10 +57,30 @@ pub(super) fn check(config: &Config) -> Result<(), Error> {
             t[1], t[0]
         )));
     }
-    if config.site.sensors.is_empty() {
+    site(&config.site)
+}
+
+/// Recordings, tables and links find sensors and access points by their names.
+fn site(site: &Site) -> Result<(), Error> {
+    if site.sensors.is_empty() {
         return Err(Error::new("site.sensors: expected one or more, found none"));
     }
-    Ok(())
+    let sensors: Vec<&str> = site.sensors.iter().map(|sensor| sensor.name.as_str()).collect();
+    let access_points: Vec<&str> = site.access_points.iter().map(|ap| ap.name.as_str()).collect();
+    for (key, names) in [("site.sensors", sensors), ("site.access_points", access_points)] {
+        if let Some((_, twice)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+            return Err(Error::new(format!("{key}: expected a name for each, found {twice:?} twice")));
+        }
+    }
+    let rates =
+        site.sensors.iter().map(|sensor| (format!("site.sensors {}: rate_hz", sensor.name), sensor.rate_hz));
+    let radii = site.pillars.iter().map(|pillar| ("site.pillars: radius_m".to_owned(), pillar.radius_m));
+    let sizes = site.furniture.iter().flat_map(|furniture| furniture.size_m);
+    let sizes = sizes.map(|size_m| ("site.furniture: size_m".to_owned(), size_m));
+    match rates.chain(radii).chain(sizes).find(|(_, value)| value.is_nan() || *value <= 0.0) {
+        Some((key, value)) => Err(Error::new(format!("{key}: expected more than 0, found {value}"))),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -81,9 +101,26 @@ mod tests {
             ),
             ("[blockage]\nthreshold = [0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.5]", "blockage.threshold"),
             ("[site]\nsensors = []", "site.sensors"),
+            ("[[site.pillars]]\nposition_m = [1.0, 2.0]\nradius_m = -1.0", "site.pillars: radius_m"),
+            (
+                "[[site.furniture]]\nposition_m = [1.0, 2.0]\nsize_m = [1.0, 0.0, 1.0]\nyaw_deg = 0.0",
+                "site.furniture: size_m",
+            ),
         ] {
             let message = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
             assert!(message.starts_with("lab.toml") && message.contains(key), "{message}");
         }
+    }
+
+    /// Two sensors of one name shared a topic, and each took the other's packets for its own repeated.
+    #[test]
+    fn two_sensors_of_one_name_are_refused() {
+        let mut config = Config::default();
+        config.site.sensors[1].name = config.site.sensors[0].name.clone();
+        let message = super::check(&config).unwrap_err().to_string();
+        assert!(message.contains("site.sensors") && message.contains("twice"), "{message}");
+        let mut config = Config::default();
+        config.site.access_points[1].name = config.site.access_points[0].name.clone();
+        assert!(super::check(&config).unwrap_err().to_string().contains("site.access_points"));
     }
 }

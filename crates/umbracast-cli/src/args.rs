@@ -309,7 +309,7 @@ pub struct Reproduce {
 /// `inspect`
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// A recording, table, capture, cloud, weights, configuration or report folder.
+    /// A recording, table, capture, cloud, the LSTM's weights or configuration.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
 }

@@ -59,9 +59,8 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
             Some("mcap") => scenes.push(Input::Recording(file)),
             Some("pcd") => clouds.push(file),
             Some("pcap") => captures.push(file),
-            _ => {
-                return Err(Error::new("expected .mcap, .pcd or .pcap").within(file.display()));
-            }
+            _ if !file.exists() => return Err(Error::new("no such file or folder").within(file.display())),
+            _ => return Err(Error::new("expected .mcap, .pcd or .pcap").within(file.display())),
         }
     }
     scenes.extend(folders_of_clouds);

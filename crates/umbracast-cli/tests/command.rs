@@ -156,6 +156,19 @@ fn a_recording_keeps_its_number() {
 }
 
 #[test]
+fn a_scene_left_of_another_simulation_is_neither_kept_nor_scored() {
+    let folder = folder("left_over");
+    let sim = simulate(&folder, "0");
+    fs::rename(sim.join("scene-0000.mcap"), sim.join("scene-0003.mcap")).expect("renames");
+    let out = folder.join("out");
+    done(&["run", text(&sim), "--out", text(&out)]);
+    let message = ends_with(1, &["evaluate", text(&out), "--truth", text(&sim)]);
+    assert!(message.contains("scene 3") && message.contains(text(&sim)), "{message}");
+    let message = ends_with(1, &["simulate", "--scenes", "1", "--out", text(&sim)]);
+    assert!(message.contains("scene-0003.mcap") && message.contains("expected"), "{message}");
+}
+
+#[test]
 fn a_capture_among_recordings_is_refused_because_it_names_no_site() {
     let folder = folder("mixed_inputs");
     let sim = simulate(&folder, "0");
@@ -235,6 +248,9 @@ fn an_empty_and_a_wrong_file_are_named() {
     }
     let missing = folder.join("missing.mcap");
     assert!(ends_with(1, &["inspect", text(&missing)]).contains("missing.mcap"));
+    let missing = folder.join("missing");
+    let message = ends_with(1, &["run", text(&missing), "--out", text(&folder.join("out"))]);
+    assert!(message.contains("no such file"), "{message}");
 }
 
 #[test]

@@ -99,6 +99,13 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
     for row in tables::read::<LinkRow>(dir, &names)? {
         scenes.entry(row.scene).or_default().1.links.push(row);
     }
+    if let Some((number, _)) = scenes.iter().find(|(_, (truth, _))| truth.people.is_empty()) {
+        return Err(Error::new(format!(
+            "expected the truth of every scene of {}, found none of scene {number}",
+            dir.display()
+        ))
+        .within(truth.display()));
+    }
     let weights = setup::weights(args.weights.as_deref())?;
     // What the whole run skipped is told with its first scene.
     let mut told = about_run(dir)?.health;

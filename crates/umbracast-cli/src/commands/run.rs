@@ -117,9 +117,16 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     }
     // Points outside the range that the site gives its sensor are the site's choice, not a loss.
     if !(Health { points_invalid: 0, ..health }).is_clean() {
-        return Ok(Ending::DataLost(format!("{health:?}")));
+        return Ok(Ending::DataLost(counts(&health)));
     }
     Ok(Ending::Done)
+}
+
+/// What is not zero of a health account.
+fn counts(health: &Health) -> String {
+    let all = serde_json::json!(health);
+    let counts = all.as_object().into_iter().flatten().filter(|(_, count)| count.as_u64() != Some(0));
+    counts.map(|(name, count)| format!("{name}: {count}")).collect::<Vec<_>>().join(", ")
 }
 
 /// The site on which all inputs were recorded; none where none says so. Captures and clouds never say.

@@ -1,7 +1,7 @@
 //! `simulate`: scenes to recordings, with their truth in tables.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -32,6 +32,7 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     };
     let (scenes, told) = crowds::dressed(drawn, &args.bodies)?;
     setup::make_dir(&args.out)?;
+    refuse_other_scenes(&args.out, scenes.len())?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let watch = Stopwatch::start();
     record_empty(&config, &args.out.join("empty.mcap"), args.clouds)?;
@@ -60,6 +61,8 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     links.finish()?;
     progress.finish_and_clear();
     let summary = RunJson::new("simulate", &watch)
+        .with("arguments", std::env::args().skip(1).collect::<Vec<_>>())
+        .with("first_seed", seed)
         .with("scenes", scenes.len())
         .with("frames", frames)
         .with("told", &told);
@@ -67,6 +70,22 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     let (count, folder, wall_s) = (scenes.len(), args.out.display(), watch.seconds());
     summary.print(common, &format!("{count} scenes, {frames} frames in {folder}: {wall_s:.1} s"));
     Ok(Ending::Done)
+}
+
+/// Recordings of an earlier simulation would be run and scored among the new ones, without truth.
+fn refuse_other_scenes(folder: &Path, scenes: usize) -> Result<(), Error> {
+    let ours: Vec<PathBuf> = (0..scenes).map(|number| recording(folder, number)).collect();
+    let found = setup::files_with_extension(folder, "mcap")?;
+    let other = found.iter().find(|file| !ours.contains(file) && !file.ends_with("empty.mcap"));
+    other.map_or(Ok(()), |file| {
+        let told = format!("expected no recordings but scene-0000 to {:04}, found another", scenes - 1);
+        Err(Error::new(told).within(file.display()))
+    })
+}
+
+/// The file of a scene.
+fn recording(folder: &Path, number: usize) -> PathBuf {
+    folder.join(format!("scene-{number:04}.mcap"))
 }
 
 /// The hall without people.
@@ -86,7 +105,7 @@ fn record_scene(
     spec: &SceneSpec,
     progress: &ProgressBar,
 ) -> Result<SceneTruth, Error> {
-    let path = args.out.join(format!("scene-{number:04}.mcap"));
+    let path = recording(&args.out, number);
     let mut scene = Scene::in_hall(spec.crowd(), &config.site, sensors, spec.seed).with_bodies(&spec.bodies);
     let mut writer = Recorder::create(&path, config, args.clouds)?;
     let mut all = SceneTruth::default();
