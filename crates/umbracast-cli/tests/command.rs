@@ -169,6 +169,18 @@ fn a_scene_left_of_another_simulation_is_neither_kept_nor_scored() {
 }
 
 #[test]
+fn the_truth_of_other_links_is_refused() {
+    let folder = folder("other_links");
+    let sim = simulate(&folder, "0");
+    let (site, out) = (folder.join("lab.toml"), folder.join("out"));
+    fs::write(&site, "[[site.access_points]]\nname = \"side\"\nposition_m = [3.0, 0.0, 2.0]\n")
+        .expect("writes");
+    done(&["run", text(&sim), "--site", text(&site), "--out", text(&out)]);
+    let message = ends_with(1, &["evaluate", text(&out), "--truth", text(&sim)]);
+    assert!(message.contains("access points") && message.contains(text(&sim)), "{message}");
+}
+
+#[test]
 fn a_capture_among_recordings_is_refused_because_it_names_no_site() {
     let folder = folder("mixed_inputs");
     let sim = simulate(&folder, "0");

@@ -85,6 +85,7 @@ pub fn in_memory(
 /// Scores the tables of a run against those of its truth, scene by scene.
 fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Result<Ending, Error> {
     let config = setup::config_of_run(dir)?;
+    same_access_points(&config, truth)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut scenes: BTreeMap<u32, (SceneTruth, SceneRun)> = BTreeMap::new();
     for row in tables::read::<PeopleRow>(truth, &names)? {
@@ -127,6 +128,23 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
         run,
     });
     show(&scores, std::slice::from_ref(&config), kept, &[], args.out.as_deref(), common)
+}
+
+/// Refuses the truth of other links, where its folder says of which.
+fn same_access_points(run: &Config, truth: &Path) -> Result<(), Error> {
+    let file = truth.join("config.toml");
+    if !file.exists() {
+        return Ok(());
+    }
+    let site = Config::site_of_run(&setup::read_text(&file)?, &file.display().to_string())?;
+    let (expected, found) = (&run.site.access_points, site.access_points);
+    match found == *expected {
+        true => Ok(()),
+        false => Err(Error::new(format!(
+            "expected the truth of the run's access points {expected:?}, found {found:?}"
+        ))
+        .within(truth.display())),
+    }
 }
 
 /// Stage 1 against people labelled by hand.
