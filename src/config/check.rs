@@ -27,11 +27,7 @@ pub(super) fn check(config: &Config) -> Result<(), Error> {
         ("site.hall.width_m", config.site.hall.width_m),
         ("site.hall.height_m", config.site.hall.height_m),
     ];
-    for (key, value) in positive {
-        if value.is_nan() || value <= 0.0 {
-            return Err(Error::new(format!("{key}: expected more than 0, found {value}")));
-        }
-    }
+    positive.into_iter().try_for_each(|(key, value)| more_than_0(key, value))?;
     if !(0.0..1.0).contains(&track.children_share) {
         return Err(Error::new(format!(
             "track.children_share: expected 0 or more and less than 1, found {}",
@@ -72,14 +68,20 @@ fn site(site: &Site) -> Result<(), Error> {
             return Err(Error::new(format!("{key}: expected a name for each, found {twice:?} twice")));
         }
     }
-    let rates =
-        site.sensors.iter().map(|sensor| (format!("site.sensors {}: rate_hz", sensor.name), sensor.rate_hz));
-    let radii = site.pillars.iter().map(|pillar| ("site.pillars: radius_m".to_owned(), pillar.radius_m));
-    let sizes = site.furniture.iter().flat_map(|furniture| furniture.size_m);
-    let sizes = sizes.map(|size_m| ("site.furniture: size_m".to_owned(), size_m));
-    match rates.chain(radii).chain(sizes).find(|(_, value)| value.is_nan() || *value <= 0.0) {
-        Some((key, value)) => Err(Error::new(format!("{key}: expected more than 0, found {value}"))),
-        None => Ok(()),
+    for sensor in &site.sensors {
+        more_than_0(&format!("site.sensors {}: rate_hz", sensor.name), sensor.rate_hz)?;
+    }
+    for pillar in &site.pillars {
+        more_than_0("site.pillars: radius_m", pillar.radius_m)?;
+    }
+    let mut sizes_m = site.furniture.iter().flat_map(|furniture| furniture.size_m);
+    sizes_m.try_for_each(|size_m| more_than_0("site.furniture: size_m", size_m))
+}
+
+fn more_than_0(key: &str, value: f64) -> Result<(), Error> {
+    match value > 0.0 {
+        true => Ok(()),
+        false => Err(Error::new(format!("{key}: expected more than 0, found {value}"))),
     }
 }
 

@@ -184,7 +184,7 @@ pub struct MeasureConfig {
     pub diagonal_max_m: f64,
     /// The same of somebody known who is lower than `seated_height_m`.
     pub seated_diagonal_max_m: f64,
-    /// Standing height below which a person may sit in a wheelchair.
+    /// Who reaches no higher than this may sit in a wheelchair.
     pub seated_height_m: f64,
     /// Least height from the lowest to the highest point.
     pub extent_min_m: f64,

@@ -12,6 +12,14 @@ use umbracast_io::recording::{Entry, RecordingReader};
 
 use crate::setup;
 
+/// The recording without people, beside those of a simulation.
+pub const EMPTY: &str = "empty.mcap";
+
+/// The file that `simulate` writes a scene to.
+pub fn scene_file(folder: &Path, number: usize) -> PathBuf {
+    folder.join(format!("scene-{number:04}.mcap"))
+}
+
 /// The number of the scene in the name that `simulate` gives a recording, `scene-0003.mcap`.
 pub fn scene_number(input: &Input) -> Option<u32> {
     let Input::Recording(file) = input else { return None };
@@ -74,16 +82,22 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
     Ok(scenes)
 }
 
-/// A folder's recordings (without `empty.mcap`), or its clouds, or its captures.
+/// A folder's recordings, or its clouds, or its captures.
 fn folder(path: &Path) -> Result<Vec<PathBuf>, Error> {
-    for extension in ["mcap", "pcd", "pcap"] {
-        let mut files = setup::files_with_extension(path, extension)?;
-        files.retain(|file| file.file_name().is_none_or(|name| name != "empty.mcap"));
-        if !files.is_empty() {
-            return Ok(files);
+    let mut files = recordings(path)?;
+    for extension in ["pcd", "pcap"] {
+        if files.is_empty() {
+            files = setup::files_with_extension(path, extension)?;
         }
     }
-    Ok(Vec::new())
+    Ok(files)
+}
+
+/// The recordings of people in a folder, in natural order.
+pub fn recordings(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut files = setup::files_with_extension(folder, "mcap")?;
+    files.retain(|file| file.file_name().is_none_or(|name| name != EMPTY));
+    Ok(files)
 }
 
 impl Input {

@@ -62,6 +62,13 @@ fn simulate(folder: &Path, threads: &str) -> PathBuf {
     sim
 }
 
+/// The crossing's recording alone has another number than its truth.
+fn simulate_as_scene_3(folder: &Path) -> PathBuf {
+    let sim = simulate(folder, "0");
+    fs::rename(sim.join("scene-0000.mcap"), sim.join("scene-0003.mcap")).expect("renames");
+    sim
+}
+
 /// Every file below, without `run.json`, which holds times and machine.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<PathBuf> =
@@ -147,8 +154,7 @@ fn scenes_in_memory_and_from_recordings_score_the_same() {
 #[test]
 fn a_recording_keeps_its_number() {
     let folder = folder("its_number");
-    let sim = simulate(&folder, "0");
-    fs::rename(sim.join("scene-0000.mcap"), sim.join("scene-0003.mcap")).expect("renames");
+    let sim = simulate_as_scene_3(&folder);
     let out = folder.join("out");
     done(&["run", text(&sim), "--csv", "--out", text(&out)]);
     let tracks = fs::read_to_string(out.join("tracks.csv")).expect("tracks");
@@ -158,8 +164,7 @@ fn a_recording_keeps_its_number() {
 #[test]
 fn a_scene_left_of_another_simulation_is_neither_kept_nor_scored() {
     let folder = folder("left_over");
-    let sim = simulate(&folder, "0");
-    fs::rename(sim.join("scene-0000.mcap"), sim.join("scene-0003.mcap")).expect("renames");
+    let sim = simulate_as_scene_3(&folder);
     let out = folder.join("out");
     done(&["run", text(&sim), "--out", text(&out)]);
     let message = ends_with(1, &["evaluate", text(&out), "--truth", text(&sim)]);

@@ -7,7 +7,7 @@ use umbracast::{STEPS, forecast::Gaussian2};
 use crate::bootstrap::Pooled;
 use crate::instances::person_counts;
 use crate::scene::TruthIndex;
-use crate::tally::ratio;
+use crate::tally::{ratio, squared_mahalanobis};
 
 /// Squared Mahalanobis distance within which 50 % of a plane Gaussian lies (chi-square, 2 degrees of freedom).
 const CHI2_50: f64 = 1.386;
@@ -102,12 +102,8 @@ impl StepSums {
     fn count(&mut self, said: &Gaussian2, truth_m: DVec2) {
         let d = truth_m - said.mean_m;
         self.distance_m += d.length();
-        let determinant = said.xx_m2 * said.yy_m2 - said.xy_m2 * said.xy_m2;
-        if !(said.xx_m2 > 0.0 && determinant > 0.0) {
-            return;
-        }
-        let squared =
-            (said.yy_m2 * d.x * d.x - 2.0 * said.xy_m2 * d.x * d.y + said.xx_m2 * d.y * d.y) / determinant;
+        let spread = [said.xx_m2, said.xy_m2, said.yy_m2];
+        let Some((squared, determinant)) = squared_mahalanobis(spread, d) else { return };
         self.nll += 0.5 * squared + 0.5 * determinant.ln() + std::f64::consts::TAU.ln();
         self.within_50 += u64::from(squared <= CHI2_50);
         self.within_90 += u64::from(squared <= CHI2_90);

@@ -5,12 +5,13 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use umbracast::geometry::DVec2;
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
 use crate::bootstrap::Pooled;
 use crate::identity::{ALPHAS, HotaSums, hota_sums, identity_true_positives};
 use crate::matching::{apart_m, by_frame, match_frame};
-use crate::tally::ratio;
+use crate::tally::{ratio, squared_mahalanobis};
 
 /// How many classes of people by returns there are: none, 1 to 5, 6 and more.
 pub const RETURN_CLASSES: usize = 3;
@@ -173,13 +174,11 @@ impl Stage1 {
 
 /// Squared Mahalanobis distances of position and velocity; nothing where a covariance is not positive definite.
 fn normalised_errors(person: &PeopleRow, track: &TrackRow) -> Option<[f64; 2]> {
-    let squared = |[xx, xy, yy]: [f64; 3], [x, y]: [f64; 2]| {
-        let determinant = xx * yy - xy * xy;
-        (xx > 0.0 && determinant > 0.0).then(|| (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant)
-    };
     let c = track.covariance;
-    let position = squared([c[0], c[1], c[4]], [track.x_m - person.x_m, track.y_m - person.y_m])?;
-    let velocity = squared([c[7], c[8], c[9]], [track.vx_mps - person.vx_mps, track.vy_mps - person.vy_mps])?;
+    let position = DVec2::new(track.x_m - person.x_m, track.y_m - person.y_m);
+    let velocity = DVec2::new(track.vx_mps - person.vx_mps, track.vy_mps - person.vy_mps);
+    let (position, _) = squared_mahalanobis([c[0], c[1], c[4]], position)?;
+    let (velocity, _) = squared_mahalanobis([c[7], c[8], c[9]], velocity)?;
     Some([position, velocity])
 }
 

@@ -1,6 +1,7 @@
 //! Sums from which every score of stage 3 follows: added up over instances, and again over scenes.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use umbracast::geometry::DVec2;
 use umbracast::{STEP_NS, STEPS};
 
 use crate::bootstrap::Pooled;
@@ -100,6 +101,14 @@ impl Counts {
 /// A quotient, or `None` over nothing.
 pub fn ratio(numerator: u64, denominator: u64) -> Option<f64> {
     (denominator > 0).then(|| numerator as f64 / denominator as f64)
+}
+
+/// The squared length of an error in standard deviations of its covariance (xx, xy, yy), and the covariance's
+/// determinant; nothing where it is not positive definite.
+pub(crate) fn squared_mahalanobis([xx, xy, yy]: [f64; 3], d: DVec2) -> Option<(f64, f64)> {
+    let determinant = xx * yy - xy * xy;
+    let squared = || (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / determinant;
+    (xx > 0.0 && determinant > 0.0).then(|| (squared(), determinant))
 }
 
 /// One bin of the reliability diagram.

@@ -146,7 +146,8 @@ fn card(options: &ResidualOptions, samples: usize, losses: &[f64], scores: &[(&s
          - Data: tracks that the default mode made of simulated returns, with the true ways of their people. Drawn \
          crowds of {people} people on the default circle, scene seeds {first} to {last}, in turn: {drawn}. In a hurry: the \
          same ways on a clock that stands, runs up to 1.9 times as fast and slows down, and they wander off their \
-         line (`hurry.rs`). Every third scene has its sensors up to 3 m lower or 1 m higher. The crowds are this project's own.\n\
+         line (`hurry.rs`). Every third scene has its sensors up to 3 m lower or 1 m higher. The crowds are this \
+         project's own.\n\
          - Recorded people replayed with the same sensors, as they walked and in a hurry: {recorded}. PedPy's \
          files are under the MIT licence of their repository (PedestrianDynamics/PedPy). \
          The circle-antipode and LogicTronix people are never learned from.\n\

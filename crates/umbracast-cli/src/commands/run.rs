@@ -198,7 +198,7 @@ fn empty_frames(
 ) -> Result<Vec<Frame>, Error> {
     let beside = || -> Option<PathBuf> {
         let Input::Recording(file) = first else { return None };
-        Some(file.parent().unwrap_or(Path::new(".")).join("empty.mcap")).filter(|path| path.is_file())
+        Some(file.parent().unwrap_or(Path::new(".")).join(input::EMPTY)).filter(|path| path.is_file())
     };
     let Some(file) = args.empty.clone().or_else(beside).filter(|_| !args.no_empty) else {
         return Ok(Vec::new());

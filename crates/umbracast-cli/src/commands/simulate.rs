@@ -19,7 +19,7 @@ use crate::args::{Common, Simulate};
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
-use crate::{Ending, crowds};
+use crate::{Ending, crowds, input};
 
 /// Simulates every scene, several at a time; tables are written in the order of the scenes.
 pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
@@ -35,7 +35,7 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     refuse_other_scenes(&args.out, scenes.len())?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let watch = Stopwatch::start();
-    record_empty(&config, &args.out.join("empty.mcap"), args.clouds)?;
+    record_empty(&config, &args.out.join(input::EMPTY), args.clouds)?;
     let sensors = Sensors::new(&config.site, TEST_SEED)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut people = TableWriter::<PeopleRow>::create(&args.out, &names, args.csv)?;
@@ -74,18 +74,13 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
 
 /// Recordings of an earlier simulation would be run and scored among the new ones, without truth.
 fn refuse_other_scenes(folder: &Path, scenes: usize) -> Result<(), Error> {
-    let ours: Vec<PathBuf> = (0..scenes).map(|number| recording(folder, number)).collect();
-    let found = setup::files_with_extension(folder, "mcap")?;
-    let other = found.iter().find(|file| !ours.contains(file) && !file.ends_with("empty.mcap"));
+    let ours: Vec<PathBuf> = (0..scenes).map(|number| input::scene_file(folder, number)).collect();
+    let found = input::recordings(folder)?;
+    let other = found.iter().find(|file| !ours.contains(file));
     other.map_or(Ok(()), |file| {
         let told = format!("expected no recordings but scene-0000 to {:04}, found another", scenes - 1);
         Err(Error::new(told).within(file.display()))
     })
-}
-
-/// The file of a scene.
-fn recording(folder: &Path, number: usize) -> PathBuf {
-    folder.join(format!("scene-{number:04}.mcap"))
 }
 
 /// The hall without people.
@@ -105,7 +100,7 @@ fn record_scene(
     spec: &SceneSpec,
     progress: &ProgressBar,
 ) -> Result<SceneTruth, Error> {
-    let path = recording(&args.out, number);
+    let path = input::scene_file(&args.out, number);
     let mut scene = Scene::in_hall(spec.crowd(), &config.site, sensors, spec.seed).with_bodies(&spec.bodies);
     let mut writer = Recorder::create(&path, config, args.clouds)?;
     let mut all = SceneTruth::default();

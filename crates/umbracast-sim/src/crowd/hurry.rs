@@ -1,6 +1,6 @@
 //! Known ways walked otherwise: the whole crowd's clock runs fast, slows down, stands and sets off again, everybody
-//! sways with the stride and wanders a little off the way. Simulated people never run or brake as people in a hurry do, and recorded ones are
-//! few; of a crowd that keeps apart, whoever walks by the same clock keeps apart too.
+//! sways with the stride and wanders a little off the way. Simulated people never run or brake as people in a hurry
+//! do, and recorded ones are few; of a crowd that keeps apart, whoever walks by the same clock keeps apart too.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
