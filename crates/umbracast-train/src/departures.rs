@@ -149,7 +149,8 @@ fn card(options: &ResidualOptions, samples: usize, losses: &[f64], scores: &[(&s
          line (`hurry.rs`). Every third scene has its sensors up to 3 m lower or 1 m higher. The crowds are this \
          project's own.\n\
          - Recorded people replayed with the same sensors, as they walked and in a hurry: {recorded}. PedPy's \
-         files are under the MIT licence of their repository (PedestrianDynamics/PedPy). \
+         files (traj_UNI_CORR_500_01) and Madras' (Topview) are under the MIT licences of their repositories \
+         (PedestrianDynamics/PedPy, PedestrianDynamics/madras-data-app). \
          The circle-antipode and LogicTronix people are never learned from.\n\
          - Training: {samples} samples, seed {seed}, {epochs} epochs, each sample mirrored or not, negative \
          log-likelihood of the steps 0 to 9 and a little of the mean distance, Adam; all in `residual.rs`.\n\
