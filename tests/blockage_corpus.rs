@@ -110,6 +110,7 @@ fn trunk_and_head_of(height_m: f64) -> BodyConfig {
     BodyConfig {
         slices: vec![slice(0.82, 0.26, 0.56), slice(1.0, 0.2, 0.2)],
         sway: 0.0,
+        surge: 0.0,
         arms: ArmsConfig { upper_radius: 0.01, fore_radius: 0.01, ..arms },
     }
 }

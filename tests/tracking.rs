@@ -31,7 +31,18 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
     };
     let obb = Obb::from_aabb(&aabb);
     let covariance_m2 = Some([[NOISE_M * NOISE_M, 0.0], [0.0, NOISE_M * NOISE_M]]);
-    Detection { position_m, covariance_m2, z_m: 0.9, time_ns, points: 30, whole: true, top_m: 1.7, aabb, obb }
+    Detection {
+        position_m,
+        covariance_m2,
+        z_m: 0.9,
+        time_ns,
+        points: 30,
+        swing: None,
+        whole: true,
+        top_m: 1.7,
+        aabb,
+        obb,
+    }
 }
 
 /// The site without anything that could hide somebody.

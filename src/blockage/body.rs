@@ -7,9 +7,8 @@ use std::f64::consts::PI;
 
 use crate::config::{ArmsConfig, BodyConfig, SliceConfig};
 use crate::geometry::{DVec2, DVec3};
+use crate::track::gait;
 
-/// The hip joint above the floor, share of the height. Gait goes by speed over it (Boulic and Thalmann 1990).
-const HIP_SHARE: f64 = 0.53;
 /// From this speed over hip height (1/s) on the trunk's sway is all there.
 const FULL_SWAY_HZ: f64 = 0.5;
 /// Gaits are known up to here: 2 m/s.
@@ -47,7 +46,7 @@ impl Posture {
 
 /// Speed over the height of the hips.
 fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
-    (speed_mps / (HIP_SHARE * height_m)).min(FASTEST_HZ)
+    gait::relative_speed_hz(speed_mps, height_m).min(FASTEST_HZ)
 }
 
 /// True when the segment meets the body; touching counts.
@@ -75,11 +74,13 @@ pub fn blocks(body: &BodyConfig, posture: &Posture, start_m: DVec3, end_m: DVec3
     }
     // The trunk rides over the foot that stands: to the left while the left one does.
     let sway_m = -body.sway * h * sway_share(speed_hz) * (posture.phase_rad - 0.2 * PI).sin();
+    // And goes ahead and back with every step, most ahead where the source has it at a usual walk.
+    let surge_m = body.surge * h * sway_share(speed_hz) * (2.0 * posture.phase_rad - 1.4 * PI).cos();
     let mut bottom_m = 0.0;
     for slice in &body.slices {
         let top_m = slice.top * h;
         let cylinder = EllipticCylinder {
-            center_m: DVec2::new(slice.ahead * h, sway_m),
+            center_m: DVec2::new(slice.ahead * h + surge_m, sway_m),
             ahead: DVec2::X,
             half_depth_m: slice.half_depth * h * posture.girth,
             half_width_m: slice.half_width * h * posture.girth,
@@ -96,7 +97,7 @@ pub fn blocks(body: &BodyConfig, posture: &Posture, start_m: DVec3, end_m: DVec3
     if lowest_m > (arms.shoulder_up + arms.upper_radius * posture.girth) * h {
         return false;
     }
-    let sway = DVec3::new(0.0, sway_m, 0.0);
+    let sway = DVec3::new(surge_m, sway_m, 0.0);
     arm_blocks(arms, posture, speed_hz, -1.0, start - sway, end - sway)
         || arm_blocks(arms, posture, speed_hz, 1.0, start - sway, end - sway)
 }
@@ -107,13 +108,13 @@ pub fn reach_m(body: &BodyConfig, height_m: f64, girth: f64, speed_mps: f64) -> 
     let hand_ahead = relative_speed_hz(speed_mps, height_m) * (arms.hand_ahead + arms.hand_swing).abs();
     let out = arms.hand_out.max(arms.elbow_out).max(arms.shoulder_out);
     let radius = arms.upper_radius.max(arms.fore_radius) * girth;
-    let arms_reach = (hand_ahead * hand_ahead + out * out).sqrt() + radius + body.sway;
+    let arms_reach = (hand_ahead * hand_ahead + out * out).sqrt() + radius + body.sway + body.surge;
     height_m * body.slices.iter().fold(arms_reach, |far, slice| far.max(slice_reach(body, slice, girth)))
 }
 
 /// The same of a slice, as a share of the height.
 fn slice_reach(body: &BodyConfig, slice: &SliceConfig, girth: f64) -> f64 {
-    slice.half_depth.max(slice.half_width) * girth + slice.ahead.abs() + body.sway
+    slice.half_depth.max(slice.half_width) * girth + slice.ahead.abs() + body.sway + body.surge
 }
 
 /// Sway rises with the speed and stays (the source's published codes jump where this bends).

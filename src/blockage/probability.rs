@@ -279,7 +279,8 @@ impl Traits {
 }
 
 /// Quantiles of the phase of a gait.
-struct Phases {
+#[derive(Debug, Clone)]
+pub struct Phases {
     first_rad: f64,
     /// Share of the phases up to each of so many equal steps of a turn, the first from opposite the likeliest phase.
     shares: [f64; PHASES],
@@ -289,7 +290,7 @@ const PHASES: usize = 48;
 
 impl Phases {
     /// Of a von Mises distribution.
-    fn new(gait: &Gait) -> Self {
+    pub fn new(gait: &Gait) -> Self {
         let width_rad = TAU / PHASES as f64;
         let density = |i: usize| {
             let off_rad = (i as f64 + 0.5) * width_rad - PI;
@@ -305,7 +306,7 @@ impl Phases {
     }
 
     /// The phase below which a share of them lies.
-    fn at(&self, share: f64) -> f64 {
+    pub fn at(&self, share: f64) -> f64 {
         let i = self.shares.partition_point(|&up_to| up_to < share).min(PHASES - 1);
         let below = if i == 0 { 0.0 } else { self.shares[i - 1] };
         let within = (share - below) / (self.shares[i] - below).max(f64::MIN_POSITIVE);

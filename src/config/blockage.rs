@@ -38,6 +38,8 @@ pub struct BodyConfig {
     pub slices: Vec<SliceConfig>,
     /// Side to side, half of the way that the trunk sways as it walks.
     pub sway: f64,
+    /// The same ahead and back, twice a stride.
+    pub surge: f64,
     /// Left and right alike.
     pub arms: ArmsConfig,
 }

@@ -2,6 +2,7 @@
 
 use super::axis::AxisModel;
 use super::bias::View;
+use super::swing::Swing;
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
 use crate::config::{DetectConfig, MeasureConfig, ObbAxes, PositionMethod};
@@ -101,9 +102,11 @@ impl Measurer {
                 (position_m, mean_m.z, Some(covariance_m2))
             }
         };
+        let swing = nearest(mean_m.truncate(), priors).and_then(|who| Swing::of(of(), position_m, who));
         Detection {
             position_m,
             covariance_m2,
+            swing,
             z_m,
             time_ns: first_ns + late_ns / cluster.len() as i64,
             points: cluster.len() as u32,
@@ -119,11 +122,16 @@ impl Measurer {
         let seen = cluster.iter().map(|&i| &points[i as usize]);
         let mean_m =
             seen.clone().map(|p| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
-        let off_m = |prior: &Prior| prior.position_m.distance(mean_m);
-        let who = priors.iter().filter(|p| p.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
-        let velocity_mps = who.filter(|prior| off_m(prior) < OWN_M).map(|prior| prior.velocity_mps);
+        let velocity_mps = nearest(mean_m, priors).map(|prior| prior.velocity_mps);
         View::new(seen, &self.sensors_m, self.config.shift_m, velocity_mps)
     }
+}
+
+/// Who is known to walk here.
+fn nearest(at_m: DVec2, priors: &[Prior]) -> Option<&Prior> {
+    let off_m = |prior: &Prior| prior.position_m.distance(at_m);
+    let who = priors.iter().filter(|p| p.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
+    who.filter(|prior| off_m(prior) < OWN_M)
 }
 
 /// The box along the points' own axes: extremes in object space (paper, section IV-A).

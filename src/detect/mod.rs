@@ -13,11 +13,13 @@ pub mod evidence;
 pub mod split_merge;
 pub mod bias;
 pub mod axis;
+pub mod swing;
 pub mod measure;
 
 pub use background::Background;
 pub use measure::Measurer;
 pub use split_merge::Clusterer;
+pub use swing::Swing;
 
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 
@@ -71,6 +73,8 @@ pub struct Detection {
     pub whole: bool,
     /// Highest point above the floor.
     pub top_m: f64,
+    /// How arms and legs of a known walker swing.
+    pub swing: Option<Swing>,
     /// Box along the site's axes.
     pub aabb: Aabb,
     /// Box along the cluster's axes.

@@ -74,6 +74,7 @@ mod tests {
             z_m: 0.9,
             time_ns: 0,
             points: 30,
+            swing: None,
             whole: true,
             top_m: 1.8,
             aabb,

@@ -99,6 +99,9 @@ impl Person {
         step_s: f64,
     ) {
         self.filter.correct(detection.position_m, detection.z_m, noise(config, detection, view));
+        if let Some(swing) = &detection.swing {
+            self.filter.correct_swing(config, swing, self.height.mean_m());
+        }
         let there = self.existence * config.hit_ratio;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.hits += 1;
@@ -261,6 +264,7 @@ mod tests {
             z_m: 0.9,
             time_ns: 0,
             points,
+            swing: None,
             whole: true,
             top_m: config.height_mean_m,
             aabb,

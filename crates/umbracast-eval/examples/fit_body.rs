@@ -1,27 +1,30 @@
 //! Fits the predictor's body on recorded tuning scenes: which few numbers, put at people's true places and headings
-//! with a gait of unknown phase, make the truth about who is blocked most likely? Prints every improvement and, at
-//! the end, the tables for `config/default.toml`.
+//! with height and gait as the tracker knows them, make the truth about who is blocked most likely? Prints every
+//! improvement and, at the end, the tables for `config/default.toml`.
 //!
-//! `cargo run --release -p umbracast-eval --example fit_body -- SIMULATED...`, directories that `umbracast simulate`
-//! wrote with tuning seeds (docs/CONVENTIONS.md).
+//! `cargo run --release -p umbracast-eval --example fit_body -- SIMULATED RUN [SIMULATED RUN...]`, directories that
+//! `umbracast simulate` wrote with tuning seeds (docs/CONVENTIONS.md), each with what `umbracast run` made of it.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use std::path::Path;
 
 use rayon::prelude::*;
 use umbracast::blockage::body::{self, Posture};
+use umbracast::blockage::probability::Phases;
 use umbracast::config::{BlockageConfig, BodyConfig};
 use umbracast::geometry::{DVec2, DVec3};
+use umbracast::track::Gait;
 use umbracast::track::girth::PRIOR_SIGMA;
 use umbracast::{Config, Error};
-use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
+use umbracast_io::rows::{PeopleLinkRow, PeopleRow, TrackRow};
 use umbracast_io::tables;
 
 /// Every so many frames; what lies between looks alike.
 const EVERY: u64 = 3;
 /// Who is farther than this from the segment, seen from above, is left out.
 const NEAR_M: f64 = 0.6;
+/// A track nearer than this is the person's.
+const OWN_M: f64 = 0.3;
 /// Postures tried of each body: phases of the gait, girths.
 const POSTURES: usize = 12;
 /// Middles of 12 equal shares of a standard normal distribution, mixed against the phases.
@@ -33,15 +36,19 @@ struct Case {
     access_point: u32,
     start_m: DVec3,
     ue_m: DVec3,
-    near: Vec<PeopleRow>,
+    near: Vec<(PeopleRow, Phases)>,
     blocked: bool,
 }
 
 fn main() -> Result<(), Error> {
     let config = Config::default();
     let mut cases = Vec::new();
-    for directory in std::env::args().skip(1) {
-        cases.extend(cases_of(Path::new(&directory), &config)?);
+    let directories: Vec<String> = std::env::args().skip(1).collect();
+    if directories.is_empty() || directories.len() % 2 == 1 {
+        return Err(Error::new("fit_body: expected pairs of directories, SIMULATED and RUN"));
+    }
+    for pair in directories.chunks_exact(2) {
+        cases.extend(cases_of(Path::new(&pair[0]), Path::new(&pair[1]), &config)?);
     }
     let mut best = config.blockage.body.clone();
     let start = loss(&best, &config.blockage, &cases);
@@ -96,8 +103,9 @@ fn fields(body: &mut BodyConfig) -> Vec<(String, &mut f64)> {
         all.push((format!("slice {i} ahead"), &mut slice.ahead));
     }
     let arms = &mut body.arms;
-    let named: [(&str, &mut f64); 12] = [
+    let named: [(&str, &mut f64); 13] = [
         ("sway", &mut body.sway),
+        ("surge", &mut body.surge),
         ("shoulder_up", &mut arms.shoulder_up),
         ("shoulder_out", &mut arms.shoulder_out),
         ("elbow_up", &mut arms.elbow_up),
@@ -114,12 +122,24 @@ fn fields(body: &mut BodyConfig) -> Vec<(String, &mut f64)> {
     all
 }
 
-fn cases_of(directory: &Path, config: &Config) -> Result<Vec<Case>, Error> {
+fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, Error> {
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut people: BTreeMap<(u32, u64), Vec<PeopleRow>> = BTreeMap::new();
     for row in tables::read::<PeopleRow>(directory, &names)? {
         people.entry((row.scene, row.frame)).or_default().push(row);
     }
+    let mut tracks: BTreeMap<(u32, u64), Vec<TrackRow>> = BTreeMap::new();
+    for row in tables::read::<TrackRow>(run, &names)? {
+        tracks.entry((row.scene, row.frame)).or_default().push(row);
+    }
+    // Of the nearest track.
+    let known = |p: &PeopleRow| {
+        let off_m = |t: &&TrackRow| (t.x_m - p.x_m).hypot(t.y_m - p.y_m);
+        let all = tracks.get(&(p.scene, p.frame))?.iter();
+        let own = all.filter(|t| t.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
+        let gait = Gait { phase_rad: own.gait_phase_rad, concentration: own.gait_concentration };
+        (off_m(&own) < OWN_M).then_some((gait, own.height_m))
+    };
     let mut cases = Vec::new();
     for link in tables::read::<PeopleLinkRow>(directory, &names)? {
         let Some(all) = people.get(&(link.scene, link.frame)).filter(|_| link.frame % EVERY == 0) else {
@@ -134,7 +154,11 @@ fn cases_of(directory: &Path, config: &Config) -> Result<Vec<Case>, Error> {
             let t = ((at - from).dot(to - from) / to.distance_squared(from)).clamp(0.0, 1.0);
             p.person != own.person && at.distance(from.lerp(to, t)) < NEAR_M
         };
-        let near: Vec<PeopleRow> = all.iter().filter(near).copied().collect();
+        let with_phase = |p: &PeopleRow| {
+            let (gait, height_m) = known(p).unwrap_or((Gait::UNKNOWN, p.height_m));
+            (PeopleRow { height_m, ..*p }, Phases::new(&gait))
+        };
+        let near: Vec<(PeopleRow, Phases)> = all.iter().filter(near).map(with_phase).collect();
         if !near.is_empty() {
             cases.push(Case { access_point: link.access_point, start_m, ue_m, near, blocked: link.blocked });
         }
@@ -145,13 +169,13 @@ fn cases_of(directory: &Path, config: &Config) -> Result<Vec<Case>, Error> {
 /// Chance that the link is blocked.
 fn probability(body: &BodyConfig, config: &BlockageConfig, case: &Case) -> f64 {
     let hits = (0..POSTURES).filter(|&k| {
-        case.near.iter().any(|p| {
-            let turns = (k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person);
+        case.near.iter().any(|(p, phases)| {
+            let share = ((k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person)).fract();
             let posture = Posture {
                 girth: 1.0
                     + PRIOR_SIGMA.hypot(config.girth_sigma) * NORMAL[(k + p.person as usize) % POSTURES],
                 speed_mps: p.vx_mps.hypot(p.vy_mps),
-                phase_rad: TAU * turns,
+                phase_rad: phases.at(share),
                 swing: 1.0,
                 ..Posture::standing(DVec2::new(p.x_m, p.y_m), DVec2::from_angle(p.heading_rad), p.height_m)
             };
