@@ -20,7 +20,6 @@ pub(super) fn check(config: &Config) -> Result<(), Error> {
         ("detect.split.lambda_m", detect.split.lambda_m),
         ("track.model_dwell_s", track.model_dwell_s),
         ("track.sway_lasts_s", track.sway_lasts_s),
-        ("track.sway_size_m", track.sway_size_m),
         ("track.swing_m2", track.swing_m2),
         ("track.swing_noise_m2", track.swing_noise_m2),
         ("track.noise_floor_m", track.noise_floor_m),

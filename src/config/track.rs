@@ -24,8 +24,6 @@ pub struct TrackConfig {
     pub sway_left_m: f64,
     /// The same ahead and back.
     pub sway_ahead_m: f64,
-    /// How far the usual body sways to each side.
-    pub sway_size_m: f64,
     /// What [`crate::detect::Swing`] is at its largest, of who walks at his hips' height a second.
     pub swing_m2: f64,
     /// Its noise in one frame, one standard deviation.

@@ -3,14 +3,13 @@
 //! Pelvis and trunk go from side to side once a stride, and ahead and back once a step, by a few centimetres. A
 //! detection is of the swaying body, the person's way is what it sways about: left out, the sway is an error that
 //! lasts over frames, and half a stride of it looks like a turn. It is followed as two oscillations whose size and
-//! phase are not known beforehand but whose pace is: people of a height at a speed all walk about alike. What arms and
-//! legs show in each frame ([`Swing`]) goes with the sway to the side, and is a second measurement of it. The two tell
-//! where in the stride a person is.
+//! phase are not known beforehand but whose pace is: people of a height at a speed all walk about alike. What is
+//! found of the sway to the side tells a little of where in the stride a person is; arms and legs tell more
+//! ([`super::stride`]).
 
 use std::f64::consts::{PI, TAU};
 
 use crate::config::TrackConfig;
-use crate::detect::Swing;
 use crate::geometry::DVec2;
 
 /// Where the state holds the sway to the left, with its quadrature after it.
@@ -44,44 +43,28 @@ impl Gait {
 
     /// What the sway to the left with its quadrature tells, each known to a variance of `variance_m2`.
     pub(super) fn of_sway(left_m: f64, quadrature_m: f64, variance_m2: f64, speed_mps: f64) -> Self {
-        let size_m2 = left_m * left_m + quadrature_m * quadrature_m;
-        if speed_mps < WALKS_FROM_MPS || size_m2 == 0.0 {
+        Self::of_wave([left_m, quadrature_m], variance_m2, LEFTMOST_RAD, speed_mps)
+    }
+
+    /// What an oscillation with its quadrature tells that is largest at the phase `largest_rad`.
+    pub(super) fn of_wave(wave: [f64; 2], variance: f64, largest_rad: f64, speed_mps: f64) -> Self {
+        let [value, quadrature] = wave;
+        let squared = value * value + quadrature * quadrature;
+        if speed_mps < WALKS_FROM_MPS || squared == 0.0 {
             return Self::UNKNOWN;
         }
-        // [`Wave::turned`]: the quadrature is minus the sine of the angle since the leftmost point.
-        let since_leftmost_rad = f64::atan2(-quadrature_m, left_m);
+        // [`Wave::turned`]: the quadrature is minus the sine of the angle since the largest value.
+        let since_largest_rad = f64::atan2(-quadrature, value);
         Self {
-            phase_rad: (since_leftmost_rad + LEFTMOST_RAD).rem_euclid(TAU),
-            concentration: size_m2 / variance_m2,
+            phase_rad: (since_largest_rad + largest_rad).rem_euclid(TAU),
+            concentration: squared / variance,
         }
     }
-}
 
-/// Arms and legs are farthest apart so long after the right heel touched the floor.
-const WIDEST_RAD: f64 = 0.05 * PI;
-
-/// The sway to the left with its phase moved so that it is largest when arms and legs are farthest apart, as a sum
-/// over the state.
-pub(super) fn sway_of_stride() -> [(usize, f64); 2] {
-    let (sin, cos) = (LEFTMOST_RAD - WIDEST_RAD).sin_cos();
-    [(LEFT, cos), (LEFT + 1, sin)]
-}
-
-/// What was seen of arms and legs as a measurement of [`sway_of_stride`], and its variance: both go with the cosine
-/// of the phase. `None` of who is too slow.
-pub(super) fn sway_of_swing(
-    config: &TrackConfig,
-    swing: &Swing,
-    speed_mps: f64,
-    height_m: f64,
-) -> Option<(f64, f64)> {
-    if speed_mps < WALKS_FROM_MPS || config.sway_left_m == 0.0 {
-        return None;
+    /// The surer one of two. They are not made one: both come from the same detections.
+    pub(super) fn surer(self, other: Self) -> Self {
+        if other.concentration > self.concentration { other } else { self }
     }
-    // Steps are longer and arms swing farther the faster one walks.
-    let whole_m2 = config.swing_m2 * swing.seen * relative_speed_hz(speed_mps, height_m).sqrt();
-    let left_m = config.sway_size_m / whole_m2;
-    Some((swing.counter_m2 * left_m, (config.swing_noise_m2 * left_m).powi(2)))
 }
 
 /// Speed over the height of the hips.
@@ -92,6 +75,11 @@ pub fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
 /// Length of a stride; the phase advances with the way walked.
 pub fn stride_m(speed_mps: f64, height_m: f64) -> f64 {
     STRIDE * (speed_mps * height_m).sqrt()
+}
+
+/// Strides in a second.
+pub(super) fn stride_hz(speed_mps: f64, height_m: f64) -> f64 {
+    if speed_mps > 0.0 { speed_mps / stride_m(speed_mps, height_m) } else { 0.0 }
 }
 
 /// Unit vectors along which the sway is measured.
@@ -119,24 +107,28 @@ pub(super) struct Wave {
     cos: f64,
     sin: f64,
     /// Added to the variances.
-    pub(super) new_m2: f64,
+    pub(super) new: f64,
 }
 
 impl Sway {
     pub(super) fn after(config: &TrackConfig, speed_mps: f64, height_m: f64, dt_s: f64) -> Self {
-        let stride_hz = if speed_mps > 0.0 { speed_mps / stride_m(speed_mps, height_m) } else { 0.0 };
+        let stride_hz = stride_hz(speed_mps, height_m);
         let size = (speed_mps / FULL_SWAY_MPS).min(1.0);
-        let kept = (-dt_s / config.sway_lasts_s).exp();
         let wave = |sway_m: f64, pace_hz: f64| {
-            let (sin, cos) = (TAU * pace_hz * dt_s).sin_cos();
-            let new_m2 = (size * sway_m).powi(2) * (1.0 - kept * kept);
-            Wave { cos: kept * cos, sin: kept * sin, new_m2 }
+            Wave::after(config.sway_lasts_s, (size * sway_m).powi(2), pace_hz, dt_s)
         };
         Self { left: wave(config.sway_left_m, stride_hz), ahead: wave(config.sway_ahead_m, 2.0 * stride_hz) }
     }
 }
 
 impl Wave {
+    /// One of `variance` and a pace of `pace_hz` that is forgotten after `lasts_s`.
+    pub(super) fn after(lasts_s: f64, variance: f64, pace_hz: f64, dt_s: f64) -> Self {
+        let kept = (-dt_s / lasts_s).exp();
+        let (sin, cos) = (TAU * pace_hz * dt_s).sin_cos();
+        Self { cos: kept * cos, sin: kept * sin, new: variance * (1.0 - kept * kept) }
+    }
+
     pub(super) fn turned(&self, a: f64, b: f64) -> (f64, f64) {
         (self.cos * a + self.sin * b, self.cos * b - self.sin * a)
     }
@@ -173,27 +165,6 @@ mod tests {
         let off_rad = (gait.phase_rad - phase_rad + PI).rem_euclid(TAU) - PI;
         assert!(off_rad.abs() < 0.25, "{gait:?}, {}", phase_rad.rem_euclid(TAU));
         assert!(gait.concentration > 5.0, "{gait:?}");
-    }
-
-    #[test]
-    fn arms_and_legs_tell_the_phase_of_who_does_not_sway() {
-        let config = Config::for_mode(Mode::Default).track;
-        let mut filter = Filter::new(&config, DVec2::ZERO, 0.9, 1e-4);
-        let mut phase_rad: f64 = 0.0;
-        for frame in 1..40 {
-            filter.predict(&config, HEIGHT_M, 0.1);
-            phase_rad += TAU * SPEED_MPS * 0.1 / stride_m(SPEED_MPS, HEIGHT_M);
-            filter.correct(
-                DVec2::new(SPEED_MPS * 0.1 * f64::from(frame), 0.0),
-                0.9,
-                [[1e-3, 0.0], [0.0, 1e-3]],
-            );
-            let counter_m2 = 0.9 * config.swing_m2 * (phase_rad - WIDEST_RAD).cos();
-            filter.correct_swing(&config, &Swing { counter_m2, seen: 0.9 }, HEIGHT_M);
-        }
-        let gait = filter.gait();
-        let off_rad = (gait.phase_rad - phase_rad + PI).rem_euclid(TAU) - PI;
-        assert!(off_rad.abs() < 0.2 && gait.concentration > 2.0, "{off_rad} {gait:?}");
     }
 
     #[test]

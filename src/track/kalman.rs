@@ -5,9 +5,8 @@
 //! position with the sway; R: measurement noise; S: covariance of the innovation; K: gain.
 #![allow(non_snake_case)]
 
-use super::gait::{self, AHEAD, Axes, Gait, LEFT, Sway};
+use super::gait::{AHEAD, Axes, Gait, LEFT, Sway};
 use crate::config::{ProcessNoise, TrackConfig};
-use crate::detect::Swing;
 use crate::geometry::DVec2;
 
 /// A symmetric 2x2 matrix.
@@ -162,17 +161,6 @@ impl Filter {
             z.P = [[(1.0 - K[0]) * p, (1.0 - K[0]) * c], [(1.0 - K[0]) * c, z.P[1][1] - K[1] * c]];
         }
     }
-
-    /// Takes what was seen of the arms and legs of a person `height_m` tall, where the sway is followed.
-    pub fn correct_swing(&mut self, config: &TrackConfig, swing: &Swing, height_m: f64) {
-        let speed_mps = self.state().velocity_mps().length();
-        let Some((left_m, variance_m2)) = gait::sway_of_swing(config, swing, speed_mps, height_m) else {
-            return;
-        };
-        for h in &mut self.hypotheses {
-            h.state.correct_one(&gait::sway_of_stride(), left_m, variance_m2);
-        }
-    }
 }
 
 impl State {
@@ -242,21 +230,8 @@ impl Full {
             for row in &mut self.P {
                 (row[at], row[at + 1]) = wave.turned(row[at], row[at + 1]);
             }
-            self.P[at][at] += wave.new_m2;
-            self.P[at + 1][at + 1] += wave.new_m2;
-        }
-    }
-
-    /// The Kalman update with one number, the weighted sum of some of the state.
-    fn correct_one(&mut self, H: &[(usize, f64)], measured: f64, R: f64) {
-        let PH: [f64; N] = std::array::from_fn(|i| H.iter().map(|&(j, h)| self.P[i][j] * h).sum());
-        let S = H.iter().map(|&(j, h)| PH[j] * h).sum::<f64>() + R;
-        let y = measured - H.iter().map(|&(j, h)| self.x[j] * h).sum::<f64>();
-        for i in 0..N {
-            self.x[i] += PH[i] / S * y;
-            for j in 0..N {
-                self.P[i][j] -= PH[i] * PH[j] / S;
-            }
+            self.P[at][at] += wave.new;
+            self.P[at + 1][at + 1] += wave.new;
         }
     }
 

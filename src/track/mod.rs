@@ -3,6 +3,7 @@
 pub mod gait;
 pub mod girth;
 pub mod kalman;
+mod stride;
 pub mod association;
 pub mod visibility;
 mod height;

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use super::girth::Girth;
 use super::height::Height;
 use super::kalman::{Filter, Mat2, State, plus};
+use super::stride::Stride;
 use super::visibility::{Body, View};
 use super::{OBSERVED, Observed, Track};
 use crate::config::{Boxes, TrackConfig};
@@ -33,6 +34,7 @@ const WIDTH_M: f64 = 0.5;
 pub(super) struct Person {
     pub(super) id: u64,
     pub(super) filter: Filter,
+    stride: Stride,
     pub(super) confirmed: bool,
     /// Probability that somebody is there.
     pub(super) existence: f64,
@@ -63,6 +65,7 @@ impl Person {
         let mut person = Self {
             id,
             filter: Filter::new(config, detection.position_m, detection.z_m, variance),
+            stride: Stride::default(),
             confirmed: config.confirm_hits <= 1,
             existence: EXISTENCE_AT_BIRTH,
             hits: 1,
@@ -86,7 +89,12 @@ impl Person {
 
     /// Moves the filter on.
     pub(super) fn predict(&mut self, config: &TrackConfig, dt_s: f64) {
+        self.stride.predict(config, self.speed_mps(), self.height.mean_m(), dt_s);
         self.filter.predict(config, self.height.mean_m(), dt_s);
+    }
+
+    fn speed_mps(&self) -> f64 {
+        self.filter.state().velocity_mps().length()
     }
 
     /// The frame's detection of this person, `after_s` after the last frame; the filter stands at it.
@@ -100,7 +108,7 @@ impl Person {
     ) {
         self.filter.correct(detection.position_m, detection.z_m, noise(config, detection, view));
         if let Some(swing) = &detection.swing {
-            self.filter.correct_swing(config, swing, self.height.mean_m());
+            self.stride.see(config, swing, self.speed_mps(), self.height.mean_m());
         }
         let there = self.existence * config.hit_ratio;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
@@ -167,7 +175,7 @@ impl Person {
             height_sigma_m: self.height.sigma_m(),
             girth,
             girth_sigma,
-            gait: self.filter.gait(),
+            gait: self.stride.gait(velocity_mps.length()).surer(self.filter.gait()),
             points: self.points,
             confirmed: self.confirmed && largest_sigma(state.position_covariance()) < config.told_sigma_max_m,
             aabb,
@@ -195,8 +203,7 @@ impl Person {
     fn see(&mut self, detection: &Detection, view: &View, step_s: f64, config: &TrackConfig) {
         self.points = detection.points;
         self.height.see(detection.top_m, view.beams_per_m_at_top);
-        let speed_mps = self.filter.state().velocity_mps().length();
-        self.girth.see(detection, view, self.height.mean_m(), speed_mps);
+        self.girth.see(detection, view, self.height.mean_m(), self.speed_mps());
         self.aabb = detection.aabb.moved_by(-detection.position_m);
         self.obb = detection.obb.moved_by(-detection.position_m, 0.0);
         let new = 1.0 - (-step_s / config.box_average_s).exp();
