@@ -5,7 +5,7 @@
 //! lasts over frames, and half a stride of it looks like a turn. It is followed as two oscillations whose size and
 //! phase are not known beforehand but whose pace is: people of a height at a speed all walk about alike. What is
 //! found of the sway to the side tells a little of where in the stride a person is; arms and legs tell more
-//! ([`super::stride`]).
+//! (`stride.rs`).
 
 use std::f64::consts::{PI, TAU};
 
