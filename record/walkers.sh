@@ -1,16 +1,24 @@
 #!/usr/bin/env bash
-# Where the F1 of 16 real walkers is lost: error budget and ladder of oracles, access point `side`, within 300 ms; as
-# they walk, and once more with their hands in their pockets, so that no arm swings.
+# 16 real walkers with ten draws of bodies. Then where their F1 is lost: error budget and ladder of oracles, access
+# point `side`, within 300 ms; as they walk, and once more with their hands in their pockets, so that no arm swings.
 # record/walkers.sh; `umbracast` is the one on the path, the walkers are found through UMBRACAST_DATA.
 set -euo pipefail
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
 
+walkers="$UMBRACAST_DATA/circle_antipode/circle-10m-16-2.txt"
+ten=()
+for _ in {1..10}; do ten+=("$walkers"); done
+echo "Ten draws of bodies"
+umbracast evaluate --mode default --unit cm --fps 25 --quiet --trajectories "${ten[@]}" |
+    sed -n 's/^circle-10m-16-2  //; /^access point/p; /^side/p; /^centre/p; /^position RMSE/p; /^velocity/p; /^displacement/p'
+echo
+
 for bodies in plain pockets; do
     kind=()
     [ "$bodies" = plain ] || kind=(--bodies "$bodies")
     umbracast evaluate --mode default --unit cm --fps 25 "${kind[@]}" --out "$scratch/$bodies" --quiet \
-        --trajectories "$UMBRACAST_DATA/circle_antipode/circle-10m-16-2.txt" >/dev/null
+        --trajectories "$walkers" >/dev/null
     printf '%-10s within 300 ms                 base rate     F1  onset F1\n' "$bodies"
     awk '/^Error budget, access point side/ { part = "budget" }
         /^Ladder of oracles/ { part = "ladder" }

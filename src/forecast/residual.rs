@@ -50,6 +50,7 @@ const SHIPPED: &[u8] = include_bytes!("../../models/residual.safetensors");
 #[derive(Clone)]
 pub struct Residual {
     network: Arc<Network>,
+    believed: f64,
 }
 
 struct Network {
@@ -87,7 +88,13 @@ impl Residual {
             head: Layer::read(&file, "head")?,
             mirror: mirror(),
         };
-        Ok(Self { network: Arc::new(network) })
+        Ok(Self { network: Arc::new(network), believed: BELIEVED })
+    }
+
+    /// The same network, of whose departure another share than [`BELIEVED`] is believed.
+    #[must_use]
+    pub fn believing(self, believed: f64) -> Self {
+        Self { believed, ..self }
     }
 
     /// What the network says of a track. Who walks in a mirror is foreseen in the mirror: the mean of what it
@@ -120,7 +127,7 @@ impl Residual {
         let steps = from_fn(|i| {
             let ahead_s = (i + 1) as f64 * STEP_S;
             let mut step = constant_velocity::position_at(position_m, velocity_mps, &coupling, ahead_s);
-            step.mean_m += departure_m(&outputs, axes, (i + 1) as f64 / STEPS as f64);
+            step.mean_m += self.believed * departure_m(&outputs, axes, (i + 1) as f64 / STEPS as f64);
             step
         });
         (steps, coupling)
@@ -134,11 +141,11 @@ impl fmt::Debug for Residual {
     }
 }
 
-/// How far the mean is said to lie from a constant velocity at a share of the last step's time.
+/// How far the network says the mean lies from a constant velocity at a share of the last step's time.
 fn departure_m(outputs: &[f64; OUTPUTS], axes: [DVec2; 2], share: f64) -> DVec2 {
     let along = |axis: usize| {
         let c = &outputs[axis * COEFFICIENTS..][..COEFFICIENTS];
-        BELIEVED * COEFFICIENT_M * share * (c[0] + share * (c[1] + share * c[2]))
+        COEFFICIENT_M * share * (c[0] + share * (c[1] + share * c[2]))
     };
     axes[0] * along(0) + axes[1] * along(1)
 }

@@ -39,7 +39,9 @@ fn a_law_is_learned_and_the_spread_is_honest() {
     let samples: Vec<Sample> = (0..4096).map(|_| sample(&mut rng)).collect();
     let held_out: Vec<Sample> = (0..2048).map(|_| sample(&mut rng)).collect();
     let weights = fit(&samples, FitOptions { seed: 1, epochs: 60 }, |_| {}).unwrap();
-    let score = Score::of(&Residual::from_safetensors(&weights).unwrap(), &held_out);
+    // The samples keep to their law; the runtime believes half of what it learned of drawn crowds.
+    let network = Residual::from_safetensors(&weights).unwrap().believing(1.0);
+    let score = Score::of(&network, &held_out);
     let last = STEPS - 1;
     // 0.16 m of 0.20 m can be foreseen along; what the track errs cannot.
     assert!(score.displacement_m[last] < 0.8 * score.carried_on_m[last], "{score:?}");
