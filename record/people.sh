@@ -17,7 +17,8 @@ score cmu-walk --scenes "$scenes" --preset orca-03 --bodies cmu-walk \
 walkers="$UMBRACAST_DATA/circle_antipode"
 score antipode --unit cm --fps 25 --trajectories "$walkers/circle-10m-08-2.txt" "$walkers/circle-10m-16-2.txt" \
     "$walkers/circle-10m-32-2x.txt" "$walkers/circle-10m-64-2x.txt"
-# Of the bottlenecks the part in which people wait and push through; the corridor's people trained the residual.
+# Of the bottlenecks the part in which people wait and push through; the corridor's people trained the residual,
+# as did other clips of the crowd in the street.
 score bottleneck --seconds 20 --trajectories "$UMBRACAST_DATA/pedpy/030_c_56_h0.txt" \
     "$UMBRACAST_DATA/pedpy/040_c_56_h-.txt"
 score trained-on --seconds 20 --trajectories "$UMBRACAST_DATA/pedpy/traj_UNI_CORR_500_01.txt"
