@@ -32,7 +32,7 @@ pub const SPREAD: usize = 4;
 pub const COEFFICIENT_M: f64 = 0.1;
 /// How much of the learned departure is believed. Real walkers depart less than drawn crowds teach: of 0, 0.35, 0.5,
 /// 0.65 and 1, half gave recorded walkers it never saw the best blockages and the best spread of errors, and cost
-/// ORCA's people nothing (`record/forecasts.txt` has both).
+/// ORCA's people nothing (`record/forecasts.txt` has what it gives now).
 pub const BELIEVED: f64 = 0.5;
 /// The filter's sigmas are changed by at most e to this.
 pub const LOG_FACTOR_LIMIT: f64 = 3.0;
