@@ -87,7 +87,7 @@ impl Person {
         person
     }
 
-    /// Moves the filter on.
+    /// Moves filter and stride on.
     pub(super) fn predict(&mut self, config: &TrackConfig, dt_s: f64) {
         self.stride.predict(config, self.speed_mps(), self.height.mean_m(), dt_s);
         self.filter.predict(config, self.height.mean_m(), dt_s);
@@ -107,9 +107,6 @@ impl Person {
         step_s: f64,
     ) {
         self.filter.correct(detection.position_m, detection.z_m, noise(config, detection, view));
-        if let Some(swing) = &detection.swing {
-            self.stride.see(config, swing, self.speed_mps(), self.height.mean_m());
-        }
         let there = self.existence * config.hit_ratio;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.hits += 1;
@@ -199,11 +196,15 @@ impl Person {
         }
     }
 
-    /// Learns what a detection says of the body's shape.
+    /// Learns what a detection says of the body's shape and stride.
     fn see(&mut self, detection: &Detection, view: &View, step_s: f64, config: &TrackConfig) {
         self.points = detection.points;
+        let speed_mps = self.speed_mps();
+        if let Some(swing) = &detection.swing {
+            self.stride.see(config, swing, speed_mps, self.height.mean_m());
+        }
         self.height.see(detection.top_m, view.beams_per_m_at_top);
-        self.girth.see(detection, view, self.height.mean_m(), self.speed_mps());
+        self.girth.see(detection, view, self.height.mean_m(), speed_mps);
         self.aabb = detection.aabb.moved_by(-detection.position_m);
         self.obb = detection.obb.moved_by(-detection.position_m, 0.0);
         let new = 1.0 - (-step_s / config.box_average_s).exp();
