@@ -91,6 +91,9 @@ fi
 # Killed and started again.
 record resume record/resume.sh
 
+# The paper's experiment in 40 scenes, with the LSTM that ships.
+record reproduce-quick umbracast reproduce --quick --out "$scratch/quick"
+
 # The paper's experiment whole, training first: an hour on two cores. REPRODUCE names a folder in which an earlier try is gone on with.
 reproduced="${REPRODUCE:-$scratch/reproduce}"
 cargo build --release -p umbracast-cli --features train
