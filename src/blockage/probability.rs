@@ -212,7 +212,9 @@ impl Ways {
                     offset += drift * STEP_S + kick * (0.5 * STEP_S * STEP_S);
                     drift += kick * STEP_S;
                 }
-                self.positions_m[s * samples + k] = mean_m + offset;
+                // Drawn each by itself: every step takes its positions from other samples.
+                let at = if config.joint { k } else { (k + s * 37) % samples };
+                self.positions_m[s * samples + at] = mean_m + offset;
             }
         }
         self.height_min_m = self.traits.iter().fold(f64::INFINITY, |a, b| a.min(b.height_m));

@@ -14,6 +14,8 @@ pub struct BlockageConfig {
     pub person_box: BoxKind,
     /// Joint samples of everybody's way.
     pub samples: usize,
+    /// Whether the steps of a sample are one way, not drawn each by itself.
+    pub joint: bool,
     /// Seed of the samples.
     pub seed: u64,
     /// What a ray meets.

@@ -122,6 +122,8 @@ pub struct SplitConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EvidenceConfig {
+    /// Whether expected people move the thresholds and take pieces of bodies.
+    pub guided: bool,
     /// Two people when the means of the halves of a cluster lie farther apart than this.
     pub halves_m: f64,
     /// The same where two people are expected.

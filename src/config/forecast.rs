@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 pub struct ForecastConfig {
     /// Who foresees.
     pub method: ForecastMethod,
+    /// How much of the learned departure is believed.
+    pub believed: f64,
+    /// Whether the network is shown a person's neighbours.
+    pub neighbours: bool,
     /// Spectral density of the unforeseen acceleration, each axis.
     pub acceleration_psd_m2ps3: f64,
     /// How the LSTM goes on from one step to the next.

@@ -7,6 +7,7 @@ mod forecast;
 mod blockage;
 mod overlay;
 mod check;
+mod mechanism;
 
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,7 @@ pub use detect::{
     MergeMean, ObbAxes, PositionMethod, SplitConfig, SplitMethod,
 };
 pub use forecast::{ForecastConfig, ForecastMethod, Rollout};
+pub use mechanism::Mechanism;
 pub use track::{Assignment, Boxes, GateOn, MeasuredAt, ProcessNoise, TrackConfig};
 
 use crate::{Error, Site};

@@ -28,6 +28,12 @@ pub struct TrackConfig {
     pub swing_m2: f64,
     /// Its noise in one frame, one standard deviation.
     pub swing_noise_m2: f64,
+    /// Whether the sway to the side tells the phase of the gait.
+    pub gait_from_sway: bool,
+    /// Whether arms and legs tell it.
+    pub gait_from_limbs: bool,
+    /// Whether extents of detections tell how stout a person is.
+    pub girth: bool,
     /// Time after which size and phase of the sway are forgotten.
     pub sway_lasts_s: f64,
     /// `per-step`: added to the position's variance each frame.

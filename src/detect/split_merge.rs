@@ -52,6 +52,7 @@ impl Clusterer {
                 }
             }
             SplitMethod::Evidence => {
+                let priors = if self.split.evidence.guided { priors } else { &[] };
                 // Small components may be a limb of somebody, so what is too small is dropped last.
                 for component in self.components.drain(..) {
                     evidence::split(&self.moved_m, priors, component, &self.split.evidence, &mut self.parts);

@@ -42,7 +42,9 @@ impl Forecaster {
         }
         let network = match (config.method, weights) {
             (ForecastMethod::ConstantVelocity, _) => Network::None,
-            (ForecastMethod::Residual, _) => Network::Residual(Residual::shipped()?),
+            (ForecastMethod::Residual, _) => {
+                Network::Residual(Residual::shipped()?.believing(config.believed))
+            }
             (ForecastMethod::Lstm, Some(weights)) => Network::Lstm(weights.clone()),
             (ForecastMethod::Lstm, None) => {
                 return Err(Error::new("forecast.method = \"lstm\": expected its weights, found none"));
@@ -55,7 +57,11 @@ impl Forecaster {
     pub fn forecast(&mut self, tracks: &[Track], forecasts: &mut Vec<Forecast>) {
         forecasts.clear();
         if let Network::Residual(residual) = &self.network {
-            forecasts.extend((0..tracks.len()).map(|i| residual.forecast(tracks, i)));
+            let alone = !self.config.neighbours;
+            forecasts.extend((0..tracks.len()).map(|i| match alone {
+                true => residual.forecast(&tracks[i..=i], 0),
+                false => residual.forecast(tracks, i),
+            }));
             return;
         }
         let psd = self.config.acceleration_psd_m2ps3;

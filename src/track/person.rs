@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use super::gait::Gait;
 use super::girth::Girth;
 use super::height::Height;
 use super::kalman::{Filter, Mat2, State, plus};
@@ -160,7 +161,7 @@ impl Person {
         }
         self.observed.push_back(Observed { time_ns, position_m, velocity_mps });
         let (aabb, obb) = self.boxes(config, &state);
-        let (girth, girth_sigma) = self.girth.factor();
+        let (girth, girth_sigma) = if config.girth { self.girth.factor() } else { Girth::default().factor() };
         Track {
             id: self.id,
             position_m,
@@ -172,13 +173,18 @@ impl Person {
             height_sigma_m: self.height.sigma_m(),
             girth,
             girth_sigma,
-            gait: self.stride.gait(velocity_mps.length()).surer(self.filter.gait()),
+            gait: self.gait(config, velocity_mps.length()),
             points: self.points,
             confirmed: self.confirmed && largest_sigma(state.position_covariance()) < config.told_sigma_max_m,
             aabb,
             obb,
             observed: self.observed.clone(),
         }
+    }
+
+    fn gait(&self, config: &TrackConfig, speed_mps: f64) -> Gait {
+        let limbs = if config.gait_from_limbs { self.stride.gait(speed_mps) } else { Gait::UNKNOWN };
+        limbs.surer(if config.gait_from_sway { self.filter.gait() } else { Gait::UNKNOWN })
     }
 
     /// The heading follows the velocity of who walks; who stands may turn on the spot.

@@ -48,6 +48,8 @@ pub enum Command {
     Evaluate(Evaluate),
     /// Put the main figures of several reports into one table.
     Compare(Compare),
+    /// Leave out each mechanism of the default mode alone, and say what it is worth.
+    Ablate(Ablate),
     /// Show where a person gives how many returns, and which places are blind.
     Coverage(Coverage),
     /// The paper's whole experiment: 500 scenes, every mode, AABB and OBB. Goes on where it was stopped.
@@ -248,6 +250,29 @@ pub struct Compare {
     /// Folders that `evaluate --out` wrote.
     #[arg(required = true, value_name = "DIR")]
     pub reports: Vec<PathBuf>,
+}
+
+/// `ablate`
+#[derive(Debug, Args)]
+pub struct Ablate {
+    /// Mechanisms to leave out, as the table calls them; several with commas. Default: every one.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub mechanisms: Vec<String>,
+    /// Data to try them on, as the table calls them; several with commas. Default: all there are.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub sets: Vec<String>,
+    /// Scenes of each drawn crowd.
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub scenes: u32,
+    /// Seed of the first scene: one for tuning.
+    #[arg(long, default_value_t = 150_000, value_name = "N")]
+    pub seed: u64,
+    /// Folder of the recordings: real walkers, bottleneck, captured gait, labelled clouds.
+    #[arg(long, value_name = "DIR", env = "UMBRACAST_DATA")]
+    pub data: Option<PathBuf>,
+    /// Where the rows (CSV) and the picture (SVG) go.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// `coverage`

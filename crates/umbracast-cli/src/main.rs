@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Command::Run(args) => commands::run::run(&args, &cli.common),
         Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),
         Command::Compare(args) => commands::compare::run(&args, &cli.common),
+        Command::Ablate(args) => commands::ablate::run(&args, &cli.common),
         Command::Coverage(args) => commands::coverage::run(&args, &cli.common),
         Command::Reproduce(args) => commands::reproduce::run(&args, &cli.common),
         Command::Inspect(args) => commands::inspect::run(&args, &cli.common),

@@ -1,7 +1,7 @@
 //! `run.json`: times and machine, which are not part of what equal runs have equal. The one place with a clock.
 
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
 use umbracast::Error;
@@ -22,7 +22,12 @@ impl Stopwatch {
 
     /// Seconds since the start.
     pub fn seconds(&self) -> f64 {
-        self.0.elapsed().as_secs_f64()
+        self.elapsed().as_secs_f64()
+    }
+
+    /// Time since the start.
+    pub fn elapsed(&self) -> Duration {
+        self.0.elapsed()
     }
 }
 

@@ -1,6 +1,8 @@
 //! The whole chain in memory: a simulated scene's packets through the pipelines of one or several modes, scored
 //! and forgotten. Scenes run side by side; results stand in scene order and do not depend on the threads.
 
+use std::time::Duration;
+
 use rayon::prelude::*;
 use umbracast::forecast::Weights;
 use umbracast::lidar::{Assembler, Packet};
@@ -176,50 +178,85 @@ impl<'a> Chain<'a> {
     /// A setting that cannot work.
     pub fn scene(&self, index: usize, progress: &impl Fn(Progress)) -> Result<SceneResult, Error> {
         let (spec, scene_spec, site) = (self.spec, &self.spec.scenes[index], &self.spec.configs[0].site);
-        let scene = Scene::in_hall(scene_spec.crowd(), site, &self.sensors, scene_spec.seed);
-        let mut scene = scene.with_bodies(&scene_spec.bodies);
-        let mut assembler = Assembler::new(site)?;
-        let mut health = Health::default();
-        let lane = |pipeline: &Pipeline| Lane {
-            pipeline: pipeline.clone(),
-            rows: SceneRun::default(),
-            health: Health::default(),
-        };
-        let mut lanes: Vec<Lane> = self.pipelines.iter().map(lane).collect();
-        let number = index as u32;
-        let mut truth = SceneTruth::default();
-        while let Some(frame) = scene.next_frame() {
-            note_truth(number, &frame, &mut truth);
-            push(&mut assembler, &frame.packets, &mut health);
-            let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
-            lanes.iter_mut().for_each(|lane| lane.step(number, &closed));
-            progress(Progress { scene: index, frames_done: frame.index + 1, frames: scene.frames() });
-        }
-        assembler.finish();
-        let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
-        lanes.iter_mut().for_each(|lane| lane.step(number, &closed));
-        let mode_run = |(lane, config)| lane_run(lane, config, &health);
+        let Played { scene, truth, lanes, assembled } = self.play(index, progress, &|| Duration::ZERO)?;
+        let mode_run = |(lane, config)| lane_run(lane, config, &assembled);
         let runs: Vec<ModeRun> = lanes.iter().zip(&spec.configs).map(mode_run).collect();
         let (weights, walkers) = (spec.weights.as_ref(), Some(scene.walkers()));
+        let number = index as u32;
         let score = score_scene(number, &scene_spec.group, &truth, &runs, weights, walkers)?;
         let ladder = spec.ladder.then(|| ladder::climb(&scene, &truth, site, scene_spec.seed));
         let kept =
             (spec.keep == Some(index)).then(|| (truth, lanes.into_iter().map(|lane| lane.rows).collect()));
         Ok(SceneResult { score, ladder, kept })
     }
+
+    /// Runs one scene without scoring it. `clock` tells how long each step of a pipeline took.
+    ///
+    /// # Errors
+    /// A sensor that cannot be simulated.
+    pub(crate) fn play(
+        &self,
+        index: usize,
+        progress: &impl Fn(Progress),
+        clock: &impl Fn() -> Duration,
+    ) -> Result<Played, Error> {
+        let (scene_spec, site) = (&self.spec.scenes[index], &self.spec.configs[0].site);
+        let scene = Scene::in_hall(scene_spec.crowd(), site, &self.sensors, scene_spec.seed);
+        let mut scene = scene.with_bodies(&scene_spec.bodies);
+        let mut assembler = Assembler::new(site)?;
+        let mut assembled = Health::default();
+        let mut lanes: Vec<Lane> = self.pipelines.iter().map(Lane::new).collect();
+        let number = index as u32;
+        let mut truth = SceneTruth::default();
+        while let Some(frame) = scene.next_frame() {
+            note_truth(number, &frame, &mut truth);
+            push(&mut assembler, &frame.packets, &mut assembled);
+            let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
+            lanes.iter_mut().for_each(|lane| lane.step(number, &closed, clock));
+            progress(Progress { scene: index, frames_done: frame.index + 1, frames: scene.frames() });
+        }
+        assembler.finish();
+        let closed: Vec<Frame> = std::iter::from_fn(|| assembler.pop()).collect();
+        lanes.iter_mut().for_each(|lane| lane.step(number, &closed, clock));
+        Ok(Played { scene, truth, lanes, assembled })
+    }
+}
+
+/// A scene that was run, and what every mode said of it.
+pub(crate) struct Played {
+    scene: Scene,
+    pub(crate) truth: SceneTruth,
+    /// One a mode.
+    pub(crate) lanes: Vec<Lane>,
+    /// What was skipped before the pipelines.
+    assembled: Health,
 }
 
 /// One mode's pipeline and what it has said.
-struct Lane {
+pub(crate) struct Lane {
     pipeline: Pipeline,
-    rows: SceneRun,
+    pub(crate) rows: SceneRun,
     health: Health,
+    /// How long each frame took.
+    pub(crate) times: Vec<Duration>,
 }
 
 impl Lane {
-    fn step(&mut self, scene: u32, frames: &[Frame]) {
+    /// Of a pipeline before its first frame.
+    pub(crate) fn new(pipeline: &Pipeline) -> Self {
+        Self {
+            pipeline: pipeline.clone(),
+            rows: SceneRun::default(),
+            health: Health::default(),
+            times: Vec::new(),
+        }
+    }
+
+    pub(crate) fn step(&mut self, scene: u32, frames: &[Frame], clock: &impl Fn() -> Duration) {
         for frame in frames {
+            let before = clock();
             let outcome = self.pipeline.step(frame);
+            self.times.push(clock().saturating_sub(before));
             rows::of_outcome(scene, outcome, &mut self.rows.tracks, &mut self.rows.links);
             self.health = outcome.health;
         }

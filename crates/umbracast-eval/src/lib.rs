@@ -29,3 +29,4 @@ pub mod pooled;
 pub mod report;
 pub mod coverage;
 pub mod explain;
+pub mod ablate;
