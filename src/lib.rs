@@ -30,6 +30,7 @@ pub mod health;
 pub mod site;
 pub mod config;
 pub mod lidar;
+pub mod gait;
 pub mod detect;
 pub mod track;
 pub mod forecast;

@@ -66,7 +66,7 @@ impl Pipeline {
     /// A setting that cannot work, with what was expected and found.
     pub fn new(config: &Config, weights: Option<&Weights>) -> Result<Self, Error> {
         Ok(Self {
-            background: Background::new(&config.detect, &config.site)?,
+            background: Background::new(&config.detect, &config.site),
             clusterer: Clusterer::new(&config.detect, &config.site),
             measurer: Measurer::new(&config.detect, &config.site),
             tracker: Tracker::new(&config.track, &config.site),

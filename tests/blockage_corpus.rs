@@ -1,10 +1,9 @@
 //! Every implementation of stage 3 against `testdata/blockage/scenes.toml`, whose answers were computed by hand.
 
 use serde::Deserialize;
-use umbracast::Config;
 use umbracast::blockage::algorithm1::{PersonBox, cast_step};
 use umbracast::blockage::body::{self, Posture};
-use umbracast::config::{ArmsConfig, BodyConfig, SliceConfig};
+use umbracast::blockage::body_model::{Arms, BodyModel, Slice};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 #[derive(Deserialize)]
@@ -98,19 +97,19 @@ fn trunk_and_head() {
 }
 
 /// A trunk of 0.26 x 0.56 m up to .82 of the height with a head of 0.2 m; the arms are within the trunk.
-fn trunk_and_head_of(height_m: f64) -> BodyConfig {
-    let slice = |top: f64, depth_m: f64, width_m: f64| SliceConfig {
+fn trunk_and_head_of(height_m: f64) -> BodyModel {
+    let slice = |top: f64, depth_m: f64, width_m: f64| Slice {
         top,
         half_depth: 0.5 * depth_m / height_m,
         half_width: 0.5 * width_m / height_m,
         ahead: 0.0,
     };
-    let body = Config::default().blockage.body;
-    let arms = ArmsConfig { shoulder_out: 0.0, elbow_out: 0.0, hand_out: 0.0, ..body.arms };
-    BodyConfig {
+    let body = BodyModel::shipped();
+    let arms = Arms { shoulder_out: 0.0, elbow_out: 0.0, hand_out: 0.0, ..body.arms };
+    BodyModel {
         slices: vec![slice(0.82, 0.26, 0.56), slice(1.0, 0.2, 0.2)],
-        sway: 0.0,
-        surge: 0.0,
-        arms: ArmsConfig { upper_radius: 0.01, fore_radius: 0.01, ..arms },
+        sway_left: 0.0,
+        sway_ahead: 0.0,
+        arms: Arms { upper_radius: 0.01, fore_radius: 0.01, ..arms },
     }
 }

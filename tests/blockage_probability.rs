@@ -1,38 +1,47 @@
 //! The sampled probability against answers known in closed form.
 
-use umbracast::blockage::{Blockage, Caster};
-use umbracast::config::{ArmsConfig, SliceConfig};
+use umbracast::blockage::body_model::{Arms, BodyModel, Slice};
+use umbracast::blockage::{Blockage, Caster, Numbers};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
-use umbracast::track::{Gait, Observed, Track};
+use umbracast::gait::GaitPhase;
+use umbracast::track::{Observed, Track};
 use umbracast::{Config, STEP_S, STEPS};
 
 const HEIGHT_M: f64 = 1.75;
 
-/// One access point at 1 m at the origin; bodies of 0.56 m turned towards it, of exactly known size and heading.
-fn config(samples: usize) -> Config {
+/// One access point at 1 m at the origin; what stage 3 computes with.
+struct Setting {
+    config: Config,
+    numbers: Numbers,
+}
+
+/// Bodies of 0.56 m turned towards the access point, of exactly known size and heading.
+fn setting(samples: usize) -> Setting {
     let mut config = Config::default();
     config.site.access_points.truncate(1);
     config.site.access_points[0].position_m = [0.0, 0.0, 1.0];
-    config.blockage.samples = samples;
-    config.blockage.girth_sigma = 0.0;
-    config.blockage.height_sigma_m = 0.0;
-    config.blockage.heading_sigma_deg = 0.0;
     let share = |half_m: f64| half_m / HEIGHT_M;
-    let slice = SliceConfig { top: 1.0, half_depth: share(0.13), half_width: share(0.28), ahead: 0.0 };
-    config.blockage.body.slices = vec![slice];
-    config.blockage.body.sway = 0.0;
+    let slice = Slice { top: 1.0, half_depth: share(0.13), half_width: share(0.28), ahead: 0.0 };
     // Arms within the trunk.
-    config.blockage.body.arms = ArmsConfig {
+    let arms = Arms {
         shoulder_out: 0.0,
         elbow_out: 0.0,
         hand_out: 0.0,
         upper_radius: 0.01,
         fore_radius: 0.01,
         still_share: 1.0,
-        ..config.blockage.body.arms
+        ..BodyModel::shipped().arms
     };
-    config
+    let numbers = Numbers {
+        samples,
+        body: BodyModel { slices: vec![slice], sway_left: 0.0, arms, ..BodyModel::shipped() },
+        width_sigma: 0.0,
+        height_sigma_m: 0.0,
+        heading_sigma_rad: 0.0,
+        ..Numbers::new(&config.blockage)
+    };
+    Setting { config, numbers }
 }
 
 fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -> (Track, Forecast) {
@@ -51,9 +60,7 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         heading_sigma_rad: 0.0,
         height_m: HEIGHT_M,
         height_sigma_m: 0.0,
-        girth: 1.0,
-        girth_sigma: 0.0,
-        gait: Gait::UNKNOWN,
+        gait: GaitPhase::UNKNOWN,
         points: 30,
         confirmed: true,
         aabb,
@@ -67,15 +74,16 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         Forecast {
             track: id,
             steps,
-            coupling: Coupling { state: covariance, acceleration_psd: [[0.0; 2]; 2] },
+            coupling: Coupling { state: covariance, acceleration_psd_m2ps3: [[0.0; 2]; 2] },
         },
     )
 }
 
-fn cast(config: &Config, people: Vec<(Track, Forecast)>) -> Vec<Blockage> {
+fn cast(Setting { config, numbers }: &Setting, people: Vec<(Track, Forecast)>) -> Vec<Blockage> {
     let (tracks, forecasts): (Vec<_>, Vec<_>) = people.into_iter().unzip();
     let mut blockages = Vec::new();
-    Caster::new(&config.blockage, &config.site).cast(&tracks, &forecasts, &mut blockages);
+    let mut caster = Caster::with_numbers(&config.blockage, numbers.clone(), &config.site);
+    caster.cast(&tracks, &forecasts, &mut blockages);
     blockages
 }
 
@@ -85,7 +93,7 @@ fn without_uncertainty_the_probability_is_zero_or_one() {
     let near = person(1, DVec2::new(4.0, 0.0), still, [0.0; 4]);
     let hidden = person(2, DVec2::new(8.0, 0.1), still, [0.0; 4]);
     let clear = person(3, DVec2::new(8.0, 3.0), still, [0.0; 4]);
-    let found = cast(&config(16), vec![near, hidden, clear]);
+    let found = cast(&setting(16), vec![near, hidden, clear]);
     assert_eq!(found.iter().map(|b| b.p_now).collect::<Vec<_>>(), [0.0, 1.0, 0.0]);
     assert_eq!(found.iter().map(|b| b.p[8]).collect::<Vec<_>>(), [0.0, 1.0, 0.0]);
 }
@@ -95,7 +103,7 @@ fn a_person_who_walks_in_blocks_from_the_step_he_arrives_at() {
     // 1 m/s towards the ray from 0.65 m beside it, half width 0.28 m: in the way from step 4 (0.25 m) on.
     let walker = person(1, DVec2::new(4.0, 0.65), DVec2::new(0.0, -1.0), [0.0; 4]);
     let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
-    let found = cast(&config(4), vec![walker, user]);
+    let found = cast(&setting(4), vec![walker, user]);
     assert!(!found[1].blocked_now);
     assert_eq!(found[1].blocked, std::array::from_fn(|w| w + 1 >= 4));
 }
@@ -105,12 +113,12 @@ fn the_share_of_samples_is_the_integral_of_the_gaussian() {
     // Lateral offset 0.28 m with sigma 0.1 m: half of the mass is inside the edge, nearly none passes the other.
     let near = person(1, DVec2::new(4.0, 0.28), DVec2::ZERO, [0.0, 0.01, 0.0, 0.0]);
     let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
-    let found = cast(&config(20_000), vec![near, user]);
+    let found = cast(&setting(20_000), vec![near, user]);
     assert!((found[1].p_now - 0.5).abs() < 0.015, "{}", found[1].p_now);
     // One sigma further out: 1 - Phi(1) = 0.1587.
     let near = person(1, DVec2::new(4.0, 0.38), DVec2::ZERO, [0.0, 0.01, 0.0, 0.0]);
     let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
-    let found = cast(&config(20_000), vec![near, user]);
+    let found = cast(&setting(20_000), vec![near, user]);
     assert!((found[1].p_now - 0.1587).abs() < 0.015, "{}", found[1].p_now);
 }
 
@@ -118,7 +126,7 @@ fn the_share_of_samples_is_the_integral_of_the_gaussian() {
 fn the_probability_never_falls_with_the_window() {
     let walker = person(1, DVec2::new(4.0, 0.6), DVec2::new(0.3, -0.8), [0.01, 0.01, 0.04, 0.04]);
     let user = person(2, DVec2::new(8.0, -0.2), DVec2::new(-0.5, 0.4), [0.01, 0.01, 0.04, 0.04]);
-    for b in cast(&config(128), vec![walker, user]) {
+    for b in cast(&setting(128), vec![walker, user]) {
         assert!(b.p.is_sorted(), "{:?}", b.p);
     }
 }
@@ -128,7 +136,7 @@ fn standing_still_a_window_is_no_likelier_than_now() {
     // Steps are not independent: a position that is wrong now is as wrong in all steps.
     let near = person(1, DVec2::new(4.0, 0.3), DVec2::ZERO, [0.01, 0.01, 0.0, 0.0]);
     let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.01, 0.01, 0.0, 0.0]);
-    let b = cast(&config(512), vec![near, user])[1];
+    let b = cast(&setting(512), vec![near, user])[1];
     assert_eq!(b.p[8], b.p_now);
 }
 
@@ -137,10 +145,10 @@ fn onset_and_duration_bracket_when_a_walker_enters_and_leaves_the_ray() {
     // As above, in the way from step 4 on, and out of it 0.28 m beyond the ray: at step 10, too late to be told.
     let walker = |y_m: f64| person(1, DVec2::new(4.0, y_m), DVec2::new(0.0, -1.0), [0.0; 4]);
     let user = || person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
-    let coming = cast(&config(4), vec![walker(0.65), user()])[1];
+    let coming = cast(&setting(4), vec![walker(0.65), user()])[1];
     assert_eq!((coming.onset_s, coming.duration_s), ([Some(4.0 * STEP_S); 3], [None; 3]));
     // 0.05 m before the ray it takes four steps to come out of it.
-    let there = cast(&config(4), vec![walker(0.05), user()])[1];
+    let there = cast(&setting(4), vec![walker(0.05), user()])[1];
     assert_eq!((there.onset_s, there.duration_s), ([None; 3], [Some(4.0 * STEP_S); 3]));
 }
 
@@ -148,23 +156,23 @@ fn onset_and_duration_bracket_when_a_walker_enters_and_leaves_the_ray() {
 fn who_comes_no_sooner_than_the_last_step_has_no_onset() {
     let walker = person(1, DVec2::new(4.0, 2.0), DVec2::new(0.0, -1.0), [0.0; 4]);
     let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
-    let found = cast(&config(4), vec![walker, user])[1];
+    let found = cast(&setting(4), vec![walker, user])[1];
     assert_eq!((found.onset_s, found.p[STEPS - 1]), ([None; 3], 0.0));
 }
 
 #[test]
 fn arms_that_swing_make_a_walker_seen_from_the_side_block_sooner() {
     // He walks across the ray towards it and is 0.33 m away, with a trunk 0.13 m deep: a hand may be in the way.
-    let mut config = config(256);
-    config.blockage.body.arms = Config::default().blockage.body.arms;
-    config.site.access_points[0].position_m[2] = 0.7;
+    let mut setting = setting(256);
+    setting.numbers.body.arms = BodyModel::shipped().arms;
+    setting.config.site.access_points[0].position_m[2] = 0.7;
     let p_now = |still_share: f64, speed_mps: f64| {
-        let mut config = config.clone();
-        config.blockage.body.arms.still_share = still_share;
+        let mut setting = Setting { config: setting.config.clone(), numbers: setting.numbers.clone() };
+        setting.numbers.body.arms.still_share = still_share;
         let (mut track, forecast) = person(1, DVec2::new(4.0, 0.33), DVec2::new(0.0, -speed_mps), [0.0; 4]);
         track.heading_rad = -std::f64::consts::FRAC_PI_2;
         let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
-        cast(&config, vec![(track, forecast), user])[1].p_now
+        cast(&setting, vec![(track, forecast), user])[1].p_now
     };
     let (swinging, some, standing) = (p_now(0.0, 1.2), p_now(0.5, 1.2), p_now(0.0, 0.0));
     assert!(swinging > 0.2 && swinging < 0.9, "{swinging}");

@@ -82,7 +82,7 @@ struct Chain {
 impl Chain {
     fn new(config: &Config) -> Self {
         Self {
-            background: Background::new(&config.detect, &config.site).unwrap(),
+            background: Background::new(&config.detect, &config.site),
             clusterer: Clusterer::new(&config.detect, &config.site),
             measurer: Measurer::new(&config.detect, &config.site),
             points: Vec::new(),
@@ -217,11 +217,21 @@ fn broken_points_are_counted_and_skipped() {
 
 #[test]
 fn more_points_than_the_limit_are_counted_and_dropped() {
-    let mut config = config(Mode::Default);
-    config.detect.background.points_limit = 10;
+    const POINTS: usize = 40_007;
+    let config = config(Mode::Default);
     let mut chain = Chain::new(&config);
     chain.background.learn_empty(&frame(&config, 0, &[]));
-    chain.step(&frame(&config, 1, &PEOPLE_M), &[]);
-    assert_eq!(chain.points.len(), 10);
-    assert!(chain.health.points_over_limit > 0);
+    let mut crowded = frame(&config, 1, &[]);
+    let near = |i: usize| SensorPoint {
+        position_m: [1.0, 1e-5 * i as f32, 0.0],
+        time_ns: 0,
+        reflectivity: 0.0,
+    };
+    // Level with a sensor that hangs no higher than people are tall.
+    crowded.scans.truncate(1);
+    crowded.scans[0].site_from_sensor.translation_m.z = 1.5;
+    crowded.scans[0].cloud = Cloud::Unorganised((0..POINTS).map(near).collect());
+    let mut points = Vec::new();
+    chain.background.foreground(&crowded, &[], &mut chain.health, &mut points);
+    assert_eq!((points.len(), chain.health.points_over_limit), (40_000, 7));
 }

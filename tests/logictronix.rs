@@ -73,7 +73,7 @@ fn people_are_found_without_an_empty_scan() {
     let config = Config::with_overlay(Mode::Default, SITE, "site").unwrap();
     let (mut found, mut people, mut detected) = (0, 0, 0);
     for run in [70..=95_u64, 117..=140] {
-        let mut background = Background::new(&config.detect, &config.site).unwrap();
+        let mut background = Background::new(&config.detect, &config.site);
         let mut clusterer = Clusterer::new(&config.detect, &config.site);
         let mut measurer = Measurer::new(&config.detect, &config.site);
         let (mut points, mut clusters, mut detections) = (Vec::new(), Vec::new(), Vec::<Detection>::new());

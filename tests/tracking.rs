@@ -7,7 +7,8 @@ use umbracast::config::TrackConfig;
 use umbracast::detect::Detection;
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb, Pose};
 use umbracast::lidar::{Cloud, Frame, Scan};
-use umbracast::track::{Track, Tracker};
+use umbracast::track::numbers::MotionModel;
+use umbracast::track::{MixtureTracker, Numbers, Track, Tracker};
 use umbracast::{Config, Mode, Site};
 
 /// What a detection tells of its error: one sigma of an axis.
@@ -37,8 +38,8 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         z_m: 0.9,
         time_ns,
         points: 30,
-        swing: None,
-        whole: true,
+        limbs: None,
+        full_body: true,
         top_m: 1.7,
         aabb,
         obb,
@@ -89,14 +90,26 @@ fn world(walkers: &Walkers, seed: u64) -> World<'_> {
     World { walkers, noise_m: 0.05, miss: 0.0, false_per_frame: 0, rng: Pcg64::seed_from_u64(seed) }
 }
 
-/// The confirmed track nearest to each person in each frame.
-fn follow(config: &TrackConfig, mut world: World<'_>, frames: u64) -> Vec<Vec<Track>> {
+/// Confirmed tracks of every frame.
+fn follow(config: &TrackConfig, mut world: World, frames: u64) -> Vec<Vec<Track>> {
     let mut tracker = Tracker::new(config, &open_site());
+    each_frame(&mut world, frames, |frame, detections, tracks| tracker.update(frame, detections, tracks))
+}
+
+fn follow_with(mut tracker: MixtureTracker, mut world: World, frames: u64) -> Vec<Vec<Track>> {
+    each_frame(&mut world, frames, |frame, detections, tracks| tracker.update(frame, detections, tracks))
+}
+
+fn each_frame(
+    world: &mut World,
+    frames: u64,
+    mut update: impl FnMut(&Frame, &[Detection], &mut Vec<Track>),
+) -> Vec<Vec<Track>> {
     let mut tracks = Vec::new();
     (0..frames)
         .map(|index| {
             let frame = frame(index);
-            tracker.update(&frame, &world.detections(&frame), &mut tracks);
+            update(&frame, &world.detections(&frame), &mut tracks);
             tracks.iter().filter(|t| t.confirmed).cloned().collect()
         })
         .collect()
@@ -200,7 +213,7 @@ fn pieces_of_a_person_keep_a_track_and_start_none() {
         for index in 0..30 {
             let frame = frame(index);
             let seen = detection(DVec2::new(0.1 * index as f64, 0.0), frame.time_ns);
-            let piece = Detection { whole: index < first_piece, ..seen };
+            let piece = Detection { full_body: index < first_piece, ..seen };
             tracker.update(&frame, &[piece], &mut tracks);
         }
         tracks.into_iter().filter(|track| track.confirmed).collect::<Vec<_>>()
@@ -287,15 +300,20 @@ fn the_order_of_detections_does_not_matter() {
 /// The normalised squared error of (x, y, vx, vy) has mean 4 if the covariance is honest.
 #[test]
 fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
-    let mut config = Config::for_mode(Mode::Default).track;
-    (config.noise_floor_m, config.noise_share) = (0.05, 0.0);
-    (config.sway_left_m, config.sway_ahead_m) = (0.0, 0.0);
     // One model and a walker who keeps to it: nothing but the filter's own account is tested.
-    (config.acceleration_m2ps3, config.model_share, config.standing_share) = (vec![1e-6], vec![1.0], 0.0);
+    let model = MotionModel { acceleration_psd_m2ps3: 1e-6, share: 1.0, standing_mps: None };
+    let numbers = Numbers {
+        noise_floor_m: 0.05,
+        noise_share: 0.0,
+        sway_m: [0.0; 2],
+        motion_models: vec![model],
+        ..Numbers::new(&Config::default().track)
+    };
     let walkers = [(DVec2::new(-6.0, 2.0), DVec2::new(1.2, -0.3))];
     let (mut sum, mut n) = (0.0, 0);
     for seed in 0..200 {
-        let all = follow(&config, world(&walkers, seed), 30);
+        let tracker = MixtureTracker::with_numbers(numbers.clone(), &open_site());
+        let all = follow_with(tracker, world(&walkers, seed), 30);
         let track = nearest(&all[29], DVec2::ZERO);
         let truth = walkers[0].0 + walkers[0].1 * 3.0;
         let (p, v) = (track.position_m - truth, track.velocity_mps - walkers[0].1);
@@ -310,11 +328,10 @@ fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
 /// A body that sways 2 cm to each side, 0.92 times a second as somebody 1.75 m tall does at 1.4 m/s.
 #[test]
 fn the_sway_of_a_walking_body_is_not_taken_for_turns() {
-    let config = Config::for_mode(Mode::Default).track;
-    let rigid = TrackConfig { sway_left_m: 0.0, sway_ahead_m: 0.0, noise_share: 0.2, ..config.clone() };
-    let config = TrackConfig { noise_share: 0.05, ..config };
-    let worst_mps = |config: &TrackConfig| {
-        let mut tracker = Tracker::new(config, &open_site());
+    let swaying = Numbers { noise_share: 0.05, ..Numbers::new(&Config::default().track) };
+    let rigid = Numbers { sway_m: [0.0; 2], noise_share: 0.2, ..swaying.clone() };
+    let worst_mps = |numbers: Numbers| {
+        let mut tracker = MixtureTracker::with_numbers(numbers, &open_site());
         let mut tracks = Vec::new();
         let mut worst_mps: f64 = 0.0;
         for index in 0..80 {
@@ -329,7 +346,7 @@ fn the_sway_of_a_walking_body_is_not_taken_for_turns() {
         }
         worst_mps
     };
-    let (followed, rigid) = (worst_mps(&config), worst_mps(&rigid));
+    let (followed, rigid) = (worst_mps(swaying), worst_mps(rigid));
     assert!(followed < 0.015 && followed < 0.5 * rigid, "{followed} and {rigid} m/s");
 }
 

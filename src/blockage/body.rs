@@ -1,16 +1,12 @@
 //! What a ray meets: an upright body of a few numbers, a stack of elliptic slices with two arms that swing. One
 //! box to the top of the head does far worse (the report's ladder): above the shoulders there is only a head.
 //!
-//! All sizes are shares of the standing height (`config/default.toml`); nothing here knows the simulator's meshes.
+//! All sizes are shares of the standing height ([`BodyModel`]); nothing here knows the simulator's meshes.
 
-use std::f64::consts::PI;
-
-use crate::config::{ArmsConfig, BodyConfig, SliceConfig};
+use super::body_model::{Arms, BodyModel, Slice};
+use crate::gait::{self, FOREMOST_RAD, LEFTMOST_RAD, sway_share};
 use crate::geometry::{DVec2, DVec3};
-use crate::track::gait;
 
-/// From this speed over hip height (1/s) on the trunk's sway is all there.
-const FULL_SWAY_HZ: f64 = 0.5;
 /// Gaits are known up to here: 2 m/s.
 const FASTEST_HZ: f64 = 2.0;
 
@@ -23,20 +19,20 @@ pub struct Posture {
     pub ahead: DVec2,
     /// Standing height.
     pub height_m: f64,
-    /// Factor on every half axis and radius.
-    pub girth: f64,
+    /// Factor on every half axis and radius: 1 for a usual body.
+    pub width_scale: f64,
     /// 0 standing.
     pub speed_mps: f64,
     /// Since the right heel touched the floor; a stride is a full turn.
     pub phase_rad: f64,
     /// Factor on the swing of the arms: 0 for arms that hang still.
-    pub swing: f64,
+    pub arm_swing: f64,
 }
 
 impl Posture {
-    /// Of a body of usual girth that stands still.
+    /// Of a usual body that stands still.
     pub fn standing(position_m: DVec2, ahead: DVec2, height_m: f64) -> Self {
-        Self { position_m, ahead, height_m, girth: 1.0, speed_mps: 0.0, phase_rad: 0.0, swing: 0.0 }
+        Self { position_m, ahead, height_m, width_scale: 1.0, speed_mps: 0.0, phase_rad: 0.0, arm_swing: 0.0 }
     }
 
     fn relative_speed_hz(&self) -> f64 {
@@ -50,7 +46,7 @@ fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
 }
 
 /// True when the segment meets the body; touching counts.
-pub fn blocks(body: &BodyConfig, posture: &Posture, start_m: DVec3, end_m: DVec3) -> bool {
+pub fn blocks(body: &BodyModel, posture: &Posture, start_m: DVec3, end_m: DVec3) -> bool {
     let local = |v: DVec3| {
         let from_axis = v.truncate() - posture.position_m;
         DVec3::new(posture.ahead.dot(from_axis), posture.ahead.perp_dot(from_axis), v.z)
@@ -61,7 +57,7 @@ pub fn blocks(body: &BodyConfig, posture: &Posture, start_m: DVec3, end_m: DVec3
     let along_m2 = along_m.length_squared().max(f64::MIN_POSITIVE);
     let nearest = (-start.truncate().dot(along_m) / along_m2).clamp(0.0, 1.0);
     let nearest_m = (start.truncate() + along_m * nearest).length();
-    let reach_m = reach_m(body, h, posture.girth, posture.speed_mps);
+    let reach_m = reach_m(body, h, posture.width_scale, posture.speed_mps);
     if nearest_m > reach_m {
         return false;
     }
@@ -72,60 +68,55 @@ pub fn blocks(body: &BodyConfig, posture: &Posture, start_m: DVec3, end_m: DVec3
     if lowest_m > h {
         return false;
     }
-    // The trunk rides over the foot that stands: to the left while the left one does.
-    let sway_m = -body.sway * h * sway_share(speed_hz) * (posture.phase_rad - 0.2 * PI).sin();
-    // And goes ahead and back with every step, most ahead where the source has it at a usual walk.
-    let surge_m = body.surge * h * sway_share(speed_hz) * (2.0 * posture.phase_rad - 1.4 * PI).cos();
+    // The trunk rides over the foot that stands, once a stride, and goes ahead and back with every step.
+    let share = sway_share(speed_hz) * h;
+    let left_m = body.sway_left * share * (posture.phase_rad - LEFTMOST_RAD).cos();
+    let ahead_m = body.sway_ahead * share * (2.0 * (posture.phase_rad - FOREMOST_RAD)).cos();
     let mut bottom_m = 0.0;
     for slice in &body.slices {
         let top_m = slice.top * h;
         let cylinder = EllipticCylinder {
-            center_m: DVec2::new(slice.ahead * h + surge_m, sway_m),
+            center_m: DVec2::new(slice.ahead * h + ahead_m, left_m),
             ahead: DVec2::X,
-            half_depth_m: slice.half_depth * h * posture.girth,
-            half_width_m: slice.half_width * h * posture.girth,
+            half_depth_m: slice.half_depth * h * posture.width_scale,
+            half_width_m: slice.half_width * h * posture.width_scale,
             bottom_m,
             top_m,
         };
         bottom_m = top_m;
-        let far = nearest_m > slice_reach(body, slice, posture.girth) * h;
+        let far = nearest_m > slice_reach(body, slice, posture.width_scale) * h;
         if !far && top_m >= lowest_m && cylinder.hit(start, end).is_some() {
             return true;
         }
     }
     let arms = &body.arms;
-    if lowest_m > (arms.shoulder_up + arms.upper_radius * posture.girth) * h {
+    if lowest_m > (arms.shoulder_up + arms.upper_radius * posture.width_scale) * h {
         return false;
     }
-    let sway = DVec3::new(surge_m, sway_m, 0.0);
+    let sway = DVec3::new(ahead_m, left_m, 0.0);
     arm_blocks(arms, posture, speed_hz, -1.0, start - sway, end - sway)
         || arm_blocks(arms, posture, speed_hz, 1.0, start - sway, end - sway)
 }
 
 /// No part of such a body is farther from its axis.
-pub fn reach_m(body: &BodyConfig, height_m: f64, girth: f64, speed_mps: f64) -> f64 {
+pub fn reach_m(body: &BodyModel, height_m: f64, width_scale: f64, speed_mps: f64) -> f64 {
     let arms = &body.arms;
     let hand_ahead = relative_speed_hz(speed_mps, height_m) * (arms.hand_ahead + arms.hand_swing).abs();
     let out = arms.hand_out.max(arms.elbow_out).max(arms.shoulder_out);
-    let radius = arms.upper_radius.max(arms.fore_radius) * girth;
-    let arms_reach = (hand_ahead * hand_ahead + out * out).sqrt() + radius + body.sway + body.surge;
-    height_m * body.slices.iter().fold(arms_reach, |far, slice| far.max(slice_reach(body, slice, girth)))
+    let radius = arms.upper_radius.max(arms.fore_radius) * width_scale;
+    let arms_reach = (hand_ahead * hand_ahead + out * out).sqrt() + radius + body.sway_left + body.sway_ahead;
+    height_m * body.slices.iter().fold(arms_reach, |far, slice| far.max(slice_reach(body, slice, width_scale)))
 }
 
 /// The same of a slice, as a share of the height.
-fn slice_reach(body: &BodyConfig, slice: &SliceConfig, girth: f64) -> f64 {
-    slice.half_depth.max(slice.half_width) * girth + slice.ahead.abs() + body.sway + body.surge
-}
-
-/// Sway rises with the speed and stays (the source's published codes jump where this bends).
-fn sway_share(speed_hz: f64) -> f64 {
-    if speed_hz < FULL_SWAY_HZ { 4.0 * speed_hz * (1.0 - speed_hz) } else { 1.0 }
+fn slice_reach(body: &BodyModel, slice: &Slice, width_scale: f64) -> f64 {
+    slice.half_depth.max(slice.half_width) * width_scale + slice.ahead.abs() + body.sway_left + body.sway_ahead
 }
 
 /// An arm of two rods; `side` is 1 on the left. It swings against the leg of its side, and farther ahead than back
 /// because the elbow bends.
 fn arm_blocks(
-    arms: &ArmsConfig,
+    arms: &Arms,
     posture: &Posture,
     speed_hz: f64,
     side: f64,
@@ -134,7 +125,7 @@ fn arm_blocks(
 ) -> bool {
     let h = posture.height_m;
     let wave = side * posture.phase_rad.cos();
-    let swing = posture.swing * speed_hz;
+    let swing = posture.arm_swing * speed_hz;
     let elbow_ahead = swing * arms.elbow_swing * wave;
     let hand_ahead = swing * (arms.hand_ahead + arms.hand_swing * wave);
     let at = |ahead: f64, out: f64, up: f64| DVec3::new(ahead, side * out, up) * h;
@@ -142,7 +133,7 @@ fn arm_blocks(
     let elbow = at(elbow_ahead, arms.elbow_out, arms.elbow_up);
     let hand = at(hand_ahead, arms.hand_out, arms.hand_up);
     let touches = |a: DVec3, b: DVec3, radius: f64| {
-        distance2_of_segments(start, end, a, b) <= (radius * h * posture.girth).powi(2)
+        distance2_of_segments(start, end, a, b) <= (radius * h * posture.width_scale).powi(2)
     };
     touches(shoulder, elbow, arms.upper_radius) || touches(elbow, hand, arms.fore_radius)
 }
@@ -223,16 +214,17 @@ impl EllipticCylinder {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::Config;
+    use std::f64::consts::PI;
 
-    fn body() -> BodyConfig {
-        Config::default().blockage.body
+    use super::*;
+
+    fn body() -> BodyModel {
+        BodyModel::shipped()
     }
 
     fn posture(phase_rad: f64) -> Posture {
         let standing = Posture::standing(DVec2::new(5.0, 0.0), DVec2::X, 1.75);
-        Posture { speed_mps: 1.0, swing: 1.0, phase_rad, ..standing }
+        Posture { speed_mps: 1.0, arm_swing: 1.0, phase_rad, ..standing }
     }
 
     /// A level ray across the body, `ahead_m` before its axis.
@@ -260,7 +252,7 @@ mod tests {
         let ahead: Vec<bool> = phases.map(|phase| reaches(&posture(phase))).collect();
         assert!(ahead[0] && ahead[8] && !ahead[4] && !ahead[12], "{ahead:?}");
         assert!(!reaches(&Posture { speed_mps: 0.0, ..posture(0.0) }));
-        assert!(!reaches(&Posture { swing: 0.0, ..posture(0.0) }));
+        assert!(!reaches(&Posture { arm_swing: 0.0, ..posture(0.0) }));
     }
 
     #[test]

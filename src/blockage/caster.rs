@@ -2,21 +2,26 @@
 
 use super::Blockage;
 use super::algorithm1::{self, PersonBox};
+use super::numbers::Numbers;
 use super::probability::Sampler;
 use crate::config::{BlockageConfig, BlockageMethod, BoxKind};
 use crate::forecast::Forecast;
+use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
 use crate::track::Track;
-use crate::{STEPS, Site};
+use crate::{STEP_S, STEPS, Site};
 
-/// Below this step length a forecast says nothing about where a person faces: 0.3 m/s.
-const TURNS_FROM_M: f64 = 0.03;
+/// Below this step length a forecast says nothing about where a person faces.
+const TURNS_FROM_M: f64 = WALKS_FROM_MPS * STEP_S;
 
 /// Stage 3 with what it needs to know.
 #[derive(Debug, Clone)]
 pub struct Caster {
-    config: BlockageConfig,
+    method: BlockageMethod,
+    person_box: BoxKind,
+    threshold: f64,
+    numbers: Numbers,
     access_points_m: Vec<DVec3>,
     ue: Ue,
     sampler: Sampler,
@@ -25,8 +30,16 @@ pub struct Caster {
 impl Caster {
     /// Needs the site's access points and where the UE is.
     pub fn new(config: &BlockageConfig, site: &Site) -> Self {
+        Self::with_numbers(config, Numbers::new(config), site)
+    }
+
+    /// The same with numbers of one's own.
+    pub fn with_numbers(config: &BlockageConfig, numbers: Numbers, site: &Site) -> Self {
         Self {
-            config: config.clone(),
+            method: config.method,
+            person_box: config.person_box,
+            threshold: config.threshold,
+            numbers,
             access_points_m: site.access_points.iter().map(|ap| ap.position()).collect(),
             ue: site.ue,
             sampler: Sampler::default(),
@@ -39,7 +52,7 @@ impl Caster {
         blockages.clear();
         let people: Vec<(&Track, &Forecast)> =
             tracks.iter().zip(forecasts).filter(|(track, _)| track.confirmed).collect();
-        match self.config.method {
+        match self.method {
             BlockageMethod::Algorithm1 => self.cast_boxes(&people, blockages),
             BlockageMethod::Probability => self.cast_samples(&people, blockages),
         }
@@ -49,7 +62,7 @@ impl Caster {
     fn cast_boxes(&self, people: &[(&Track, &Forecast)], blockages: &mut Vec<Blockage>) {
         let boxes_now: Vec<PersonBox> = people
             .iter()
-            .map(|(track, _)| match self.config.person_box {
+            .map(|(track, _)| match self.person_box {
                 BoxKind::Aabb => PersonBox::Aabb(track.aabb),
                 BoxKind::Obb => PersonBox::Obb(track.obb),
             })
@@ -87,20 +100,20 @@ impl Caster {
         }
     }
 
-    /// Our way: bodies on sampled ways, a probability and a threshold.
+    /// Our way: bodies on sampled trajectories, a probability and a threshold.
     fn cast_samples(&mut self, people: &[(&Track, &Forecast)], blockages: &mut Vec<Blockage>) {
-        self.sampler.draw(&self.config, people);
+        self.sampler.draw(&self.numbers, people);
         for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
             for (person, (track, _)) in people.iter().enumerate() {
-                let chances = self.sampler.chances(&self.config, &self.ue, ap_m, person);
-                let blocked_now = chances.p_now >= self.config.threshold_now;
+                let chances = self.sampler.chances(&self.numbers, &self.ue, ap_m, person);
+                let blocked_now = chances.p_now >= self.threshold;
                 let (p, none) = (chances.p, [None; 3]);
                 blockages.push(Blockage {
                     access_point,
                     track: track.id,
                     blocked_now,
                     p_now: chances.p_now,
-                    blocked: std::array::from_fn(|w| p[w] >= self.config.threshold[w]),
+                    blocked: p.map(|p| p >= self.threshold),
                     p,
                     onset_s: if blocked_now { none } else { chances.onset_s },
                     duration_s: if blocked_now { chances.clear_s } else { chances.clear_again_s },

@@ -11,14 +11,14 @@ use crate::STEPS;
 #[derive(Debug, Clone)]
 pub(super) struct Draws {
     pub(super) state: [Vec<f64>; 4],
-    pub(super) kicks: [[Vec<f64>; 2]; STEPS],
+    pub(super) process_noise: [[Vec<f64>; 2]; STEPS],
     pub(super) height: Vec<f64>,
-    pub(super) girth: Vec<f64>,
+    pub(super) width: Vec<f64>,
     pub(super) heading: Vec<f64>,
     /// Even.
     pub(super) phase: Vec<f64>,
     /// Even.
-    pub(super) swing: Vec<f64>,
+    pub(super) arm_swing: Vec<f64>,
 }
 
 impl Draws {
@@ -29,12 +29,12 @@ impl Draws {
         let mut shuffled = |values: &[f64]| shuffled(values, &mut random);
         Self {
             state: std::array::from_fn(|_| shuffled(&normal)),
-            kicks: std::array::from_fn(|_| std::array::from_fn(|_| shuffled(&normal))),
+            process_noise: std::array::from_fn(|_| std::array::from_fn(|_| shuffled(&normal))),
             height: shuffled(&normal),
-            girth: shuffled(&normal),
+            width: shuffled(&normal),
             heading: shuffled(&normal),
             phase: shuffled(&even),
-            swing: shuffled(&even),
+            arm_swing: shuffled(&even),
         }
     }
 }
@@ -88,7 +88,7 @@ mod tests {
             values.sort_by(f64::total_cmp);
             values
         };
-        assert_eq!(sorted(&draws.state[0]), sorted(&draws.kicks[8][1]));
+        assert_eq!(sorted(&draws.state[0]), sorted(&draws.process_noise[8][1]));
         assert_ne!(draws.state[0], draws.state[1]);
         assert_ne!(draws.state[0], Draws::new(64, 1, 8).state[0]);
         assert_eq!(draws.phase, Draws::new(64, 1, 7).phase);

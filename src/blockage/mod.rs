@@ -1,12 +1,16 @@
 //! Stage 3: which links will be blocked by a body (paper, section IV-C).
 
+pub mod body_model;
 pub mod body;
 pub mod algorithm1;
 mod draws;
+pub mod numbers;
 pub mod probability;
 pub mod caster;
 
+pub use body_model::BodyModel;
 pub use caster::Caster;
+pub use numbers::Numbers;
 
 use crate::STEPS;
 

@@ -1,4 +1,4 @@
-//! The probability that a link is blocked, now and within each window: everybody's way is sampled together
+//! The probability that a link is blocked, now and within each window: everybody's trajectory is sampled together
 //! from the forecast's joint distribution, with body sizes, headings and the phase of the gait, and rays are cast in
 //! every sample. Steps of a window, and links that share a blocker, hang together as they do in reality.
 
@@ -8,17 +8,15 @@ use std::f64::consts::{PI, TAU};
 use super::body::{self, Posture, distance2_to_segment};
 use super::caster::{heading_at, position_at};
 use super::draws::Draws;
-use crate::config::BlockageConfig;
+use super::numbers::Numbers;
 use crate::forecast::Forecast;
+use crate::gait::{self, GaitPhase, WALKS_FROM_MPS};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
 use crate::track::Track;
-use crate::track::gait::{self, Gait};
 use crate::{STEP_S, STEPS};
 
-/// Below this speed a velocity says little about where somebody faces.
-const FACES_FROM_MPS: f64 = 0.3;
-/// Quantiles of times that are told.
+/// Quantiles of times that are reported.
 const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 
 /// What the samples say of one link.
@@ -43,14 +41,14 @@ pub struct Sampler {
     samples: usize,
     /// By track: what a person's samples are made of, drawn once.
     draws: BTreeMap<u64, Draws>,
-    people: Vec<Ways>,
+    people: Vec<Trajectories>,
     /// By sample: bit s set where the link is blocked at step s.
     blocked: Vec<u16>,
 }
 
 /// Samples of one person. Positions of step s, sample k at `s * samples + k`; step 0 is now.
 #[derive(Debug, Clone, Default)]
-struct Ways {
+struct Trajectories {
     positions_m: Vec<DVec2>,
     /// By step: the heading's unit vector, to be turned by the sample's `turn`.
     ahead: [DVec2; STEPS + 1],
@@ -68,35 +66,35 @@ struct Ways {
 struct Traits {
     turn: DVec2,
     height_m: f64,
-    girth: f64,
+    width_scale: f64,
     speed_mps: f64,
     phase_rad: f64,
     phase_step_rad: f64,
-    swing: f64,
+    arm_swing: f64,
 }
 
 impl Sampler {
-    /// Draws everybody's ways. A person's draws depend on the seed, the track and nothing else, so the samples
+    /// Draws everybody's trajectories. A person's draws depend on the seed, the track and nothing else, so the samples
     /// of one frame and the next differ only by what the tracks learned.
-    pub fn draw(&mut self, config: &BlockageConfig, people: &[(&Track, &Forecast)]) {
-        self.samples = config.samples;
-        self.people.resize_with(people.len(), Ways::default);
+    pub fn draw(&mut self, numbers: &Numbers, people: &[(&Track, &Forecast)]) {
+        self.samples = numbers.samples;
+        self.people.resize_with(people.len(), Trajectories::default);
         self.draws.retain(|&id, _| people.iter().any(|(track, _)| track.id == id));
-        for (ways, (track, forecast)) in self.people.iter_mut().zip(people) {
+        for (trajectories, (track, forecast)) in self.people.iter_mut().zip(people) {
             let draws = self
                 .draws
                 .entry(track.id)
-                .or_insert_with(|| Draws::new(config.samples, config.seed, track.id));
-            ways.fill(config, draws, track, forecast);
+                .or_insert_with(|| Draws::new(numbers.samples, numbers.seed, track.id));
+            trajectories.fill(numbers, draws, track, forecast);
         }
     }
 
     /// What becomes of the link of `person`.
-    pub fn chances(&mut self, config: &BlockageConfig, ue: &Ue, ap_m: DVec3, person: usize) -> Chances {
+    pub fn chances(&mut self, numbers: &Numbers, ue: &Ue, ap_m: DVec3, person: usize) -> Chances {
         self.blocked.clear();
         self.blocked.resize(self.samples, 0);
         for step in 0..=STEPS {
-            self.mark(config, ue, ap_m, person, step);
+            self.mark(numbers, ue, ap_m, person, step);
         }
         let blocked = &self.blocked;
         let share =
@@ -119,7 +117,7 @@ impl Sampler {
     }
 
     /// Sets the bit of `step` in the samples whose link is blocked then.
-    fn mark(&mut self, config: &BlockageConfig, ue: &Ue, ap_m: DVec3, person: usize, step: usize) {
+    fn mark(&mut self, numbers: &Numbers, ue: &Ue, ap_m: DVec3, person: usize, step: usize) {
         let q = &self.people[person];
         let ap = ap_m.truncate();
         let ue_reach_m = ue.forward_m.abs() + ue.left_m.abs();
@@ -138,7 +136,7 @@ impl Sampler {
                 let heading_rad = || q.ahead[step].rotate(q.traits[k].turn).to_angle();
                 let facing_rad = if ue_reach_m > 0.0 { heading_rad() } else { 0.0 };
                 let ue_m = ue.on_body(at_q, facing_rad, q.traits[k].height_m);
-                if body::blocks(&config.body, &p.posture(step, k, at_p), ap_m, ue_m) {
+                if body::blocks(&numbers.body, &p.posture(step, k, at_p), ap_m, ue_m) {
                     *blocked |= 1 << step;
                 }
             }
@@ -171,7 +169,7 @@ fn quantiles_s(steps: impl Iterator<Item = u32>) -> [Option<f64>; 3] {
 
 /// False where no sample of `p` can stand in the way of any sample of `q`: seen from above it is too far from
 /// the segment.
-fn may_block(ap_m: DVec3, ue: &Ue, q: &Ways, p: &Ways, step: usize) -> bool {
+fn may_block(ap_m: DVec3, ue: &Ue, q: &Trajectories, p: &Trajectories, step: usize) -> bool {
     let (start, end) = (ap_m.truncate(), q.center_m[step]);
     let along = end - start;
     let t = ((p.center_m[step] - start).dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
@@ -187,12 +185,12 @@ fn may_block(ap_m: DVec3, ue: &Ue, q: &Ways, p: &Ways, step: usize) -> bool {
     lowest_m <= p.height_max_m
 }
 
-impl Ways {
-    fn fill(&mut self, config: &BlockageConfig, draws: &Draws, track: &Track, forecast: &Forecast) {
-        let samples = config.samples;
+impl Trajectories {
+    fn fill(&mut self, numbers: &Numbers, draws: &Draws, track: &Track, forecast: &Forecast) {
+        let samples = numbers.samples;
         let state_root = root(&forecast.coupling.state);
-        // A constant acceleration over each step with the step's share of the white one.
-        let kick_root_mps2 = root(&forecast.coupling.acceleration_psd.map(|row| row.map(|psd| psd / STEP_S)));
+        // Process noise: a constant acceleration over each step with the step's share of the white one.
+        let noise_root_mps2 = root(&forecast.coupling.acceleration_psd_m2ps3.map(|row| row.map(|psd| psd / STEP_S)));
         self.positions_m.resize((STEPS + 1) * samples, DVec2::ZERO);
         self.traits.clear();
         let means: [DVec2; STEPS + 1] = std::array::from_fn(|s| position_at(track, forecast, s));
@@ -203,25 +201,25 @@ impl Ways {
             let e: [f64; 4] =
                 std::array::from_fn(|r| (0..=r).map(|c| state_root[r][c] * draws.state[c][k]).sum());
             let (mut offset, mut drift) = (DVec2::new(e[0], e[1]), DVec2::new(e[2], e[3]));
-            self.traits.push(Traits::new(config, draws, k, track, velocity, drift, &phases));
+            self.traits.push(Traits::new(numbers, draws, k, track, velocity, drift, &phases));
             for (s, &mean_m) in means.iter().enumerate() {
                 if s > 0 {
-                    let [x, y] = &draws.kicks[s - 1];
-                    let [[xx, _], [xy, yy]] = kick_root_mps2;
-                    let kick = DVec2::new(xx * x[k], xy * x[k] + yy * y[k]);
-                    offset += drift * STEP_S + kick * (0.5 * STEP_S * STEP_S);
-                    drift += kick * STEP_S;
+                    let [x, y] = &draws.process_noise[s - 1];
+                    let [[xx, _], [xy, yy]] = noise_root_mps2;
+                    let noise_mps2 = DVec2::new(xx * x[k], xy * x[k] + yy * y[k]);
+                    offset += drift * STEP_S + noise_mps2 * (0.5 * STEP_S * STEP_S);
+                    drift += noise_mps2 * STEP_S;
                 }
                 // Drawn each by itself: every step takes its positions from other samples.
-                let at = if config.joint { k } else { (k + s * 37) % samples };
+                let at = if numbers.joint { k } else { (k + s * 37) % samples };
                 self.positions_m[s * samples + at] = mean_m + offset;
             }
         }
         self.height_min_m = self.traits.iter().fold(f64::INFINITY, |a, b| a.min(b.height_m));
         self.height_max_m = self.traits.iter().fold(0.0, |a, b| a.max(b.height_m));
-        let girth_max = self.traits.iter().fold(1.0, |a: f64, b| a.max(b.girth));
+        let width_max = self.traits.iter().fold(1.0, |a: f64, b| a.max(b.width_scale));
         let fastest_mps = self.traits.iter().fold(0.0, |a: f64, b| a.max(b.speed_mps));
-        self.reach_m = body::reach_m(&config.body, self.height_max_m, girth_max, fastest_mps);
+        self.reach_m = body::reach_m(&numbers.body, self.height_max_m, width_max, fastest_mps);
         for s in 0..=STEPS {
             let center = means[s];
             self.center_m[s] = center;
@@ -238,17 +236,17 @@ impl Ways {
             position_m,
             ahead: self.ahead[step].rotate(t.turn),
             height_m: t.height_m,
-            girth: t.girth,
+            width_scale: t.width_scale,
             speed_mps: t.speed_mps,
             phase_rad: t.phase_rad + step as f64 * t.phase_step_rad,
-            swing: t.swing,
+            arm_swing: t.arm_swing,
         }
     }
 }
 
 impl Traits {
     fn new(
-        config: &BlockageConfig,
+        numbers: &Numbers,
         draws: &Draws,
         k: usize,
         track: &Track,
@@ -256,12 +254,11 @@ impl Traits {
         drift: DVec2,
         phases: &Phases,
     ) -> Self {
-        let height_sigma_m = track.height_sigma_m.hypot(config.height_sigma_m);
+        let height_sigma_m = track.height_sigma_m.hypot(numbers.height_sigma_m);
         let height_m = (track.height_m + height_sigma_m * draws.height[k]).max(0.5);
-        let girth_sigma = track.girth_sigma.hypot(config.girth_sigma);
         let speed_mps = (velocity + drift).length();
-        let trunk_rad = config.heading_sigma_deg.to_radians();
-        let turn_rad = if velocity.length() > FACES_FROM_MPS {
+        let trunk_rad = numbers.heading_sigma_rad;
+        let turn_rad = if velocity.length() > WALKS_FROM_MPS {
             // Who walks faces where he goes: an error of the velocity is one of the heading.
             velocity.perp_dot(drift) / velocity.length_squared() + trunk_rad * draws.heading[k]
         } else {
@@ -271,11 +268,11 @@ impl Traits {
         Self {
             turn: DVec2::from_angle(turn_rad),
             height_m,
-            girth: (track.girth + girth_sigma * draws.girth[k]).clamp(0.5, 1.8),
+            width_scale: (1.0 + numbers.width_sigma * draws.width[k]).clamp(0.5, 1.8),
             speed_mps,
             phase_rad: phases.at(draws.phase[k]),
             phase_step_rad: if stride_m > 0.0 { TAU * speed_mps * STEP_S / stride_m } else { 0.0 },
-            swing: if draws.swing[k] < config.body.arms.still_share { 0.0 } else { 1.0 },
+            arm_swing: if draws.arm_swing[k] < numbers.body.arms.still_share { 0.0 } else { 1.0 },
         }
     }
 }
@@ -292,7 +289,7 @@ const PHASES: usize = 48;
 
 impl Phases {
     /// Of a von Mises distribution.
-    pub fn new(gait: &Gait) -> Self {
+    pub fn new(gait: &GaitPhase) -> Self {
         let width_rad = TAU / PHASES as f64;
         let density = |i: usize| {
             let off_rad = (i as f64 + 0.5) * width_rad - PI;

@@ -1,59 +1,45 @@
 //! Values of the right kind that cannot work.
 
-use super::Config;
+use super::{Config, Mechanism};
 use crate::{Error, Site};
+
+/// More samples than this take longer than a frame lasts, and more memory than is there.
+const SAMPLES_MAX: usize = 16_384;
 
 /// Refuses them with key, what was expected and what was found.
 pub(super) fn check(config: &Config) -> Result<(), Error> {
-    let (track, detect, blockage) = (&config.track, &config.detect, &config.blockage);
-    if track.acceleration_m2ps3.is_empty() || track.acceleration_m2ps3.len() != track.model_share.len() {
+    let Config { detect, track, forecast, blockage, .. } = config;
+    more_than_0("detect.highest_m", detect.highest_m)?;
+    more_than_0("track.clutter_per_m2", track.clutter_per_m2)?;
+    more_than_0("track.coast_max_s", track.coast_max_s)?;
+    if !(0.0..10.0).contains(&detect.thin_m) {
+        return Err(Error::new(format!("detect.thin_m: expected 0 to 10, found {}", detect.thin_m)));
+    }
+    if !(1..=SAMPLES_MAX).contains(&blockage.samples) {
+        let found = blockage.samples;
+        return Err(Error::new(format!("blockage.samples: expected 1 to {SAMPLES_MAX}, found {found}")));
+    }
+    if !(blockage.threshold > 0.0 && blockage.threshold <= 1.0) {
+        let found = blockage.threshold;
         return Err(Error::new(format!(
-            "track: expected one acceleration_m2ps3 and one model_share for each motion model, found {} and {}",
-            track.acceleration_m2ps3.len(),
-            track.model_share.len()
+            "blockage.threshold: expected more than 0 and at most 1, found {found}"
         )));
     }
-    let positive = [
-        ("detect.cluster.radius_m", detect.cluster.radius_m),
-        ("detect.background.voxel_m", detect.background.voxel_m),
-        ("detect.background.azimuth_bin_deg", detect.background.azimuth_bin_deg),
-        ("detect.split.lambda_m", detect.split.lambda_m),
-        ("track.model_dwell_s", track.model_dwell_s),
-        ("track.sway_lasts_s", track.sway_lasts_s),
-        ("track.swing_m2", track.swing_m2),
-        ("track.swing_noise_m2", track.swing_noise_m2),
-        ("track.noise_floor_m", track.noise_floor_m),
-        ("track.height_sigma_m", track.height_sigma_m),
-        ("track.box_average_s", track.box_average_s),
-        ("site.hall.length_m", config.site.hall.length_m),
-        ("site.hall.width_m", config.site.hall.width_m),
-        ("site.hall.height_m", config.site.hall.height_m),
-    ];
-    positive.into_iter().try_for_each(|(key, value)| more_than_0(key, value))?;
-    if !(0.0..1.0).contains(&track.children_share) {
-        return Err(Error::new(format!(
-            "track.children_share: expected 0 or more and less than 1, found {}",
-            track.children_share
-        )));
-    }
-    let mut bottom = 0.0;
-    for slice in &blockage.body.slices {
-        if !(slice.top > bottom && slice.half_depth > 0.0 && slice.half_width > 0.0) {
-            return Err(Error::new(format!(
-                "blockage.body.slices: expected half axes above 0 and a top above {bottom}, found {slice:?}"
-            )));
+    for (stage, without) in [
+        ("detect", &detect.without),
+        ("track", &track.without),
+        ("forecast", &forecast.without),
+        ("blockage", &blockage.without),
+    ] {
+        if let Some(foreign) = without.iter().find(|mechanism| !mechanism.stages().contains(&stage)) {
+            let own: Vec<&str> = Mechanism::ALL
+                .iter()
+                .filter(|mechanism| mechanism.stages().contains(&stage))
+                .map(|mechanism| mechanism.name())
+                .collect();
+            let (own, found) = (own.join(", "), foreign.name());
+            return Err(Error::new(format!("{stage}.without: expected {own}, found {found}")));
         }
-        bottom = slice.top;
-    }
-    if blockage.samples == 0 {
-        return Err(Error::new("blockage.samples: expected 1 or more, found 0"));
-    }
-    if let Some(t) = blockage.threshold.windows(2).find(|t| t[1] > t[0]) {
-        return Err(Error::new(format!(
-            "blockage.threshold: expected values that do not rise with the window (a link blocked within 600 ms \
-             is blocked within 900 ms), found {} after {}",
-            t[1], t[0]
-        )));
     }
     site(&config.site)
 }
@@ -69,6 +55,10 @@ fn site(site: &Site) -> Result<(), Error> {
         if let Some((_, twice)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
             return Err(Error::new(format!("{key}: expected a name for each, found {twice:?} twice")));
         }
+    }
+    let hall = &site.hall;
+    for (key, size_m) in [("length_m", hall.length_m), ("width_m", hall.width_m), ("height_m", hall.height_m)] {
+        more_than_0(&format!("site.hall.{key}"), size_m)?;
     }
     for sensor in &site.sensors {
         more_than_0(&format!("site.sensors {}: rate_hz", sensor.name), sensor.rate_hz)?;
@@ -94,16 +84,12 @@ mod tests {
     #[test]
     fn what_cannot_work_is_refused_with_its_key() {
         for (text, key) in [
-            ("[track]\nmodel_share = [1.0]", "model_share"),
-            ("[detect.cluster]\nradius_m = 0.0", "detect.cluster.radius_m"),
-            ("[track]\nheight_sigma_m = nan", "track.height_sigma_m"),
-            ("[track]\nchildren_share = 1.0", "track.children_share"),
+            ("[detect]\nhighest_m = 0.0", "detect.highest_m"),
+            ("[detect]\nthin_m = -1.0", "detect.thin_m"),
+            ("[track]\ncoast_max_s = nan", "track.coast_max_s"),
+            ("[track]\nwithout = [\"arms\"]", "track.without"),
             ("[blockage]\nsamples = 0", "blockage.samples"),
-            (
-                "[blockage.body]\nslices = [{ top = 0.0, half_depth = 0.1, half_width = 0.1, ahead = 0.0 }]",
-                "blockage.body.slices",
-            ),
-            ("[blockage]\nthreshold = [0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.4, 0.5]", "blockage.threshold"),
+            ("[blockage]\nthreshold = 1.5", "blockage.threshold"),
             ("[site]\nsensors = []", "site.sensors"),
             ("[[site.pillars]]\nposition_m = [1.0, 2.0]\nradius_m = -1.0", "site.pillars: radius_m"),
             (

@@ -1,6 +1,8 @@
-//! Switches of `forecast`.
+//! Choices of `forecast`.
 
 use serde::{Deserialize, Serialize};
+
+use super::Mechanism;
 
 /// See `config/default.toml` for every value and its reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -8,16 +10,12 @@ use serde::{Deserialize, Serialize};
 pub struct ForecastConfig {
     /// Who foresees.
     pub method: ForecastMethod,
-    /// How much of the learned departure is believed.
-    pub believed: f64,
-    /// Whether the network is shown a person's neighbours.
-    pub neighbours: bool,
-    /// Spectral density of the unforeseen acceleration, each axis.
-    pub acceleration_psd_m2ps3: f64,
     /// How the LSTM goes on from one step to the next.
     pub rollout: Rollout,
     /// Of the draws.
     pub seed: u64,
+    /// Mechanisms left out.
+    pub without: Vec<Mechanism>,
 }
 
 /// Who foresees.

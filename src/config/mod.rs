@@ -1,24 +1,22 @@
-//! Every switch of the runtime. The defaults live in `config/default.toml`, embedded here; the other modes are
-//! the differences in `config/paper.toml` and `config/hdl.toml`. A user's file is laid over the mode's values.
+//! Every setting of the runtime. The defaults live in `config/default.toml`, embedded here; `config/paper.toml` holds what
+//! the mode `paper` has otherwise, `config/hdl.toml` what `hdl` has other than that. A user's file is laid over the mode's
+//! values.
 
+mod mechanism;
 mod detect;
 mod track;
 mod forecast;
 mod blockage;
 mod overlay;
 mod check;
-mod mechanism;
 
 use serde::{Deserialize, Serialize};
 
-pub use blockage::{ArmsConfig, BlockageConfig, BlockageMethod, BodyConfig, BoxKind, SliceConfig};
-pub use detect::{
-    BackgroundConfig, BackgroundMethod, ClusterConfig, DetectConfig, EvidenceConfig, MeasureConfig,
-    MergeMean, ObbAxes, PositionMethod, SplitConfig, SplitMethod,
-};
+pub use blockage::{BlockageConfig, BlockageMethod, BoxKind};
+pub use detect::{BackgroundMethod, ClusterMethod, DetectConfig, PositionMethod};
 pub use forecast::{ForecastConfig, ForecastMethod, Rollout};
 pub use mechanism::Mechanism;
-pub use track::{Assignment, Boxes, GateOn, MeasuredAt, ProcessNoise, TrackConfig};
+pub use track::{TrackConfig, TrackMethod};
 
 use crate::{Error, Site};
 
@@ -97,7 +95,7 @@ impl Config {
     pub fn with_overlay(mode: Mode, text: &str, file: &str) -> Result<Self, Error> {
         let mut layers = vec![("config/default.toml", DEFAULT_TOML)];
         match mode {
-            Mode::Hdl => layers.push(("config/hdl.toml", HDL_TOML)),
+            Mode::Hdl => layers.extend([("config/paper.toml", PAPER_TOML), ("config/hdl.toml", HDL_TOML)]),
             Mode::Paper => layers.push(("config/paper.toml", PAPER_TOML)),
             Mode::Default => {}
         }

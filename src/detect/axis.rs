@@ -2,11 +2,11 @@
 //!
 //! One hidden layer of `tanh`. It is asked twice, for the view and for its mirror image, so that mirrored people stand
 //! at mirrored places. It ships as `models/body_axis.toml`; data and scores are in the card beside it. It was
-//! fitted on simulated returns by `cargo run --release -p umbracast-eval --example fit_bias`.
+//! fitted on simulated returns by `umbracast train axis`.
 
 use serde::Deserialize;
 
-use super::bias::{EVEN, ODD, View};
+use super::features::{AxisFeatures, EVEN, ODD};
 use crate::Error;
 use crate::geometry::DVec2;
 
@@ -79,7 +79,7 @@ impl AxisModel {
     }
 
     /// Ground point of the body axis, and the covariance of its error, m^2.
-    pub fn locate(&self, view: &View) -> (DVec2, [[f64; 2]; 2]) {
+    pub fn locate(&self, view: &AxisFeatures) -> (DVec2, [[f64; 2]; 2]) {
         let (own, mirrored) =
             (self.forward(&view.even, &view.odd), self.forward(&view.even, &view.odd.map(|x| -x)));
         let offset = DVec2::new(own[0] + mirrored[0], own[1] - mirrored[1]) * (0.5 * UNIT_M);

@@ -3,18 +3,41 @@
 use super::range_model::RangeModel;
 use super::voxel::{VoxelMap, thin};
 use super::{Point, Prior};
-use crate::config::{BackgroundConfig, BackgroundMethod, DetectConfig};
+use crate::config::{BackgroundMethod, DetectConfig};
 use crate::geometry::{DVec3, Pose};
 use crate::lidar::{Azimuths, Cloud, RangeImage, Scan, SensorPoint};
-use crate::{Error, Frame, Health, Site};
+use crate::site::Sensor;
+use crate::{Frame, Health, Site};
+
+/// Width of a pixel of an organised scan: a little more than one column of a sensor at 10 Hz.
+const AZIMUTH_BIN_DEG: f64 = 0.2;
+/// The same of an unorganised cloud, whose columns are not known: a VLP-16 at 20 Hz fires every 0.4 degrees.
+const CLOUD_AZIMUTH_BIN_DEG: f64 = 1.0;
+const CLOUD_ELEVATION_BIN_DEG: f64 = 0.5;
+/// A return is new when it is nearer than the background by so many standard deviations of the sensor's range,
+const MARGIN_SIGMAS: f64 = 5.0;
+/// and at least by this.
+const MARGIN_MIN_M: f64 = 0.05;
+/// Somebody who stands still must not be learned: nothing is within this distance of an expected person.
+const FREEZE_M: f64 = 0.5;
+/// Lower points are the floor's.
+const LOWEST_M: f64 = 0.03;
+/// Most foreground points kept of one frame: 100 people close to the sensors. Bounds the time of a frame.
+const POINTS_MAX: usize = 40_000;
+/// Voxels: hdl_people_tracking's edge and threshold.
+const VOXEL_M: f64 = 0.2;
+const VOXEL_POINTS_MIN: u8 = 2;
+/// So many empty scans make the voxel map. The adapted code takes one; with our columns, which do not repeat from turn
+/// to turn, one leaves some 9,000 points of the hall a frame to be taken for people.
+const MAP_REVOLUTIONS: u32 = 20;
 
 /// What the empty scene looks like to each sensor.
 #[derive(Debug, Clone)]
 pub struct Background {
-    config: BackgroundConfig,
+    method: BackgroundMethod,
+    thin_m: f64,
     sensors: Vec<SensorModel>,
-    half_length_m: f64,
-    half_width_m: f64,
+    clip: Clip,
     /// True once an empty frame was given: then nothing more is learned.
     known: bool,
     map: Option<VoxelMap>,
@@ -49,53 +72,40 @@ struct Return {
 
 impl Background {
     /// Knows nothing yet.
-    ///
-    /// # Errors
-    /// A bin, voxel or share that is not positive.
-    pub fn new(config: &DetectConfig, site: &Site) -> Result<Self, Error> {
-        let config = config.background.clone();
-        for (name, value) in [
-            ("azimuth_bin_deg", config.azimuth_bin_deg),
-            ("cloud_azimuth_bin_deg", config.cloud_azimuth_bin_deg),
-            ("cloud_elevation_bin_deg", config.cloud_elevation_bin_deg),
-            ("voxel_m", config.voxel_m),
-        ] {
-            if !(value > 0.0 && value < 360.0) {
-                return Err(Error::new(format!(
-                    "detect.background.{name}: expected a number above 0 and below 360, found {value}"
-                )));
-            }
-        }
-        let sensors = site
-            .sensors
-            .iter()
-            .map(|sensor| SensorModel {
-                range_min_m: sensor.range_min_m as f32,
-                range_max_m: sensor.range_max_m as f32,
-                ranges: RangeModel::new(&config, config.azimuth_bin_deg),
-                cloud_ranges: RangeModel::new(&config, config.cloud_azimuth_bin_deg),
-                row_of_elevation: vec![None; (180.0 / config.cloud_elevation_bin_deg) as usize + 3],
-                elevation_bins_per_rad: 1.0_f64.to_degrees() / config.cloud_elevation_bin_deg,
-                returns: Vec::new(),
-            })
-            .collect();
-        Ok(Self {
-            sensors,
-            half_length_m: site.hall.length_m * 0.5 - config.wall_m,
-            half_width_m: site.hall.width_m * 0.5 - config.wall_m,
+    pub fn new(config: &DetectConfig, site: &Site) -> Self {
+        let ranges = |sensor: &Sensor, bin_deg| {
+            RangeModel::new((MARGIN_SIGMAS * sensor.range_noise_m).max(MARGIN_MIN_M), bin_deg)
+        };
+        let sensor = |sensor: &Sensor| SensorModel {
+            range_min_m: sensor.range_min_m as f32,
+            range_max_m: sensor.range_max_m as f32,
+            ranges: ranges(sensor, AZIMUTH_BIN_DEG),
+            cloud_ranges: ranges(sensor, CLOUD_AZIMUTH_BIN_DEG),
+            row_of_elevation: vec![None; (180.0 / CLOUD_ELEVATION_BIN_DEG) as usize + 3],
+            elevation_bins_per_rad: 1.0_f64.to_degrees() / CLOUD_ELEVATION_BIN_DEG,
+            returns: Vec::new(),
+        };
+        Self {
+            method: config.background,
+            thin_m: config.thin_m,
+            sensors: site.sensors.iter().map(sensor).collect(),
+            clip: Clip {
+                half_length_m: site.hall.length_m * 0.5,
+                half_width_m: site.hall.width_m * 0.5,
+                highest_m: config.highest_m,
+            },
             known: false,
             map: None,
             map_scans: 0,
             keys: Vec::new(),
             thinned: Vec::new(),
             azimuths: None,
-            config,
-        })
+        }
     }
 
     /// Learns from a frame without people (the paper's global map).
     pub fn learn_empty(&mut self, frame: &Frame) {
-        match self.config.method {
+        match self.method {
             BackgroundMethod::RangeImage => {
                 self.known = true;
                 let mut nothing = Vec::new();
@@ -104,7 +114,7 @@ impl Background {
                     self.scan(scan, Some(learn), &mut Health::default(), &mut nothing);
                 }
             }
-            BackgroundMethod::Voxel => {
+            BackgroundMethod::Voxels => {
                 let mut points = Vec::new();
                 self.all_points(frame, &mut Health::default(), &mut points);
                 self.learn_map(&points);
@@ -122,37 +132,36 @@ impl Background {
         points: &mut Vec<Point>,
     ) {
         points.clear();
-        match self.config.method {
+        match self.method {
             BackgroundMethod::RangeImage => {
-                let learn = Learn { on_the_way: true, priors, freeze_m: self.config.freeze_m };
+                let learn = Learn { on_the_way: true, priors, freeze_m: FREEZE_M };
                 for scan in &frame.scans {
                     let learn = (!self.known).then_some(learn);
                     self.scan(scan, learn, health, points);
                 }
             }
-            BackgroundMethod::Voxel => {
+            BackgroundMethod::Voxels => {
                 self.all_points(frame, health, points);
                 // Without an empty scan the first cloud is the map, and nothing changes it after, as in the
                 // adapted code: who stands in it is never seen.
-                let map = self.map.get_or_insert_with(|| VoxelMap::new(self.config.voxel_m, points));
-                points.retain(|p| map.is_new(p.position_m, self.config.voxel_points));
-                if self.config.thin_m == 0.0 {
+                let map = self.map.get_or_insert_with(|| VoxelMap::new(VOXEL_M, points));
+                points.retain(|p| map.is_new(p.position_m, VOXEL_POINTS_MIN));
+                if self.thin_m == 0.0 {
                     // DP-means depends on the order; a thinned cloud has one already, its voxels'.
                     points.sort_unstable_by(in_space);
                 }
             }
         }
-        let limit = self.config.points_limit;
-        health.points_over_limit += points.len().saturating_sub(limit) as u64;
-        points.truncate(limit);
+        health.points_over_limit += points.len().saturating_sub(POINTS_MAX) as u64;
+        points.truncate(POINTS_MAX);
     }
 
     /// Adds a scan to the map until it has enough.
     fn learn_map(&mut self, points: &[Point]) {
-        if self.map_scans < self.config.map_revolutions {
+        if self.map_scans < MAP_REVOLUTIONS {
             match &mut self.map {
                 Some(map) => map.add(points),
-                None => self.map = Some(VoxelMap::new(self.config.voxel_m, points)),
+                None => self.map = Some(VoxelMap::new(VOXEL_M, points)),
             }
             self.map_scans += 1;
         }
@@ -189,19 +198,14 @@ impl Background {
                 }
             }
         }
-        if self.config.thin_m > 0.0 {
-            thin(points, self.config.thin_m, &mut self.keys, &mut self.thinned);
+        if self.thin_m > 0.0 {
+            thin(points, self.thin_m, &mut self.keys, &mut self.thinned);
         }
     }
 
     /// One scan against its sensor's range image; what is new goes to `points`.
     fn scan(&mut self, scan: &Scan, learn: Option<Learn>, health: &mut Health, points: &mut Vec<Point>) {
-        let clip = Clip {
-            half_length_m: self.half_length_m,
-            half_width_m: self.half_width_m,
-            z_min_m: self.config.z_min_m,
-            z_max_m: self.config.z_max_m,
-        };
+        let clip = self.clip;
         let Some(sensor) = self.sensors.get_mut(scan.sensor) else { return };
         match &scan.cloud {
             Cloud::Organised(image) => sensor.organised(scan, image, &clip, learn, health, points),
@@ -237,20 +241,20 @@ impl Learn<'_> {
     }
 }
 
-/// Where people can be.
+/// Where people can be: the hall is known, so what lies outside is a reflection.
+#[derive(Debug, Clone, Copy)]
 struct Clip {
     half_length_m: f64,
     half_width_m: f64,
-    z_min_m: f64,
-    z_max_m: f64,
+    highest_m: f64,
 }
 
 impl Clip {
     fn holds(&self, p: DVec3) -> bool {
         p.x.abs() <= self.half_length_m
             && p.y.abs() <= self.half_width_m
-            && p.z >= self.z_min_m
-            && p.z <= self.z_max_m
+            && p.z >= LOWEST_M
+            && p.z <= self.highest_m
     }
 }
 

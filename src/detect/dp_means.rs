@@ -1,15 +1,30 @@
 //! Haselich's split-merge as hdl_people_tracking adapted it: DP-means, then a merge where no gap is seen (facts
 //! and values: koide3/hdl_people_tracking at 2d12516). Depends on the order of the points, as the original does.
 
-use crate::config::{MergeMean, SplitConfig};
 use crate::geometry::DVec2;
 
-/// Labels of the points after DP-means: a point farther than `lambda_m` from every centroid starts a new one, at
-/// most one a pass; until no label changes or `passes` are done.
-pub fn split(points_m: &[DVec2], lambda_m: f64, passes: u32) -> Vec<usize> {
+/// A point farther than this from every centroid starts a new cluster.
+const LAMBDA_M: f64 = 0.45;
+/// Most passes.
+const PASSES: u32 = 128;
+/// Clusters whose means are farther apart are not merged.
+const MERGE_M: f64 = 0.8;
+
+/// What the gap test of the merge takes for a cluster's mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MergeMean {
+    /// The sum of the points, never divided: the adapted code's bug, which keeps it from ever merging.
+    Sum,
+    /// The mean, as published.
+    Mean,
+}
+
+/// Labels of the points after DP-means: a point farther than [`LAMBDA_M`] from every centroid starts a new one, at
+/// most one a pass; until no label changes or all passes are done.
+pub fn split(points_m: &[DVec2]) -> Vec<usize> {
     let mut labels = vec![0; points_m.len()];
     let mut centroids_m = vec![DVec2::ZERO];
-    for _ in 0..passes {
+    for _ in 0..PASSES {
         centroids_m = means(points_m, &labels, centroids_m.len());
         let (mut changed, mut grown) = (false, false);
         for (&p, label) in points_m.iter().zip(&mut labels) {
@@ -20,7 +35,7 @@ pub fn split(points_m: &[DVec2], lambda_m: f64, passes: u32) -> Vec<usize> {
                     nearest = (d, j);
                 }
             }
-            if !grown && nearest.0 > lambda_m * lambda_m {
+            if !grown && nearest.0 > LAMBDA_M * LAMBDA_M {
                 grown = true;
                 nearest.1 = centroids_m.len();
                 centroids_m.push(p);
@@ -47,12 +62,12 @@ fn means(points_m: &[DVec2], labels: &[usize], n: usize) -> Vec<DVec2> {
 
 /// For each part the one it is merged into, itself where it stays: two parts are merged when their "means" are
 /// near and no gap lies between.
-pub fn merge(parts: &[Vec<DVec2>], config: &SplitConfig) -> Vec<usize> {
+pub fn merge(parts: &[Vec<DVec2>], mean: MergeMean) -> Vec<usize> {
     let means_m: Vec<DVec2> = parts
         .iter()
         .map(|part| {
             let sum: DVec2 = part.iter().copied().sum();
-            match config.merge_mean {
+            match mean {
                 // The original never divides, so that "means" are nearly always far apart and nothing is merged.
                 MergeMean::Sum => sum,
                 MergeMean::Mean => sum / part.len() as f64,
@@ -63,7 +78,7 @@ pub fn merge(parts: &[Vec<DVec2>], config: &SplitConfig) -> Vec<usize> {
     for i in 0..parts.len() {
         for j in i + 1..parts.len() {
             let apart_m = means_m[i].distance(means_m[j]);
-            if apart_m > config.merge_m || has_gap(means_m[i], means_m[j], &parts[i], &parts[j]) {
+            if apart_m > MERGE_M || has_gap(means_m[i], means_m[j], &parts[i], &parts[j]) {
                 continue;
             }
             if into[j] == j || means_m[into[j]].distance(means_m[j]) > apart_m {
@@ -104,7 +119,6 @@ fn has_gap(mean_a_m: DVec2, mean_b_m: DVec2, a: &[DVec2], b: &[DVec2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Config, Mode};
 
     fn disc(x: f64, y: f64) -> Vec<DVec2> {
         (0..24).map(|i| DVec2::new(x, y) + DVec2::from_angle(f64::from(i)) * 0.2).collect()
@@ -112,9 +126,9 @@ mod tests {
 
     #[test]
     fn one_disc_stays_whole_and_two_come_apart() {
-        assert!(split(&disc(3.0, 4.0), 0.45, 128).iter().all(|&l| l == 0));
+        assert!(split(&disc(3.0, 4.0)).iter().all(|&l| l == 0));
         let two = [disc(3.0, 4.0), disc(3.9, 4.0)].concat();
-        let labels = split(&two, 0.45, 128);
+        let labels = split(&two);
         assert!(labels[..24].iter().all(|&l| l == labels[0]));
         assert!(labels[24..].iter().all(|&l| l == labels[24] && l != labels[0]));
     }
@@ -122,7 +136,7 @@ mod tests {
     #[test]
     fn the_undivided_sum_never_merges_where_the_mean_does() {
         let parts = [disc(3.0, 4.0), disc(3.3, 4.0)];
-        assert_eq!(merge(&parts, &Config::for_mode(Mode::Paper).detect.split), [0, 0]);
-        assert_eq!(merge(&parts, &Config::for_mode(Mode::Hdl).detect.split), [0, 1]);
+        assert_eq!(merge(&parts, MergeMean::Mean), [0, 0]);
+        assert_eq!(merge(&parts, MergeMean::Sum), [0, 1]);
     }
 }

@@ -3,9 +3,25 @@
 
 use super::guided::owners;
 use super::{Cluster, Prior};
-use crate::config::EvidenceConfig;
 use crate::geometry::{DVec2, DVec3};
 
+/// Two people when the means of the halves of a cluster lie farther apart than this: the halves of one body are at most
+/// 0.35 m apart, of two side by side 0.45 m.
+const HALVES_M: f64 = 0.42;
+/// The same where two people are known, who may come closer.
+const EXPECTED_HALVES_M: f64 = 0.3;
+/// A point or part nearer than this to an expected person may be that person.
+const EXPECTED_M: f64 = 0.3;
+/// What ends below this height is legs alone: the hips of most adults.
+pub(super) const FULL_BODY_TOP_M: f64 = 0.9;
+/// Least points of a person.
+pub(super) const POINTS_MIN: usize = 5;
+/// Parts whose means are nearer than this are one person: nobody's body axis comes nearer to another's.
+const ONE_PERSON_M: f64 = 0.33;
+/// A low part nearer than this to a person is a leg: half a stride.
+const LIMB_M: f64 = 0.55;
+/// Low: its top is below this share of the person's, for a leg ends below the hip.
+const LIMB_TOP_SHARE: f64 = 0.55;
 /// Passes of k-means; it settles in three or four.
 const PASSES: usize = 10;
 /// Points that deviate more than this along their longest axis are more than four people in a row.
@@ -40,34 +56,33 @@ pub fn split(
     moved_m: &[DVec3],
     priors: &[Prior],
     cluster: Cluster,
-    config: &EvidenceConfig,
     parts: &mut Vec<Part>,
 ) {
-    if cluster.len() < 2 * config.points_min {
+    if cluster.len() < 2 * POINTS_MIN {
         parts.push(Part::new(moved_m, cluster));
         return;
     }
-    let whole = Part::new(moved_m, cluster);
-    let axis_m = long_axis(moved_m, &whole);
+    let all = Part::new(moved_m, cluster);
+    let axis_m = long_axis(moved_m, &all);
     if axis_m.length() > CROWD_M {
         // The work grows with the square of the people, so a crowd is halved first; whom the cut divides, the
         // merge makes whole again.
-        let ends_m = vec![whole.mean_m() - axis_m, whole.mean_m() + axis_m];
-        for half in means(moved_m, &whole.points, ends_m).into_iter().flatten() {
-            split(moved_m, priors, half.points, config, parts);
+        let ends_m = vec![all.mean_m() - axis_m, all.mean_m() + axis_m];
+        for half in means(moved_m, &all.points, ends_m).into_iter().flatten() {
+            split(moved_m, priors, half.points, parts);
         }
         return;
     }
-    let cluster = &whole.points;
-    let expected_m = expected(moved_m, priors, cluster, config);
+    let cluster = &all.points;
+    let expected_m = expected(moved_m, priors, cluster);
     let mut people = means(moved_m, cluster, expected_m)
-        .filter(|people| are_people(people, config.expected_halves_m, config))
-        .unwrap_or_else(|| vec![whole.clone()]);
+        .filter(|people| are_people(people, EXPECTED_HALVES_M))
+        .unwrap_or_else(|| vec![all.clone()]);
     // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
     // are never counted: two of them may be one person or two.
     while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
-        && are_people(&more, config.halves_m, config)
-        && more.iter().all(|part| part.top_m >= config.whole_top_m)
+        && are_people(&more, HALVES_M)
+        && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
     {
         people = more;
     }
@@ -75,15 +90,15 @@ pub fn split(
 }
 
 /// True when all stand apart and show enough.
-fn are_people(parts: &[Part], apart_m: f64, config: &EvidenceConfig) -> bool {
+fn are_people(parts: &[Part], apart_m: f64) -> bool {
     let apart = |k: usize, a: &Part| parts[k + 1..].iter().all(|b| a.mean_m().distance(b.mean_m()) > apart_m);
-    parts.iter().enumerate().all(|(k, a)| a.points.len() >= config.points_min && apart(k, a))
+    parts.iter().enumerate().all(|(k, a)| a.points.len() >= POINTS_MIN && apart(k, a))
 }
 
 /// Joins parts that are one person, nearest first: those nearer than two people can stand, and legs that lost
 /// their body.
-pub fn merge(parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
-    let reach_m = config.one_person_m.max(config.limb_m);
+pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
+    let reach_m = ONE_PERSON_M.max(LIMB_M);
     let mut order: Vec<usize> = (0..parts.len()).collect();
     order.sort_by(|&a, &b| parts[a].mean_m().x.total_cmp(&parts[b].mean_m().x));
     let mut candidates = Vec::new();
@@ -109,7 +124,7 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
     };
     for (_, i, j) in candidates {
         let (i, j) = (root(&into, i), root(&into, j));
-        if i == j || !is_one_person(&parts[i], &parts[j], priors, config) {
+        if i == j || !is_one_person(&parts[i], &parts[j], priors) {
             continue;
         }
         join(parts, i, j);
@@ -120,13 +135,13 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
 
 /// Gives the points of pieces to the expected people whose bodies are nowhere: legs where the beams pass below the
 /// hips, or the few points that others let through. Without an expected person such pieces are nobody.
-pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], config: &EvidenceConfig) {
+pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
     let people: Vec<&Prior> = priors.iter().filter(|prior| prior.confirmed).collect();
     let off_m = |part: &Part, k: usize| people[k].position_m.distance(part.mean_m());
     let is_near = |part: &Part, k: usize| {
-        off_m(part, k) < config.limb_m + people[k].position_sigma_m.min(config.limb_m)
+        off_m(part, k) < LIMB_M + people[k].position_sigma_m.min(LIMB_M)
     };
-    let (bodies, pieces): (Vec<Part>, Vec<Part>) = parts.drain(..).partition(|part| !is_piece(part, config));
+    let (bodies, pieces): (Vec<Part>, Vec<Part>) = parts.drain(..).partition(|part| !is_piece(part));
     let mut has_body = vec![false; people.len()];
     for body in &bodies {
         let near = (0..people.len()).filter(|&k| is_near(body, k));
@@ -151,8 +166,8 @@ pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], c
 }
 
 /// True for what may be somebody's leg or head, but does not look like a whole person.
-fn is_piece(part: &Part, config: &EvidenceConfig) -> bool {
-    part.points.len() < config.points_min || part.top_m < config.whole_top_m
+fn is_piece(part: &Part) -> bool {
+    part.points.len() < POINTS_MIN || part.top_m < FULL_BODY_TOP_M
 }
 
 /// Moves the points of part `j` to part `i`.
@@ -170,31 +185,31 @@ fn tidy(parts: &mut Vec<Part>) {
     parts.iter_mut().for_each(|part| part.points.sort_unstable());
 }
 
-fn is_one_person(a: &Part, b: &Part, priors: &[Prior], config: &EvidenceConfig) -> bool {
+fn is_one_person(a: &Part, b: &Part, priors: &[Prior]) -> bool {
     let apart_m = a.mean_m().distance(b.mean_m());
-    if apart_m < config.one_person_m {
-        return !are_expected_apart(a.mean_m(), b.mean_m(), priors, config);
+    if apart_m < ONE_PERSON_M {
+        return !are_expected_apart(a.mean_m(), b.mean_m(), priors);
     }
     // A leg in mid-stride stands apart from its body, is low, and shows less.
     let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
-    apart_m < config.limb_m && small.top_m < config.limb_top_share * large.top_m
+    apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m
 }
 
 /// True when each of the two is where another confirmed person is expected.
-fn are_expected_apart(a_m: DVec2, b_m: DVec2, priors: &[Prior], config: &EvidenceConfig) -> bool {
+fn are_expected_apart(a_m: DVec2, b_m: DVec2, priors: &[Prior]) -> bool {
     let nearest = |p_m: DVec2| {
         let confirmed = priors.iter().filter(|prior| prior.confirmed).map(|prior| prior.position_m);
         confirmed.min_by(|a, b| a.distance_squared(p_m).total_cmp(&b.distance_squared(p_m)))
     };
     let (Some(p), Some(q)) = (nearest(a_m), nearest(b_m)) else { return false };
-    let own = |prior_m: DVec2, p_m: DVec2| prior_m.distance(p_m) < config.expected_m;
-    p.distance(q) > config.expected_halves_m && own(p, a_m) && own(q, b_m)
+    let own = |prior_m: DVec2, p_m: DVec2| prior_m.distance(p_m) < EXPECTED_M;
+    p.distance(q) > EXPECTED_HALVES_M && own(p, a_m) && own(q, b_m)
 }
 
 /// Where confirmed people are expected within the cluster.
-fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32], config: &EvidenceConfig) -> Vec<DVec2> {
+fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> Vec<DVec2> {
     let is_inside = |prior: &&Prior| {
-        let near = |i: &u32| moved_m[*i as usize].truncate().distance(prior.position_m) < config.expected_m;
+        let near = |i: &u32| moved_m[*i as usize].truncate().distance(prior.position_m) < EXPECTED_M;
         prior.confirmed && cluster.iter().any(near)
     };
     priors.iter().filter(is_inside).map(|prior| prior.position_m).collect()
@@ -262,7 +277,6 @@ fn means(moved_m: &[DVec3], cluster: &[u32], mut means_m: Vec<DVec2>) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Config;
 
     /// An upright body of 0.26 x 0.5 m, broad along y.
     fn body(x: f64, y: f64) -> Vec<DVec3> {
@@ -275,10 +289,9 @@ mod tests {
     }
 
     fn people(points_m: &[DVec3], priors: &[Prior]) -> usize {
-        let config = Config::default().detect.split.evidence;
         let mut parts = Vec::new();
-        split(points_m, priors, (0..points_m.len() as u32).collect(), &config, &mut parts);
-        merge(&mut parts, priors, &config);
+        split(points_m, priors, (0..points_m.len() as u32).collect(), &mut parts);
+        merge(&mut parts, priors);
         parts.len()
     }
 
@@ -308,13 +321,12 @@ mod tests {
 
     #[test]
     fn two_legs_become_one_person_where_one_is_expected_and_stay_pieces_elsewhere() {
-        let config = Config::default().detect.split.evidence;
         let leg = |y: f64| (0..8).map(move |i| DVec3::new(0.0, y, 0.05 * f64::from(i)));
         let points_m: Vec<DVec3> = leg(-0.3).chain(leg(0.3)).collect();
         let legs = || vec![Part::new(&points_m, (0..8).collect()), Part::new(&points_m, (8..16).collect())];
         let (mut known, mut unknown) = (legs(), legs());
-        give_pieces(&points_m, &mut known, &[prior(0.1, 0.0)], &config);
-        give_pieces(&points_m, &mut unknown, &[prior(3.0, 0.0)], &config);
+        give_pieces(&points_m, &mut known, &[prior(0.1, 0.0)]);
+        give_pieces(&points_m, &mut unknown, &[prior(3.0, 0.0)]);
         assert!(known.len() == 1 && known[0].expected && known[0].points.len() == 16);
         assert!(unknown.len() == 2 && !unknown[0].expected);
     }
@@ -327,12 +339,11 @@ mod tests {
 
     #[test]
     fn a_leg_joins_its_body() {
-        let config = Config::default().detect.split.evidence;
         let mut points_m = body(0.0, 0.0);
         points_m.extend((0..8).map(|i| DVec3::new(0.4, 0.0, 0.1 * f64::from(i))));
         let mut parts =
             vec![Part::new(&points_m, (0..40).collect()), Part::new(&points_m, (40..48).collect())];
-        merge(&mut parts, &[], &config);
+        merge(&mut parts, &[]);
         assert_eq!(parts.len(), 1);
         assert_eq!(parts[0].points.len(), 48);
     }

@@ -3,7 +3,8 @@
 //! A body is wide in the trunk and long in the legs, so two people whose feet lie among each other come apart all
 //! the same. Without such knowledge nobody can tell four legs of two people from four people.
 
-use super::{Prior, WALKING_MPS};
+use super::Prior;
+use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{DVec2, DVec3};
 
 /// Passes of the assignment; it settles in two or three.
@@ -51,7 +52,7 @@ fn owner(point_m: DVec3, people: &[&Prior], places: &[(DVec2, f64)]) -> Option<u
         let (mut along, mut across) = (along_m.powi(2), across_m.powi(2));
         let off_m = point_m.truncate() - place_m;
         let mut heading = prior.velocity_mps;
-        if heading.length() < WALKING_MPS {
+        if heading.length() < WALKS_FROM_MPS {
             (along, across) = (0.5 * (along + across), 0.5 * (along + across));
             heading = DVec2::X;
         }

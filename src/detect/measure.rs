@@ -1,21 +1,65 @@
 //! Position and boxes of one person.
 
 use super::axis::AxisModel;
-use super::bias::View;
-use super::swing::Swing;
+use super::evidence::FULL_BODY_TOP_M;
+use super::features::AxisFeatures;
+use super::limbs::LimbCovariance;
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
-use crate::config::{DetectConfig, MeasureConfig, ObbAxes, PositionMethod};
+use crate::config::{DetectConfig, Mechanism, PositionMethod};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
+/// What is seen is the near side, 0.08 to 0.12 m nearer than the body axis: so far a point is moved along the horizontal
+/// line of sight.
+pub const SHIFT_M: f64 = 0.1;
+/// Points that do not look like a person count where one is expected within this distance, half a stride: legs alone, or a
+/// head behind others, still tell where somebody known is.
+const EXPECTED_M: f64 = 0.55;
 /// A prior farther than this from a cluster does not tell where its person walks.
 const OWN_M: f64 = 0.5;
+/// A wheelchair is 1.3 m from corner to corner, and who sits in one reaches no higher than this.
+const SEATED_DIAGONAL_MAX_M: f64 = 1.5;
+const SEATED_HEIGHT_M: f64 = 1.5;
+
+/// What has the size of a person: both ends excluded, but of the points.
+#[derive(Debug, Clone)]
+struct Size {
+    points: std::ops::RangeInclusive<usize>,
+    /// Of the box in plan view, from corner to corner.
+    diagonal_m: [f64; 2],
+    /// From the lowest to the highest point.
+    extent_m: [f64; 2],
+    /// The highest point above the floor.
+    top_m: [f64; 2],
+}
+
+/// A stride with swinging arms is longer than 1 m.
+const OURS: Size =
+    Size { points: 5..=8192, diagonal_m: [0.1, 1.3], extent_m: [0.0, 2.4], top_m: [0.5, 2.3] };
+/// As hdl_people_tracking has it: more than 10 points.
+const ADAPTED: Size = Size {
+    points: 11..=8191,
+    diagonal_m: [0.2, 1.0],
+    extent_m: [0.3, 2.0],
+    top_m: [f64::NEG_INFINITY, f64::INFINITY],
+};
+
+/// Which way an oriented box may turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ObbAxes {
+    /// Along the eigenvectors of the points.
+    Eigenvectors,
+    /// About the vertical only: people stand upright.
+    Yaw,
+}
 
 /// Turns clusters into detections.
 #[derive(Debug, Clone)]
 pub struct Measurer {
-    config: MeasureConfig,
-    whole_top_m: f64,
+    position: PositionMethod,
+    size: Size,
+    /// Whether known people may be as long as a wheelchair.
+    seated: bool,
     sensors_m: Vec<DVec3>,
     axis: AxisModel,
 }
@@ -24,8 +68,9 @@ impl Measurer {
     /// Needs the site to know from where each point was seen.
     pub fn new(config: &DetectConfig, site: &Site) -> Self {
         Self {
-            config: config.measure.clone(),
-            whole_top_m: config.split.evidence.whole_top_m,
+            position: config.position,
+            size: if config.position == PositionMethod::BoxCenter { ADAPTED } else { OURS },
+            seated: !config.without.contains(&Mechanism::ChildrenAndSeated),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
             axis: AxisModel::shipped(),
         }
@@ -44,86 +89,81 @@ impl Measurer {
             let aabb = Aabb::around(cluster.iter().map(|&i| points[i as usize].position_m));
             let expected = self.is_expected(&aabb, priors);
             // Legs are somebody only where nobody is known.
-            let whole = self.has_size_of_person(cluster.len(), &aabb)
-                && !(expected && aabb.max_m.z < self.whole_top_m);
-            if whole || expected {
-                detections.push(self.detection(points, cluster, priors, aabb, whole));
+            let full_body = self.has_size_of_person(cluster.len(), &aabb)
+                && !(expected && aabb.max_m.z < FULL_BODY_TOP_M);
+            if full_body || expected {
+                detections.push(Detection { full_body, ..self.detection(points, cluster, priors) });
             }
         }
     }
 
     fn has_size_of_person(&self, points: usize, aabb: &Aabb) -> bool {
-        let c = &self.config;
+        let within = |value: f64, [least, most]: [f64; 2]| value > least && value < most;
         let size_m = aabb.size_m();
-        let diagonal_m = size_m.truncate().length();
-        (c.points_min..=c.points_max).contains(&points)
-            && diagonal_m > c.diagonal_min_m
-            && diagonal_m < c.diagonal_max_m
-            && size_m.z > c.extent_min_m
-            && size_m.z < c.extent_max_m
-            && aabb.max_m.z > c.top_min_m
-            && aabb.max_m.z < c.top_max_m
+        self.size.points.contains(&points)
+            && within(size_m.truncate().length(), self.size.diagonal_m)
+            && within(size_m.z, self.size.extent_m)
+            && within(aabb.max_m.z, self.size.top_m)
     }
 
     /// True for what may be a part of somebody who is expected there.
     fn is_expected(&self, aabb: &Aabb, priors: &[Prior]) -> bool {
-        let c = &self.config;
         let (length_m, middle_m) = (aabb.size_m().truncate().length(), aabb.center_m().truncate());
         // A wheelchair is longer than a stride, and who sits in it lower than who walks.
-        let longest_m = |prior: &Prior| match prior.height_m < c.seated_height_m {
-            true => c.seated_diagonal_max_m,
-            false => c.diagonal_max_m,
+        let longest_m = |prior: &Prior| match self.seated && prior.height_m < SEATED_HEIGHT_M {
+            true => SEATED_DIAGONAL_MAX_M,
+            false => self.size.diagonal_m[1],
         };
         let near = |prior: &Prior| {
-            let reach_m = c.expected_m + prior.position_sigma_m.min(c.expected_m);
+            let reach_m = EXPECTED_M + prior.position_sigma_m.min(EXPECTED_M);
             prior.confirmed && prior.position_m.distance(middle_m) < reach_m && length_m < longest_m(prior)
         };
-        aabb.max_m.z < c.top_max_m && priors.iter().any(near)
+        aabb.max_m.z < self.size.top_m[1] && priors.iter().any(near)
     }
 
-    fn detection(
-        &self,
-        points: &[Point],
-        cluster: &[u32],
-        priors: &[Prior],
-        aabb: Aabb,
-        whole: bool,
-    ) -> Detection {
+    /// Of points that are one person's, whatever their size; at least one.
+    pub fn detection(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> Detection {
         let n = cluster.len() as f64;
         let of = || cluster.iter().map(|&i| &points[i as usize]);
+        let aabb = Aabb::around(of().map(|p| p.position_m));
         let mean_m: DVec3 = of().map(|p| p.position_m).sum::<DVec3>() / n;
         let first_ns = of().map(|p| p.time_ns).min().unwrap_or_default();
         let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
-        let (position_m, z_m, covariance_m2) = match self.config.position {
+        let (position_m, z_m, covariance_m2) = match self.position {
             PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z, None),
-            PositionMethod::ShiftedMean => (self.view(points, cluster, &[]).base_m, mean_m.z, None),
+            PositionMethod::ShiftedMean => (self.features(points, cluster, &[]).base_m, mean_m.z, None),
             PositionMethod::Fitted => {
-                let (position_m, covariance_m2) = self.axis.locate(&self.view(points, cluster, priors));
+                let (position_m, covariance_m2) = self.axis.locate(&self.features(points, cluster, priors));
                 (position_m, mean_m.z, Some(covariance_m2))
             }
         };
-        let swing = nearest(mean_m.truncate(), priors).and_then(|who| Swing::of(of(), position_m, who));
+        let who = nearest(mean_m.truncate(), priors);
+        let limbs = who.and_then(|who| LimbCovariance::of(of(), position_m, who));
+        let axes = match self.position {
+            PositionMethod::BoxCenter => ObbAxes::Eigenvectors,
+            PositionMethod::ShiftedMean | PositionMethod::Fitted => ObbAxes::Yaw,
+        };
         Detection {
             position_m,
             covariance_m2,
-            swing,
+            limbs,
             z_m,
             time_ns: first_ns + late_ns / cluster.len() as i64,
             points: cluster.len() as u32,
-            whole,
+            full_body: true,
             top_m: aabb.max_m.z,
             aabb,
-            obb: obb(of().map(|p| p.position_m), mean_m, self.config.obb_axes),
+            obb: obb(of().map(|p| p.position_m), mean_m, axes),
         }
     }
 
     /// A cluster as the model of the body axis sees it; who walks there is the nearest of `priors`.
-    pub fn view(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> View {
+    pub fn features(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> AxisFeatures {
         let seen = cluster.iter().map(|&i| &points[i as usize]);
         let mean_m =
             seen.clone().map(|p| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
         let velocity_mps = nearest(mean_m, priors).map(|prior| prior.velocity_mps);
-        View::new(seen, &self.sensors_m, self.config.shift_m, velocity_mps)
+        AxisFeatures::new(seen, &self.sensors_m, SHIFT_M, velocity_mps)
     }
 }
 

@@ -11,20 +11,17 @@ pub mod dp_means;
 pub mod guided;
 pub mod evidence;
 pub mod split_merge;
-pub mod bias;
+pub mod features;
 pub mod axis;
-pub mod swing;
+pub mod limbs;
 pub mod measure;
 
 pub use background::Background;
 pub use measure::Measurer;
 pub use split_merge::Clusterer;
-pub use swing::Swing;
+pub use limbs::LimbCovariance;
 
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
-
-/// Who walks slower may look anywhere.
-const WALKING_MPS: f64 = 0.3;
 
 /// A foreground point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,11 +67,11 @@ pub struct Detection {
     /// How many points.
     pub points: u32,
     /// False for points that do not look like a person, but lie where one is expected: legs, a head behind others.
-    pub whole: bool,
+    pub full_body: bool,
     /// Highest point above the floor.
     pub top_m: f64,
-    /// How arms and legs of a known walker swing.
-    pub swing: Option<Swing>,
+    /// How arms and legs of a known walker lie.
+    pub limbs: Option<LimbCovariance>,
     /// Box along the site's axes.
     pub aabb: Aabb,
     /// Box along the cluster's axes.

@@ -1,8 +1,13 @@
 //! What the empty scene looks like to one sensor: for each pixel (a row of one beam, a bin of azimuth) the ranges
 //! that came back most often.
 
-use crate::config::BackgroundConfig;
-
+/// A range is background when it came back in at least this share of the revolutions: leaves and edges come back at
+/// several ranges; a passer-by has a smaller share.
+const SHARE: f32 = 0.3;
+/// Without an empty scan what was seen first is believed, after so many revolutions, until something farther comes back.
+const START_REVOLUTIONS: f32 = 1.0;
+/// Revolutions after which what was learned weighs half: a minute at 10 Hz.
+const MEMORY_REVOLUTIONS: f32 = 600.0;
 /// How many ranges a pixel remembers: an edge returns two, and one more passes by.
 const MODES: usize = 3;
 /// A mode's mean follows at least this fast: 1/50 a revolution.
@@ -65,14 +70,11 @@ pub struct RangeModel {
     /// True once it was learned without people.
     known: bool,
     margin_m: f32,
-    share: f32,
-    start: f32,
-    memory: f32,
 }
 
 impl RangeModel {
-    /// Knows nothing yet.
-    pub fn new(config: &BackgroundConfig, azimuth_bin_deg: f64) -> Self {
+    /// Knows nothing yet. A return is new when it is nearer than the background by more than `margin_m`.
+    pub fn new(margin_m: f64, azimuth_bin_deg: f64) -> Self {
         let bins = (360.0 / azimuth_bin_deg).round().clamp(1.0, 36_000.0) as usize;
         Self {
             bins,
@@ -82,10 +84,7 @@ impl RangeModel {
             nearest_m: Vec::new(),
             limit_m: Vec::new(),
             revolutions: 0.0,
-            margin_m: config.margin_m as f32,
-            share: config.share as f32,
-            start: config.start_revolutions as f32,
-            memory: config.memory_revolutions as f32,
+            margin_m: margin_m as f32,
             count: 1,
             known: false,
         }
@@ -162,11 +161,11 @@ impl RangeModel {
         self.known |= known;
         self.revolutions += 1.0;
         // After the first halving nothing tells any more what was there from the start.
-        if !self.known && self.count as f32 <= self.memory {
+        if !self.known && self.count as f32 <= MEMORY_REVOLUTIONS {
             self.forget_movers();
         }
         self.count = self.count.wrapping_add(1);
-        if self.revolutions > self.memory {
+        if self.revolutions > MEMORY_REVOLUTIONS {
             self.revolutions *= 0.5;
             self.modes.iter_mut().flatten().for_each(|mode| mode.weight *= 0.5);
         }
@@ -253,9 +252,9 @@ impl RangeModel {
     }
 
     fn find_limits(&mut self) {
-        let unseen_m = if self.known || self.revolutions >= self.start { f32::INFINITY } else { 0.0 };
+        let unseen_m = if self.known || self.revolutions >= START_REVOLUTIONS { f32::INFINITY } else { 0.0 };
         // An empty scan is believed as it is; what walks by has to be outvoted.
-        let least = self.share * self.revolutions;
+        let least = SHARE * self.revolutions;
         let least = if self.known { least } else { least.max(self.revolutions.min(1.5)) };
         for (nearest, modes) in self.nearest_m.iter_mut().zip(&self.modes) {
             *nearest = nearest_m(modes, least).unwrap_or(unseen_m).min(unseen_m);
@@ -287,7 +286,6 @@ fn nearest_m(modes: &[Mode; MODES], least: f32) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config;
 
     const ROWS: usize = 4;
     const NEAR_M: f32 = 5.0;
@@ -305,8 +303,7 @@ mod tests {
     }
 
     fn learned(first: usize, end: usize) -> RangeModel {
-        let config = config::Config::for_mode(config::Mode::Default);
-        let mut model = RangeModel::new(&config.detect.background, 1.0);
+        let mut model = RangeModel::new(0.1, 1.0);
         model.grow(ROWS);
         for _ in 0..10 {
             look(&mut model, first, end);

@@ -1,18 +1,42 @@
 //! One cluster, one person: Haselich's split-merge, or evidence for one person more or fewer.
 
-use super::bias::away;
+use super::dp_means::MergeMean;
 use super::cluster::PlanGrid;
 use super::evidence::Part;
+use super::features::away;
 use super::{Cluster, Point, Prior, dp_means, evidence};
 use crate::Site;
-use crate::config::{ClusterConfig, DetectConfig, SplitConfig, SplitMethod};
+use crate::config::{ClusterMethod, DetectConfig, Mechanism};
 use crate::geometry::{DVec2, DVec3};
+
+/// When points belong together in plan view.
+#[derive(Debug, Clone, Copy)]
+struct Radius {
+    /// Points nearer than this belong together.
+    radius_m: f64,
+    /// It grows by this for each metre from the nearest sensor.
+    per_range: f64,
+    /// How far a point is first moved along the horizontal line of sight, so that front and back, seen by two sensors,
+    /// come together on the body axis.
+    shift_m: f64,
+    /// Smaller clusters are dropped.
+    points_min: usize,
+}
+
+/// A body is 0.26 m deep: both sides seen must stay together. At 20 m a person has few returns; 16 points lose 3 % of
+/// the people.
+const OURS: Radius =
+    Radius { radius_m: 0.2, per_range: 0.005, shift_m: 0.1, points_min: evidence::POINTS_MIN };
+/// As hdl_people_tracking has it.
+const ADAPTED: Radius = Radius { radius_m: 0.2, per_range: 0.0, shift_m: 0.0, points_min: 16 };
 
 /// Groups foreground points into people.
 #[derive(Debug, Clone)]
 pub struct Clusterer {
-    cluster: ClusterConfig,
-    split: SplitConfig,
+    method: ClusterMethod,
+    radius: Radius,
+    /// Whether expected people guide split and merge.
+    guided: bool,
     sensors_m: Vec<DVec3>,
     grid: PlanGrid,
     /// Each point, moved behind the surface that its sensor saw.
@@ -28,8 +52,9 @@ impl Clusterer {
     /// Needs the site to know how far each point is from a sensor.
     pub fn new(config: &DetectConfig, site: &Site) -> Self {
         Self {
-            cluster: config.cluster.clone(),
-            split: config.split.clone(),
+            method: config.clusters,
+            radius: if config.clusters == ClusterMethod::Evidence { OURS } else { ADAPTED },
+            guided: !config.without.contains(&Mechanism::GuidedAssignment),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
             grid: PlanGrid::default(),
             moved_m: Vec::new(),
@@ -45,25 +70,10 @@ impl Clusterer {
     pub fn clusters(&mut self, points: &[Point], priors: &[Prior], clusters: &mut Vec<Cluster>) {
         clusters.clear();
         self.components(points);
-        match self.split.method {
-            SplitMethod::DpMeans => {
-                for component in self.components.drain(..).filter(|c| c.len() >= self.cluster.points_min) {
-                    haselich(points, &component, &self.split, clusters);
-                }
-            }
-            SplitMethod::Evidence => {
-                let priors = if self.split.evidence.guided { priors } else { &[] };
-                // Small components may be a limb of somebody, so what is too small is dropped last.
-                for component in self.components.drain(..) {
-                    evidence::split(&self.moved_m, priors, component, &self.split.evidence, &mut self.parts);
-                }
-                evidence::merge(&mut self.parts, priors, &self.split.evidence);
-                evidence::give_pieces(&self.moved_m, &mut self.parts, priors, &self.split.evidence);
-                // What too few points show counts only where somebody is expected.
-                let all =
-                    self.parts.drain(..).filter(|p| p.expected || p.points.len() >= self.cluster.points_min);
-                clusters.extend(all.map(|part| part.points));
-            }
+        match self.method {
+            ClusterMethod::Evidence => self.by_evidence(if self.guided { priors } else { &[] }, clusters),
+            ClusterMethod::Haselich => self.by_dp_means(points, MergeMean::Mean, clusters),
+            ClusterMethod::HaselichAsShipped => self.by_dp_means(points, MergeMean::Sum, clusters),
         }
         let first = |cluster: &Cluster| {
             cluster
@@ -73,6 +83,24 @@ impl Clusterer {
                 .unwrap_or_default()
         };
         clusters.sort_by(|a, b| order(&first(a), &first(b)));
+    }
+
+    /// Small components may be a limb of somebody, so what is too small is dropped last, and counts where somebody is
+    /// expected.
+    fn by_evidence(&mut self, priors: &[Prior], clusters: &mut Vec<Cluster>) {
+        for component in self.components.drain(..) {
+            evidence::split(&self.moved_m, priors, component, &mut self.parts);
+        }
+        evidence::merge(&mut self.parts, priors);
+        evidence::give_pieces(&self.moved_m, &mut self.parts, priors);
+        let all = self.parts.drain(..).filter(|p| p.expected || p.points.len() >= self.radius.points_min);
+        clusters.extend(all.map(|part| part.points));
+    }
+
+    fn by_dp_means(&mut self, points: &[Point], mean: MergeMean, clusters: &mut Vec<Cluster>) {
+        for component in self.components.drain(..).filter(|c| c.len() >= self.radius.points_min) {
+            haselich(points, &component, mean, clusters);
+        }
     }
 
     /// Connected components in plan view.
@@ -85,13 +113,13 @@ impl Clusterer {
                 self.sensors_m.iter().map(|s| s.distance(point.position_m)).fold(f64::INFINITY, f64::min);
             let range_m = if range_m.is_finite() { range_m } else { 0.0 };
             let moved_m =
-                point.position_m + (away(&self.sensors_m, point) * self.cluster.shift_m).extend(0.0);
+                point.position_m + (away(&self.sensors_m, point) * self.radius.shift_m).extend(0.0);
             self.moved_m.push(moved_m);
             self.plan_m.push(moved_m.truncate());
-            self.radius_m.push(self.cluster.radius_m + self.cluster.radius_per_range * range_m);
+            self.radius_m.push(self.radius.radius_m + self.radius.per_range * range_m);
         }
         let found =
-            self.grid.components(&self.plan_m, &self.radius_m, self.cluster.radius_m, &mut self.labels);
+            self.grid.components(&self.plan_m, &self.radius_m, self.radius.radius_m, &mut self.labels);
         self.components.resize_with(found, Vec::new);
         for (&label, i) in self.labels.iter().zip(0..) {
             self.components[label as usize].push(i);
@@ -104,9 +132,9 @@ fn order(a: &[f64; 3], b: &[f64; 3]) -> std::cmp::Ordering {
 }
 
 /// DP-means and the merge; what is merged keeps the order of the points.
-fn haselich(points: &[Point], component: &[u32], config: &SplitConfig, clusters: &mut Vec<Cluster>) {
+fn haselich(points: &[Point], component: &[u32], mean: MergeMean, clusters: &mut Vec<Cluster>) {
     let plan_m: Vec<DVec2> = component.iter().map(|&i| points[i as usize].position_m.truncate()).collect();
-    let labels = dp_means::split(&plan_m, config.lambda_m, config.passes);
+    let labels = dp_means::split(&plan_m);
     let mut parts: Vec<(Cluster, Vec<DVec2>)> = Vec::new();
     parts.resize_with(labels.iter().max().map_or(0, |&l| l + 1), Default::default);
     for ((&label, &i), &p) in labels.iter().zip(component).zip(&plan_m) {
@@ -115,7 +143,7 @@ fn haselich(points: &[Point], component: &[u32], config: &SplitConfig, clusters:
     }
     parts.retain(|(part, _)| !part.is_empty());
     let (mut people, plans): (Vec<Cluster>, Vec<Vec<DVec2>>) = parts.into_iter().unzip();
-    for (part, into) in dp_means::merge(&plans, config).into_iter().enumerate() {
+    for (part, into) in dp_means::merge(&plans, mean).into_iter().enumerate() {
         if into != part {
             let moved = std::mem::take(&mut people[part]);
             people[into].extend(moved);

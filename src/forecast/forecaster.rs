@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 
 use super::lstm::OBSERVED_DISPLACEMENTS;
 use super::{Forecast, Gaussian2, Residual, Weights, constant_velocity};
-use crate::config::{ForecastConfig, ForecastMethod, Rollout};
+use crate::config::{ForecastConfig, ForecastMethod, Mechanism, Rollout};
 use crate::geometry::DVec2;
 use crate::track::{OBSERVED, Observed, Track};
 use crate::{Error, STEP_NS};
@@ -16,7 +16,8 @@ use crate::{Error, STEP_NS};
 /// Foresees.
 #[derive(Debug, Clone)]
 pub struct Forecaster {
-    config: ForecastConfig,
+    rollout: Rollout,
+    seed: u64,
     network: Network,
 }
 
@@ -24,7 +25,7 @@ pub struct Forecaster {
 #[derive(Debug, Clone)]
 enum Network {
     None,
-    Residual(Residual),
+    Residual { residual: Residual, neighbours: bool },
     Lstm(Weights),
 }
 
@@ -32,40 +33,37 @@ impl Forecaster {
     /// `weights` are needed by the method `lstm` only.
     ///
     /// # Errors
-    /// The method needs weights and there are none, or the spread is no number.
+    /// The method needs weights and there are none.
     pub fn new(config: &ForecastConfig, weights: Option<&Weights>) -> Result<Self, Error> {
-        let psd = config.acceleration_psd_m2ps3;
-        if !psd.is_finite() || psd < 0.0 {
-            return Err(Error::new(format!(
-                "forecast.acceleration_psd_m2ps3: expected a number not below 0, found {psd}"
-            )));
-        }
+        let without = |mechanism| config.without.contains(&mechanism);
         let network = match (config.method, weights) {
             (ForecastMethod::ConstantVelocity, _) => Network::None,
             (ForecastMethod::Residual, _) => {
-                Network::Residual(Residual::shipped()?.believing(config.believed))
+                let residual = match without(Mechanism::ResidualDeparture) {
+                    true => Residual::shipped()?.believing(0.0),
+                    false => Residual::shipped()?,
+                };
+                Network::Residual { residual, neighbours: !without(Mechanism::ResidualNeighbours) }
             }
             (ForecastMethod::Lstm, Some(weights)) => Network::Lstm(weights.clone()),
             (ForecastMethod::Lstm, None) => {
                 return Err(Error::new("forecast.method = \"lstm\": expected its weights, found none"));
             }
         };
-        Ok(Self { config: config.clone(), network })
+        Ok(Self { rollout: config.rollout, seed: config.seed, network })
     }
 
     /// One forecast for each track, in the order of the tracks.
     pub fn forecast(&mut self, tracks: &[Track], forecasts: &mut Vec<Forecast>) {
         forecasts.clear();
-        if let Network::Residual(residual) = &self.network {
-            let alone = !self.config.neighbours;
-            forecasts.extend((0..tracks.len()).map(|i| match alone {
-                true => residual.forecast(&tracks[i..=i], 0),
-                false => residual.forecast(tracks, i),
+        if let Network::Residual { residual, neighbours } = &self.network {
+            forecasts.extend((0..tracks.len()).map(|i| match neighbours {
+                true => residual.forecast(tracks, i),
+                false => residual.forecast(&tracks[i..=i], 0),
             }));
             return;
         }
-        let psd = self.config.acceleration_psd_m2ps3;
-        forecasts.extend(tracks.iter().map(|track| constant_velocity::forecast(track, psd)));
+        forecasts.extend(tracks.iter().map(constant_velocity::forecast));
         if let Network::Lstm(weights) = &self.network {
             self.by_lstm(weights, tracks, forecasts);
         }
@@ -78,14 +76,14 @@ impl Forecaster {
             if let Some(displacements) = displacements_m(&track.observed) {
                 full.push(i);
                 observed_m.push(displacements);
-                generators.push(generator(self.config.seed, track));
+                generators.push(generator(self.seed, track));
             }
         }
         let mut walked_m = Vec::new();
         walked_m.resize_with(full.len(), Vec::new);
         let foreseen = weights.roll_out(&observed_m, |person, displacement| {
             // Eq. (3) draws v; the mean, which TrajNet++ evaluates with, errs less.
-            let v = match self.config.rollout {
+            let v = match self.rollout {
                 Rollout::Mean => displacement.mean_m,
                 Rollout::Draw => draw(displacement, &mut generators[person]),
             };
@@ -181,9 +179,7 @@ pub(super) mod tests {
             heading_sigma_rad: 0.0,
             height_m: 1.75,
             height_sigma_m: 0.0,
-            girth: 1.0,
-            girth_sigma: 0.0,
-            gait: crate::track::Gait::UNKNOWN,
+            gait: crate::gait::GaitPhase::UNKNOWN,
             points: 30,
             confirmed: true,
             aabb: Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE },

@@ -29,12 +29,12 @@ pub struct Forecast {
 
 /// The joint distribution of the steps' errors. The error at time t after the frame is that of the position
 /// now, plus t times that of the velocity now, plus what an unforeseen acceleration adds (white, spectral
-/// density `acceleration_psd`). [`Gaussian2`] of each step is the marginal of the same. The LSTM gives marginals
+/// density `acceleration_psd_m2ps3`). [`Gaussian2`] of each step is the marginal of the same. The LSTM gives marginals
 /// only; with it this is the filter's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coupling {
     /// Covariance of (x, y, vx, vy) now.
     pub state: [[f64; 4]; 4],
     /// Over x and y, m^2/s^3; symmetric.
-    pub acceleration_psd: [[f64; 2]; 2],
+    pub acceleration_psd_m2ps3: [[f64; 2]; 2],
 }

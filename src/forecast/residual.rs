@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use safetensors::SafeTensors;
 
+use super::constant_velocity::ACCELERATION_PSD_M2PS3;
 use super::inputs::{INPUTS, Seen, mirror, see};
 use super::tensors::tensor;
 use super::{Coupling, Forecast, Gaussian2, constant_velocity};
@@ -38,9 +39,8 @@ pub const BELIEVED: f64 = 0.5;
 pub const LOG_FACTOR_LIMIT: f64 = 3.0;
 /// Keeps the covariance invertible.
 pub const RHO_LIMIT: f64 = 0.95;
-/// The acceleration's spectral density, m^2/s^3, where the network says 0, and at most so many powers of e away.
-pub const DENSITY_M2PS3: f64 = 0.01;
-/// See [`DENSITY_M2PS3`].
+/// The acceleration's spectral density is [`ACCELERATION_PSD_M2PS3`] where the network says 0, and at most so many powers
+/// of e away.
 pub const LOG_DENSITY_LIMIT: f64 = 8.0;
 
 /// The network as `umbracast train` made it; its card lies beside the file.
@@ -153,14 +153,14 @@ fn departure_m(outputs: &[f64; OUTPUTS], axes: [DVec2; 2], share: f64) -> DVec2 
 /// Along and across, errors of position and velocity are the filter's by the network's factors, correlated as it
 /// says; so is the acceleration that nobody can foresee.
 fn coupling(outputs: &[f64; OUTPUTS], seen: &Seen, axes: [DVec2; 2]) -> Coupling {
-    let mut coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd: [[0.0; 2]; 2] };
+    let mut coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd_m2ps3: [[0.0; 2]; 2] };
     for (axis, direction) in axes.into_iter().enumerate() {
         let spread = &outputs[2 * COEFFICIENTS + axis * SPREAD..][..SPREAD];
         let factor = |log: f64| log.clamp(-LOG_FACTOR_LIMIT, LOG_FACTOR_LIMIT).exp();
         let position_m = seen.sigmas[axis] * factor(spread[0]);
         let velocity_mps = seen.sigmas[2 + axis] * factor(spread[1]);
         let both = RHO_LIMIT * spread[2].tanh() * position_m * velocity_mps;
-        let density = DENSITY_M2PS3 * (2.0 * spread[3]).clamp(-LOG_DENSITY_LIMIT, LOG_DENSITY_LIMIT).exp();
+        let density = ACCELERATION_PSD_M2PS3 * (2.0 * spread[3]).clamp(-LOG_DENSITY_LIMIT, LOG_DENSITY_LIMIT).exp();
         let d = direction.to_array();
         for i in 0..2 {
             for j in 0..2 {
@@ -169,7 +169,7 @@ fn coupling(outputs: &[f64; OUTPUTS], seen: &Seen, axes: [DVec2; 2]) -> Coupling
                 coupling.state[i][j + 2] += share * both;
                 coupling.state[i + 2][j] += share * both;
                 coupling.state[i + 2][j + 2] += share * velocity_mps * velocity_mps;
-                coupling.acceleration_psd[i][j] += share * density;
+                coupling.acceleration_psd_m2ps3[i][j] += share * density;
             }
         }
     }
@@ -254,7 +254,7 @@ mod tests {
         };
         let tracks = three_people(|p| p);
         let found = Residual::from_safetensors(&file(OUTPUTS)).unwrap().forecast(&tracks, 0);
-        let expected = constant_velocity::forecast(&tracks[0], DENSITY_M2PS3);
+        let expected = constant_velocity::forecast(&tracks[0]);
         for (found, expected) in found.steps.iter().zip(&expected.steps) {
             assert!(found.mean_m.abs_diff_eq(expected.mean_m, 1e-9));
             assert!(

@@ -1,4 +1,9 @@
 //! Which detection belongs to which track.
+//!
+//! The assignment stays by hand: rows that may stay alone and pairs that are forbidden are part of the algorithm here,
+//! and the crates that assign square matrices of integers know neither.
+
+use crate::detect::Detection;
 
 /// A pair that is not allowed.
 pub const FORBIDDEN: f64 = f64::INFINITY;
@@ -59,6 +64,16 @@ pub fn optimal(rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) 
         }
     }
     column_of.into_iter().map(|c| c.filter(|&c| c < columns)).collect()
+}
+
+/// The detections that are numbers, in an order that does not depend on the one they came in.
+pub(super) fn in_order(detections: &[Detection]) -> Vec<&Detection> {
+    let mut sorted: Vec<&Detection> = detections.iter().filter(|d| d.position_m.is_finite()).collect();
+    sorted.sort_by(|a, b| {
+        let (p, q) = (a.position_m, b.position_m);
+        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(a.time_ns.cmp(&b.time_ns))
+    });
+    sorted
 }
 
 /// The cheapest allowed pair first, then the cheapest of what is left. Returns each row's column.

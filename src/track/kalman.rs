@@ -1,36 +1,20 @@
 //! Constant-velocity Kalman filters over the floor, with the sway of a walking body beside.
 //!
-//! x: state (x, y, vx, vy, then how far the body sways to the left and ahead: see [`super::gait`]); P: its
-//! covariance; F: motion; Q: process noise (the base of the paper calls it R); H: picks what is measured, the
-//! position with the sway; R: measurement noise; S: covariance of the innovation; K: gain.
+//! x: state (x, y, vx, vy, then how far the body sways to the left and ahead: see [`super::sway`]); P: its
+//! covariance; F: motion; Q: process noise; H: picks what is measured, the position with the sway; R: measurement
+//! noise; S: covariance of the innovation; K: gain. By hand: F and H are mostly zeros, which a matrix library would
+//! multiply by, and the paper's letters stay at their lines.
 #![allow(non_snake_case)]
 
-use super::gait::{AHEAD, Axes, Gait, LEFT, Sway};
-use crate::config::{ProcessNoise, TrackConfig};
+use super::gaussian::{Mat2, State, inverted, plus, quadratic};
+use super::numbers::{MotionModel, Numbers};
+use super::sway::{AHEAD, Axes, LEFT, Sway};
 use crate::geometry::DVec2;
 
-/// A symmetric 2x2 matrix.
-pub type Mat2 = [[f64; 2]; 2];
-/// A symmetric 4x4 matrix over (x, y, vx, vy).
-pub type Mat4 = [[f64; 4]; 4];
-
-/// A Gaussian over (x, y, vx, vy), metres and seconds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State {
-    /// Mean.
-    pub x: [f64; 4],
-    /// Covariance.
-    pub P: Mat4,
-}
-
-/// A Gaussian over one coordinate and its rate: the height of the points, where it is followed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Vertical {
-    /// Mean.
-    pub x: [f64; 2],
-    /// Covariance.
-    pub P: Mat2,
-}
+/// How long a motion model holds on the mean, seconds.
+const MEAN_SOJOURN_S: f64 = 2.4;
+/// A new track's velocity, one standard deviation of an axis: a walk in any direction.
+const BIRTH_SPEED_MPS: f64 = 1.2;
 
 /// Numbers of a hypothesis' state.
 const N: usize = 8;
@@ -46,9 +30,8 @@ struct Full {
 /// models: Blom and Bar-Shalom 1988), so that it is calm while a person walks on and quick when one turns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
+    /// In the order of the motion models.
     hypotheses: Vec<Hypothesis>,
-    /// Present where the height of the points is followed.
-    pub vertical: Option<Vertical>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,29 +49,21 @@ struct Q {
 
 impl Filter {
     /// A track's first state: somewhere near the first detection, at any walking velocity.
-    pub fn new(config: &TrackConfig, position_m: DVec2, z_m: f64, R: f64) -> Self {
-        let (p, v) = (config.birth_variance_per_noise * R, config.birth_speed_mps.powi(2));
-        let [left, ahead] = [config.sway_left_m.powi(2), config.sway_ahead_m.powi(2)];
+    pub fn new(numbers: &Numbers, position_m: DVec2, R: f64) -> Self {
+        let (p, v) = (R, BIRTH_SPEED_MPS.powi(2));
+        let [left, ahead] = numbers.sway_m.map(|sway_m| sway_m.powi(2));
         let mut state = Full { x: [0.0; N], P: [[0.0; N]; N] };
         (state.x[0], state.x[1]) = (position_m.x, position_m.y);
         for (i, variance) in [p, p, v, v, left, left, ahead, ahead].into_iter().enumerate() {
             state.P[i][i] = variance;
         }
-        let hypotheses = models(config).map(|model| Hypothesis { weight: model.share, state }).collect();
-        let vertical = config.follow_z.then_some(Vertical { x: [z_m, 0.0], P: [[p, 0.0], [0.0, v]] });
-        Self { hypotheses, vertical }
+        let hypothesis = |model: &MotionModel| Hypothesis { weight: model.share, state };
+        Self { hypotheses: numbers.motion_models.iter().map(hypothesis).collect() }
     }
 
     /// The one Gaussian with the mean and the covariance of all hypotheses together.
     pub fn state(&self) -> State {
         self.full().kinematic()
-    }
-
-    /// Where in the stride the person is.
-    pub fn gait(&self) -> Gait {
-        let Full { x, P } = self.full();
-        let variance_m2 = 0.5 * (P[LEFT][LEFT] + P[LEFT + 1][LEFT + 1]);
-        Gait::of_sway(x[LEFT], x[LEFT + 1], variance_m2, x[2].hypot(x[3]))
     }
 
     fn full(&self) -> Full {
@@ -97,51 +72,40 @@ impl Filter {
     }
 
     /// [`Filter::state`] as it will be `dt_s` later, without changing the filter.
-    pub fn state_after(&self, config: &TrackConfig, dt_s: f64) -> State {
+    pub fn state_after(&self, numbers: &Numbers, dt_s: f64) -> State {
         let mut later = self.full();
         if dt_s > 0.0 {
-            let density = |(h, model): (&Hypothesis, Model)| h.weight * model.acceleration_m2ps3;
-            let density = self.hypotheses.iter().zip(models(config)).map(density).sum();
-            later.walk(dt_s, &process_noise(config, density, dt_s));
+            let weighted = self.hypotheses.iter().zip(&numbers.motion_models);
+            let psd_m2ps3 = weighted.map(|(h, model)| h.weight * model.acceleration_psd_m2ps3).sum();
+            later.walk(dt_s, &process_noise(psd_m2ps3, dt_s));
         }
         later.kinematic()
     }
 
     /// Moves the filter of a person `height_m` tall `dt_s` on; not at all where no time has passed.
-    pub fn predict(&mut self, config: &TrackConfig, height_m: f64, dt_s: f64) {
+    pub fn predict(&mut self, numbers: &Numbers, height_m: f64, dt_s: f64) {
         if dt_s <= 0.0 {
             return;
         }
-        // The chance to stay in a model is exp(-dt / dwell), else one is drawn by its share; so two steps do the
+        // The chance to stay in a model is exp(-dt / mean sojourn), else one is drawn by its share; so two steps do the
         // same as one that is as long as both.
         let all = self.full();
-        let sway = Sway::after(config, all.kinematic().velocity_mps().length(), height_m, dt_s);
-        let stay = (-dt_s / config.model_dwell_s).exp();
-        for (h, model) in self.hypotheses.iter_mut().zip(models(config)) {
+        let sway = Sway::after(numbers.sway_m, all.kinematic().velocity_mps().length(), height_m, dt_s);
+        let stay = (-dt_s / MEAN_SOJOURN_S).exp();
+        for (h, model) in self.hypotheses.iter_mut().zip(&numbers.motion_models) {
             let stayed = stay * h.weight;
             h.weight = stayed + (1.0 - stay) * model.share;
             h.state = mixture(&[(stayed, &h.state), (h.weight - stayed, &all)]);
             if let Some(speed_mps) = model.standing_mps {
                 h.state.stand(speed_mps);
             }
-            h.state.walk(dt_s, &process_noise(config, model.acceleration_m2ps3, dt_s));
+            h.state.walk(dt_s, &process_noise(model.acceleration_psd_m2ps3, dt_s));
             h.state.sway(&sway);
-        }
-        if let Some(z) = &mut self.vertical {
-            let q = process_noise(config, config.acceleration_m2ps3[0], dt_s);
-            z.x[0] += dt_s * z.x[1];
-            z.P = [
-                [
-                    z.P[0][0] + 2.0 * dt_s * z.P[0][1] + dt_s * dt_s * z.P[1][1] + q.position,
-                    z.P[0][1] + dt_s * z.P[1][1] + q.cross,
-                ],
-                [z.P[1][0] + dt_s * z.P[1][1] + q.cross, z.P[1][1] + q.velocity],
-            ];
         }
     }
 
-    /// Takes a measured position whose error has covariance `R`, and the height of the points where followed.
-    pub fn correct(&mut self, position_m: DVec2, z_m: f64, R: Mat2) {
+    /// Takes a measured position whose error has covariance `R`.
+    pub fn correct(&mut self, position_m: DVec2, R: Mat2) {
         let axes = Axes::along(self.state().velocity_mps());
         let mut logs = Vec::with_capacity(self.hypotheses.len());
         for h in &mut self.hypotheses {
@@ -152,31 +116,6 @@ impl Filter {
         for (h, log) in self.hypotheses.iter_mut().zip(logs) {
             h.weight = (log - most).exp() / total;
         }
-        if let Some(z) = &mut self.vertical {
-            let S = z.P[0][0] + R[0][0];
-            let K = [z.P[0][0] / S, z.P[1][0] / S];
-            let y = z_m - z.x[0];
-            z.x = [z.x[0] + K[0] * y, z.x[1] + K[1] * y];
-            let (p, c) = (z.P[0][0], z.P[0][1]);
-            z.P = [[(1.0 - K[0]) * p, (1.0 - K[0]) * c], [(1.0 - K[0]) * c, z.P[1][1] - K[1] * c]];
-        }
-    }
-}
-
-impl State {
-    /// The position's mean.
-    pub fn position_m(&self) -> DVec2 {
-        DVec2::new(self.x[0], self.x[1])
-    }
-
-    /// The velocity's mean.
-    pub fn velocity_mps(&self) -> DVec2 {
-        DVec2::new(self.x[2], self.x[3])
-    }
-
-    /// The position's covariance.
-    pub fn position_covariance(&self) -> Mat2 {
-        [[self.P[0][0], self.P[0][1]], [self.P[1][0], self.P[1][1]]]
     }
 }
 
@@ -271,38 +210,12 @@ impl Full {
     }
 }
 
-/// What a hypothesis believes of the motion.
-struct Model {
-    acceleration_m2ps3: f64,
-    share: f64,
-    /// Of who stands: how far the velocity may be from zero, one sigma of an axis.
-    standing_mps: Option<f64>,
-}
-
-/// The models of motion, in the order of a filter's hypotheses; who stands comes last.
-fn models(config: &TrackConfig) -> impl Iterator<Item = Model> + '_ {
-    let walking = config.acceleration_m2ps3.iter().zip(&config.model_share);
-    let walking =
-        walking.map(|(&acceleration_m2ps3, &share)| Model { acceleration_m2ps3, share, standing_mps: None });
-    let standing = Model {
-        acceleration_m2ps3: 0.0,
-        share: config.standing_share,
-        standing_mps: Some(config.standing_speed_mps),
-    };
-    walking.chain((config.standing_share > 0.0).then_some(standing))
-}
-
-fn process_noise(config: &TrackConfig, density_m2ps3: f64, dt_s: f64) -> Q {
-    match config.process_noise {
-        // White acceleration integrated over the step: two steps add what one of their length adds.
-        ProcessNoise::WhiteAcceleration => Q {
-            position: density_m2ps3 * dt_s.powi(3) / 3.0,
-            cross: density_m2ps3 * dt_s.powi(2) / 2.0,
-            velocity: density_m2ps3 * dt_s,
-        },
-        ProcessNoise::PerStep => {
-            Q { position: config.step_position_m2, cross: 0.0, velocity: config.step_velocity_m2ps2 }
-        }
+/// White acceleration integrated over the step: two steps add what one of their length adds.
+fn process_noise(psd_m2ps3: f64, dt_s: f64) -> Q {
+    Q {
+        position: psd_m2ps3 * dt_s.powi(3) / 3.0,
+        cross: psd_m2ps3 * dt_s.powi(2) / 2.0,
+        velocity: psd_m2ps3 * dt_s,
     }
 }
 
@@ -326,44 +239,38 @@ fn mixture(parts: &[(f64, &Full)]) -> Full {
     mean
 }
 
-/// Sum of two matrices.
-pub fn plus(a: Mat2, b: Mat2) -> Mat2 {
-    [[a[0][0] + b[0][0], a[0][1] + b[0][1]], [a[1][0] + b[1][0], a[1][1] + b[1][1]]]
-}
-
-/// Inverse and determinant of a positive definite matrix.
-pub fn inverted(a: Mat2) -> (Mat2, f64) {
-    let det = a[0][0] * a[1][1] - a[0][1] * a[1][0];
-    ([[a[1][1] / det, -a[0][1] / det], [-a[1][0] / det, a[0][0] / det]], det)
-}
-
-/// y' A y.
-pub fn quadratic(a: Mat2, y: DVec2) -> f64 {
-    a[0][0] * y.x * y.x + (a[0][1] + a[1][0]) * y.x * y.y + a[1][1] * y.y * y.y
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Config, Mode};
+    use crate::Config;
+    use crate::track::gaussian::round;
 
-    fn filter(config: &TrackConfig) -> Filter {
-        let mut filter = Filter::new(config, DVec2::ZERO, 0.9, 0.01);
+    fn numbers() -> Numbers {
+        Numbers::new(&Config::default().track)
+    }
+
+    /// With one model of this density alone.
+    fn calm(acceleration_psd_m2ps3: f64) -> Numbers {
+        let model = MotionModel { acceleration_psd_m2ps3, share: 1.0, standing_mps: None };
+        Numbers { motion_models: vec![model], ..numbers() }
+    }
+
+    fn filter(numbers: &Numbers) -> Filter {
+        let mut filter = Filter::new(numbers, DVec2::ZERO, 0.01);
         for i in 1..20 {
-            filter.predict(config, 1.75, 0.1);
-            filter.correct(DVec2::new(0.1 * f64::from(i), 0.0), 0.9, [[0.01, 0.0], [0.0, 0.01]]);
+            filter.predict(numbers, 1.75, 0.1);
+            filter.correct(DVec2::new(0.1 * f64::from(i), 0.0), round(0.01));
         }
         filter
     }
 
     #[test]
     fn two_steps_do_what_one_as_long_as_both_does() {
-        let mut config = Config::for_mode(Mode::Default).track;
-        (config.acceleration_m2ps3, config.model_share, config.standing_share) = (vec![0.2], vec![1.0], 0.0);
-        let (mut once, mut twice) = (filter(&config), filter(&config));
-        once.predict(&config, 1.75, 0.1);
-        twice.predict(&config, 1.75, 0.03);
-        twice.predict(&config, 1.75, 0.07);
+        let numbers = calm(0.2);
+        let (mut once, mut twice) = (filter(&numbers), filter(&numbers));
+        once.predict(&numbers, 1.75, 0.1);
+        twice.predict(&numbers, 1.75, 0.03);
+        twice.predict(&numbers, 1.75, 0.07);
         let (once, twice) = (once.state(), twice.state());
         for i in 0..4 {
             assert!((once.x[i] - twice.x[i]).abs() < 1e-12);
@@ -374,31 +281,14 @@ mod tests {
     }
 
     #[test]
-    fn hdl_has_the_steady_gains_measured_on_the_original() {
-        let config = Config::for_mode(Mode::Hdl).track;
-        let mut filter = Filter::new(&config, DVec2::ZERO, 0.9, 0.2);
-        for _ in 0..300 {
-            filter.predict(&config, 1.75, 0.1);
-            filter.correct(DVec2::ZERO, 0.9, [[0.2, 0.0], [0.0, 0.2]]);
-        }
-        // K = P H' / R after the update: 0.355 for the position, 0.180 for the velocity.
-        let P = filter.state().P;
-        assert!((P[0][0] / 0.2 - 0.355).abs() < 1e-3 && (P[0][2] / 0.2 - 0.180).abs() < 1e-3, "{P:?}");
-        let z = filter.vertical.unwrap();
-        assert!((z.P[0][0] - P[0][0]).abs() < 1e-12);
-    }
-
-    #[test]
     fn a_stop_is_followed_sooner_by_several_models_than_by_the_calm_one() {
-        let several = Config::for_mode(Mode::Default).track;
-        let mut calm = several.clone();
-        (calm.acceleration_m2ps3, calm.model_share, calm.standing_share) =
-            (vec![several.acceleration_m2ps3[0]], vec![1.0], 0.0);
-        let speed_after_stop = |config: &TrackConfig| {
-            let mut filter = filter(config);
+        let several = numbers();
+        let calm = calm(several.motion_models[0].acceleration_psd_m2ps3);
+        let speed_after_stop = |numbers: &Numbers| {
+            let mut filter = filter(numbers);
             for _ in 0..8 {
-                filter.predict(config, 1.75, 0.1);
-                filter.correct(DVec2::new(1.9, 0.0), 0.9, [[0.0013, 0.0], [0.0, 0.0013]]);
+                filter.predict(numbers, 1.75, 0.1);
+                filter.correct(DVec2::new(1.9, 0.0), round(0.0013));
             }
             filter.state().velocity_mps().length()
         };

@@ -1,24 +1,76 @@
 //! Stage 1, second half: detections of frame after frame joined to tracks (paper, section IV-A).
+//!
+//! [`mixture`] is our tracker, [`paper`] that of the paper's authors; the method chooses.
 
-pub mod gait;
-pub mod girth;
-pub mod kalman;
-mod stride;
+pub mod gaussian;
 pub mod association;
+pub mod numbers;
+mod sway;
+pub mod kalman;
+mod limb_phase;
 pub mod visibility;
 mod height;
 mod person;
-pub mod tracker;
+pub mod mixture;
+pub mod paper;
 
-pub use gait::Gait;
-pub use tracker::Tracker;
+pub use numbers::Numbers;
+pub use mixture::MixtureTracker;
+pub use paper::{PaperTracker, Variant};
 
 use std::collections::VecDeque;
 
+use crate::config::{TrackConfig, TrackMethod};
+use crate::detect::{Detection, Prior};
+use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, Obb};
+use crate::{Frame, Site};
 
 /// Positions of the observation window: 10 frames (paper, section V-B).
 pub const OBSERVED: usize = 10;
+/// Variance of a heading that may be any: even over a turn.
+const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
+/// How fast who stands may turn away from the last heading: 40 degrees (one sigma) in a second. A guess: nothing
+/// that is measured here tells it.
+const STANDING_TURN_RAD2PS: f64 = 0.5;
+
+/// Follows people by the method of the config.
+#[derive(Debug, Clone)]
+pub struct Tracker(Method);
+
+#[derive(Debug, Clone)]
+enum Method {
+    Mixture(Box<MixtureTracker>),
+    Paper(PaperTracker),
+}
+
+impl Tracker {
+    /// Needs the site to know what each sensor can see.
+    pub fn new(config: &TrackConfig, site: &Site) -> Self {
+        Self(match config.method {
+            TrackMethod::Mixture => Method::Mixture(Box::new(MixtureTracker::new(config, site))),
+            TrackMethod::Paper => Method::Paper(PaperTracker::new(Variant::Paper)),
+            TrackMethod::Hdl => Method::Paper(PaperTracker::new(Variant::Hdl)),
+        })
+    }
+
+    /// Last step's tracks predicted to `time_ns`; none by the paper's method, whose detection asks for none.
+    pub fn priors(&self, time_ns: i64) -> Vec<Prior> {
+        match &self.0 {
+            Method::Mixture(tracker) => tracker.priors(time_ns),
+            Method::Paper(_) => Vec::new(),
+        }
+    }
+
+    /// Takes a frame's detections; `tracks` is every track alive at the frame's time, in order of `id`. A frame
+    /// that is not later than the last one changes nothing.
+    pub fn update(&mut self, frame: &Frame, detections: &[Detection], tracks: &mut Vec<Track>) {
+        match &mut self.0 {
+            Method::Mixture(tracker) => tracker.update(frame, detections, tracks),
+            Method::Paper(tracker) => tracker.update(frame, detections, tracks),
+        }
+    }
+}
 
 /// One person followed over time, at the frame's instant.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,16 +88,12 @@ pub struct Track {
     /// One standard deviation of `heading_rad`: what the velocity's covariance leaves open while walking, more
     /// with the time while standing, and 1.81 (any direction) for who has never walked.
     pub heading_sigma_rad: f64,
-    /// Standing height, shoes and hair included.
+    /// Standing height, shoes and hair included; by the paper's method the last detection's highest point.
     pub height_m: f64,
     /// One standard deviation of `height_m`.
     pub height_sigma_m: f64,
-    /// Depths and widths of the body beside those of a usual one of this height: 1.
-    pub girth: f64,
-    /// One standard deviation of `girth`.
-    pub girth_sigma: f64,
-    /// Where in the stride, as the sway of the trunk tells it.
-    pub gait: Gait,
+    /// Where in the stride, as arms and legs tell it.
+    pub gait: GaitPhase,
     /// Points of this frame's detection; 0 while it coasts.
     pub points: u32,
     /// False until the track has been seen often enough to be believed, and while it has been out of sight so long
@@ -68,4 +116,21 @@ pub struct Observed {
     pub position_m: DVec2,
     /// Velocity.
     pub velocity_mps: DVec2,
+}
+
+/// The observation window of a track.
+#[derive(Debug, Clone, Default)]
+struct Observations(VecDeque<Observed>);
+
+impl Observations {
+    fn push(&mut self, time_ns: i64, position_m: DVec2, velocity_mps: DVec2) {
+        if self.0.len() == OBSERVED {
+            self.0.pop_front();
+        }
+        self.0.push_back(Observed { time_ns, position_m, velocity_mps });
+    }
+}
+
+fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 * 1e-9
 }

@@ -1,19 +1,14 @@
 //! One person followed: filter, height, heading, boxes, and how sure it is that somebody is there.
-//!
-//! P: covariance of (x, y, vx, vy).
-#![allow(non_snake_case)]
 
-use std::collections::VecDeque;
-
-use super::gait::Gait;
-use super::girth::Girth;
+use super::gaussian::{Mat2, State, largest_sigma, plus, round};
 use super::height::Height;
-use super::kalman::{Filter, Mat2, State, plus};
-use super::stride::Stride;
-use super::visibility::{Body, View};
-use super::{OBSERVED, Observed, Track};
-use crate::config::{Boxes, TrackConfig};
+use super::kalman::Filter;
+use super::limb_phase::LimbPhase;
+use super::numbers::Numbers;
+use super::visibility::{Body, BodyView};
+use super::{ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, seconds};
 use crate::detect::{Detection, Prior};
+use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 /// Nobody is believed in more firmly than this, so that a track that should be seen dies within frames.
@@ -22,11 +17,28 @@ const EXISTENCE_MAX: f64 = 0.99;
 const EXISTENCE_AT_BIRTH: f64 = 0.5;
 /// The step that chances of detection are meant for.
 const STEP_S: f64 = crate::STEP_S;
-/// Variance of a heading that may be any: even over a turn.
-const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
-/// How fast who stands may turn away from the last heading: 40 degrees (one sigma) in a second. A guess: nothing
-/// that is measured here tells it.
-const STANDING_TURN_RAD2PS: f64 = 0.5;
+/// How much likelier a detection is from a person than from nobody.
+const LIKELIHOOD_RATIO: f64 = 20.0;
+/// A track dies when the probability that somebody is there falls below this: about four frames missed in full view.
+const EXISTENCE_MIN: f64 = 0.05;
+/// So many detections confirm a track, within a time: two of three frames at 10 Hz.
+const CONFIRMING_MATCHES: u32 = 2;
+const CONFIRM_WITHIN_S: f64 = 0.25;
+/// A track is not reported as confirmed while its position, one standard deviation of the larger axis, is less sure:
+/// who has been out of sight so long is more likely elsewhere. It is kept, to be known again.
+const REPORTED_SIGMA_MAX_M: f64 = 0.6;
+/// A track dies when the variances of its position add up to this.
+const POSITION_VARIANCE_MAX_M2: f64 = 8.0;
+/// A track that stands where another does dies after this long: people who pass each other are sooner apart.
+const DUPLICATE_AFTER_S: f64 = 0.5;
+/// Measurement noise added where hardly anything of a person is seen, one axis: legs alone swing by 0.1 m, and where a
+/// view ends the mean stays at its edge, frame after frame. None is added where half the height and half the returns of a
+/// body in free sight are.
+const HIDDEN_NOISE_M: f64 = 0.25;
+/// Mean standing height of adults in shoes.
+const HEIGHT_MEAN_M: f64 = 1.72;
+/// Time over which the width of a box is averaged.
+const BOX_AVERAGE_S: f64 = 1.0;
 /// The width of a box until one was seen.
 const WIDTH_M: f64 = 0.5;
 
@@ -35,63 +47,56 @@ const WIDTH_M: f64 = 0.5;
 pub(super) struct Person {
     pub(super) id: u64,
     pub(super) filter: Filter,
-    stride: Stride,
+    limb_phase: LimbPhase,
     pub(super) confirmed: bool,
     /// Probability that somebody is there.
     pub(super) existence: f64,
-    pub(super) hits: u32,
+    pub(super) matches: u32,
     /// How long an elder track has stood in the same place.
     pub(super) doubled_s: f64,
     born_ns: i64,
-    last_hit_ns: i64,
+    last_match_ns: i64,
     points: u32,
     heading_rad: f64,
     heading_variance_rad2: f64,
     /// When the track was last given out.
     given_ns: i64,
     height: Height,
-    girth: Girth,
-    /// The last detection's boxes, moved so that the detection's position is at the origin.
-    aabb: Aabb,
-    obb: Obb,
     /// Averaged extent along x and y.
     extent_m: DVec2,
-    observed: VecDeque<Observed>,
+    observed: Observations,
 }
 
 impl Person {
-    pub(super) fn born(config: &TrackConfig, id: u64, detection: &Detection, time_ns: i64) -> Self {
-        let noise = plus(noise(config, detection, &View::default()), sway(config));
+    pub(super) fn born(numbers: &Numbers, id: u64, detection: &Detection, time_ns: i64) -> Self {
+        let noise = plus(noise(numbers, detection, &BodyView::default()), sway(numbers));
         let variance = noise[0][0].max(noise[1][1]);
         let mut person = Self {
             id,
-            filter: Filter::new(config, detection.position_m, detection.z_m, variance),
-            stride: Stride::default(),
-            confirmed: config.confirm_hits <= 1,
+            filter: Filter::new(numbers, detection.position_m, variance),
+            limb_phase: LimbPhase::default(),
+            confirmed: false,
             existence: EXISTENCE_AT_BIRTH,
-            hits: 1,
+            matches: 1,
             doubled_s: 0.0,
             born_ns: time_ns,
-            last_hit_ns: time_ns,
+            last_match_ns: time_ns,
             points: 0,
             heading_rad: 0.0,
             heading_variance_rad2: ANY_HEADING_RAD2,
             given_ns: time_ns,
-            height: Height::new(config.height_mean_m, config.height_sigma_m, config.children_share),
-            girth: Girth::default(),
-            aabb: Aabb::EMPTY,
-            obb: Obb::from_aabb(&Aabb::EMPTY),
+            height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
             extent_m: DVec2::splat(WIDTH_M),
-            observed: VecDeque::with_capacity(OBSERVED),
+            observed: Observations::default(),
         };
-        person.see(detection, &View::default(), 0.0, config);
+        person.see(numbers, detection, &BodyView::default(), 0.0);
         person
     }
 
-    /// Moves filter and stride on.
-    pub(super) fn predict(&mut self, config: &TrackConfig, dt_s: f64) {
-        self.stride.predict(config, self.speed_mps(), self.height.mean_m(), dt_s);
-        self.filter.predict(config, self.height.mean_m(), dt_s);
+    /// Moves filter and phase of the gait on.
+    pub(super) fn predict(&mut self, numbers: &Numbers, dt_s: f64) {
+        self.limb_phase.predict(self.speed_mps(), self.height.mean_m(), dt_s);
+        self.filter.predict(numbers, self.height.mean_m(), dt_s);
     }
 
     fn speed_mps(&self) -> f64 {
@@ -99,21 +104,21 @@ impl Person {
     }
 
     /// The frame's detection of this person, `after_s` after the last frame; the filter stands at it.
-    pub(super) fn hit(
+    pub(super) fn matched(
         &mut self,
-        config: &TrackConfig,
+        numbers: &Numbers,
         detection: &Detection,
-        view: &View,
+        view: &BodyView,
         time_ns: i64,
         step_s: f64,
     ) {
-        self.filter.correct(detection.position_m, detection.z_m, noise(config, detection, view));
-        let there = self.existence * config.hit_ratio;
+        self.filter.correct(detection.position_m, noise(numbers, detection, view));
+        let there = self.existence * LIKELIHOOD_RATIO;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
-        self.hits += 1;
-        self.last_hit_ns = time_ns;
-        self.confirmed |= self.hits >= config.confirm_hits;
-        self.see(detection, view, step_s, config);
+        self.matches += 1;
+        self.last_match_ns = time_ns;
+        self.confirmed |= self.matches >= CONFIRMING_MATCHES;
+        self.see(numbers, detection, view, step_s);
     }
 
     /// No detection in this frame, although there was one with chance `detection_probability` a step.
@@ -123,15 +128,13 @@ impl Person {
         self.points = 0;
     }
 
-    pub(super) fn is_dead(&self, config: &TrackConfig, time_ns: i64) -> bool {
-        let seconds_since = |then_ns: i64| (time_ns - then_ns) as f64 * 1e-9;
+    pub(super) fn is_dead(&self, numbers: &Numbers, time_ns: i64) -> bool {
         let spread = self.filter.state().position_covariance();
-        let spread_z = self.filter.vertical.map_or(0.0, |z| z.P[0][0]);
-        self.existence < config.existence_min
-            || seconds_since(self.last_hit_ns) > config.coast_max_s
-            || spread[0][0] + spread[1][1] + spread_z >= config.position_variance_max_m2
-            || self.doubled_s > config.duplicate_after_s
-            || !self.confirmed && seconds_since(self.born_ns) > config.confirm_within_s
+        self.existence < EXISTENCE_MIN
+            || seconds(self.last_match_ns, time_ns) > numbers.coast_max_s
+            || spread[0][0] + spread[1][1] >= POSITION_VARIANCE_MAX_M2
+            || self.doubled_s > DUPLICATE_AFTER_S
+            || !self.confirmed && seconds(self.born_ns, time_ns) > CONFIRM_WITHIN_S
     }
 
     /// The body that others may hide behind.
@@ -139,8 +142,8 @@ impl Person {
         Body { position_m, height_m: self.height.mean_m() }
     }
 
-    pub(super) fn prior(&self, config: &TrackConfig, after_s: f64) -> Prior {
-        let state = self.filter.state_after(config, after_s);
+    pub(super) fn prior(&self, numbers: &Numbers, after_s: f64) -> Prior {
+        let state = self.filter.state_after(numbers, after_s);
         Prior {
             position_m: state.position_m(),
             velocity_mps: state.velocity_mps(),
@@ -151,17 +154,13 @@ impl Person {
     }
 
     /// The track at the frame's time, where the filter stands.
-    pub(super) fn track(&mut self, config: &TrackConfig, time_ns: i64) -> Track {
+    pub(super) fn track(&mut self, time_ns: i64) -> Track {
         let state = self.filter.state();
         let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
-        self.turn(config, &state, (time_ns - self.given_ns) as f64 * 1e-9);
+        self.turn(&state, seconds(self.given_ns, time_ns));
         self.given_ns = time_ns;
-        if self.observed.len() == OBSERVED {
-            self.observed.pop_front();
-        }
-        self.observed.push_back(Observed { time_ns, position_m, velocity_mps });
-        let (aabb, obb) = self.boxes(config, &state);
-        let (girth, girth_sigma) = if config.girth { self.girth.factor() } else { Girth::default().factor() };
+        self.observed.push(time_ns, position_m, velocity_mps);
+        let (aabb, obb) = self.boxes(position_m);
         Track {
             id: self.id,
             position_m,
@@ -171,96 +170,71 @@ impl Person {
             heading_sigma_rad: self.heading_variance_rad2.sqrt(),
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
-            girth,
-            girth_sigma,
-            gait: self.gait(config, velocity_mps.length()),
+            gait: self.limb_phase.phase(velocity_mps.length()),
             points: self.points,
-            confirmed: self.confirmed && largest_sigma(state.position_covariance()) < config.told_sigma_max_m,
+            confirmed: self.confirmed && largest_sigma(state.position_covariance()) < REPORTED_SIGMA_MAX_M,
             aabb,
             obb,
-            observed: self.observed.clone(),
+            observed: self.observed.0.clone(),
         }
     }
 
-    fn gait(&self, config: &TrackConfig, speed_mps: f64) -> Gait {
-        let limbs = if config.gait_from_limbs { self.stride.gait(speed_mps) } else { Gait::UNKNOWN };
-        limbs.surer(if config.gait_from_sway { self.filter.gait() } else { Gait::UNKNOWN })
-    }
-
     /// The heading follows the velocity of who walks; who stands may turn on the spot.
-    fn turn(&mut self, config: &TrackConfig, state: &State, step_s: f64) {
-        let (v, P) = (state.velocity_mps(), &state.P);
-        let squared = v.length_squared();
-        if v.length() > config.heading_speed_mps {
+    fn turn(&mut self, state: &State, step_s: f64) {
+        let v = state.velocity_mps();
+        if v.length() > WALKS_FROM_MPS {
             self.heading_rad = v.y.atan2(v.x);
-            // d(heading) = (v x dv) / |v|^2.
-            let across = P[3][3] * v.x * v.x - 2.0 * P[2][3] * v.x * v.y + P[2][2] * v.y * v.y;
-            self.heading_variance_rad2 = (across / (squared * squared)).min(ANY_HEADING_RAD2);
+            self.heading_variance_rad2 = state.heading_variance_rad2().min(ANY_HEADING_RAD2);
         } else {
             self.heading_variance_rad2 =
                 (self.heading_variance_rad2 + STANDING_TURN_RAD2PS * step_s).min(ANY_HEADING_RAD2);
         }
     }
 
-    /// Learns what a detection says of the body's shape and stride.
-    fn see(&mut self, detection: &Detection, view: &View, step_s: f64, config: &TrackConfig) {
+    /// Learns what a detection says of the body's shape and gait.
+    fn see(&mut self, numbers: &Numbers, detection: &Detection, view: &BodyView, step_s: f64) {
         self.points = detection.points;
-        let speed_mps = self.speed_mps();
-        if let Some(swing) = &detection.swing {
-            self.stride.see(config, swing, speed_mps, self.height.mean_m());
+        if let Some(limbs) = detection.limbs.as_ref().filter(|_| numbers.limb_phase) {
+            self.limb_phase.see(limbs, self.speed_mps(), self.height.mean_m());
         }
         self.height.see(detection.top_m, view.beams_per_m_at_top);
-        self.girth.see(detection, view, self.height.mean_m(), speed_mps);
-        self.aabb = detection.aabb.moved_by(-detection.position_m);
-        self.obb = detection.obb.moved_by(-detection.position_m, 0.0);
-        let new = 1.0 - (-step_s / config.box_average_s).exp();
+        let new = 1.0 - (-step_s / BOX_AVERAGE_S).exp();
         self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
     }
 
-    fn boxes(&self, config: &TrackConfig, state: &State) -> (Aabb, Obb) {
-        let position_m = state.position_m();
-        match config.boxes {
-            Boxes::Detection => (self.aabb.moved_by(position_m), self.obb.moved_by(position_m, 0.0)),
-            Boxes::Averaged => {
-                let half_m = (0.5 * self.extent_m).extend(0.5 * self.height.mean_m());
-                let center_m = position_m.extend(half_m.z);
-                let aabb = Aabb { min_m: center_m - half_m, max_m: center_m + half_m };
-                let site_from_box = DMat3::from_rotation_z(self.heading_rad);
-                // Shoulders are twice as wide as a trunk is deep; the plan area is what was seen.
-                let depth_m = (0.5 * half_m.x * half_m.y).sqrt();
-                let half_m = DVec3::new(depth_m, 2.0 * depth_m, half_m.z);
-                (aabb, Obb { center_m, half_m, site_from_box })
-            }
-        }
+    /// As wide as seen on the mean, standing on the floor; the oriented one turned with the heading.
+    fn boxes(&self, position_m: DVec2) -> (Aabb, Obb) {
+        let half_m = (0.5 * self.extent_m).extend(0.5 * self.height.mean_m());
+        let center_m = position_m.extend(half_m.z);
+        let aabb = Aabb { min_m: center_m - half_m, max_m: center_m + half_m };
+        let site_from_box = DMat3::from_rotation_z(self.heading_rad);
+        // Shoulders are twice as wide as a trunk is deep; the plan area is what was seen.
+        let depth_m = (0.5 * half_m.x * half_m.y).sqrt();
+        let half_m = DVec3::new(depth_m, 2.0 * depth_m, half_m.z);
+        (aabb, Obb { center_m, half_m, site_from_box })
     }
 }
 
 /// Covariance of a detection's position for the filter, which follows the sway itself: what the detection tells of
 /// its error counts in part; beside it a part that nothing mends, and one that falls with the share of the body that
 /// is seen.
-pub(super) fn noise(config: &TrackConfig, detection: &Detection, view: &View) -> Mat2 {
+pub(super) fn noise(numbers: &Numbers, detection: &Detection, view: &BodyView) -> Mat2 {
     // 1 where hardly anything is seen, 0 from half the height and half the returns in free sight on.
-    let low = 1.0 - 2.0 * detection.aabb.size_m().z / config.height_mean_m;
+    let low = 1.0 - 2.0 * detection.aabb.size_m().z / HEIGHT_MEAN_M;
     let few = match view.beams_known {
         true => 1.0 - 2.0 * f64::from(detection.points) / view.returns_alone.max(f64::MIN_POSITIVE),
         false => 0.0,
     };
     let hidden = low.max(few).max(0.0);
-    let variance = config.noise_floor_m.powi(2) + (config.hidden_noise_m * hidden).powi(2);
-    let told = detection.covariance_m2.unwrap_or_default();
-    plus(told.map(|row| row.map(|c| config.noise_share * c)), [[variance, 0.0], [0.0, variance]])
+    let claimed = detection.covariance_m2.unwrap_or_default();
+    let lasting = numbers.noise_floor_m.powi(2) + (HIDDEN_NOISE_M * hidden).powi(2);
+    plus(claimed.map(|row| row.map(|c| numbers.noise_share * c)), round(lasting))
 }
 
 /// Covariance of a swaying body about the person's way, of a phase and direction that are not known.
-pub(super) fn sway(config: &TrackConfig) -> Mat2 {
-    let variance = 0.5 * (config.sway_left_m.powi(2) + config.sway_ahead_m.powi(2));
-    [[variance, 0.0], [0.0, variance]]
-}
-
-/// One standard deviation along the longer axis of an ellipse.
-fn largest_sigma(spread: Mat2) -> f64 {
-    let (mean, half) = (0.5 * (spread[0][0] + spread[1][1]), 0.5 * (spread[0][0] - spread[1][1]));
-    (mean + half.hypot(spread[0][1])).max(0.0).sqrt()
+pub(super) fn sway(numbers: &Numbers) -> Mat2 {
+    let [left_m, ahead_m] = numbers.sway_m;
+    round(0.5 * (left_m.powi(2) + ahead_m.powi(2)))
 }
 
 #[cfg(test)]
@@ -270,21 +244,21 @@ mod tests {
 
     /// Variance for the filter of a whole body's height with so many returns, where a body in free sight gives 40.
     fn variance_m2(points: u32, beams_known: bool) -> f64 {
-        let config = Config::default().track;
-        let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.4, config.height_mean_m) };
+        let numbers = Numbers::new(&Config::default().track);
+        let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.4, HEIGHT_MEAN_M) };
         let detection = Detection {
             position_m: DVec2::ZERO,
             covariance_m2: None,
             z_m: 0.9,
             time_ns: 0,
             points,
-            swing: None,
-            whole: true,
-            top_m: config.height_mean_m,
+            limbs: None,
+            full_body: true,
+            top_m: HEIGHT_MEAN_M,
             aabb,
             obb: Obb::from_aabb(&aabb),
         };
-        noise(&config, &detection, &View { returns_alone: 40.0, beams_known, ..View::default() })[0][0]
+        noise(&numbers, &detection, &BodyView { returns_alone: 40.0, beams_known, ..BodyView::default() })[0][0]
     }
 
     #[test]

@@ -3,7 +3,6 @@
 
 use std::f64::consts::TAU;
 
-use crate::config::TrackConfig;
 use crate::geometry::slab::hit_obb;
 use crate::geometry::{DMat3, DVec2, DVec3, Obb, Pose};
 use crate::lidar::{Cloud, Frame, RangeImage};
@@ -16,6 +15,10 @@ const BODY_RADIUS_M: f64 = 0.155;
 const SLICES: usize = 8;
 /// Directions round a sensor, counted apart, so that a lost packet hides a sector only.
 const SECTORS: usize = 90;
+/// Expected returns at which the chance of a detection has fallen to half, measured; a cluster has at least 5 points.
+const RETURNS_AT_HALF: f64 = 6.0;
+/// A body that sensors meet only below this height is not detected: legs alone are not taken for a person.
+const SEEN_TOP_MIN_M: f64 = 0.5;
 /// Returns from a body in free sight of a sensor whose beams are unknown: enough to be found.
 const RETURNS_OF_UNKNOWN_BEAMS: f64 = 50.0;
 
@@ -57,7 +60,7 @@ struct Fan {
 
 /// What a body gives.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct View {
+pub struct BodyView {
     /// Returns expected from all sensors together.
     pub returns: f64,
     /// The same if nobody and nothing stood between.
@@ -106,8 +109,9 @@ impl Visibility {
     }
 
     /// What `body` gives to all `eyes` while `others` stand round it.
-    pub fn view(&self, eyes: &[Eye], body: &Body, others: &[Body]) -> View {
-        let mut view = View { beams_known: eyes.iter().all(|eye| eye.fan.is_some()), ..View::default() };
+    pub fn view(&self, eyes: &[Eye], body: &Body, others: &[Body]) -> BodyView {
+        let mut view =
+            BodyView { beams_known: eyes.iter().all(|eye| eye.fan.is_some()), ..BodyView::default() };
         for eye in eyes {
             let near = |point: DVec2, radius: f64| {
                 distance_to_segment(point, eye.origin_m.truncate(), body.position_m) < radius + BODY_RADIUS_M
@@ -228,13 +232,14 @@ fn cylinder_hides(axis_m: DVec2, radius_m: f64, height_m: f64, eye_m: DVec3, tar
     enter < leave && z(enter).min(z(leave)) < height_m
 }
 
-/// Chance that a body seen like this is detected (the shape of the curve is a fit to simulated scenes).
-pub fn detection_probability(config: &TrackConfig, view: &View) -> f64 {
-    if view.returns <= 0.0 || view.top_m < config.seen_top_min_m {
+/// Chance that a body seen like this is detected, where it is `in_full_view` with every return (the shape of the curve
+/// is a fit to simulated scenes).
+pub fn detection_probability(in_full_view: f64, view: &BodyView) -> f64 {
+    if view.returns <= 0.0 || view.top_m < SEEN_TOP_MIN_M {
         return 0.0;
     }
-    let few = config.returns_at_half / view.returns;
-    config.detection_probability / (1.0 + few * few)
+    let few = RETURNS_AT_HALF / view.returns;
+    in_full_view / (1.0 + few * few)
 }
 
 #[cfg(test)]
@@ -265,7 +270,7 @@ mod tests {
         Body { position_m: DVec2::new(x_m, y_m), height_m: 1.75 }
     }
 
-    fn view(frame: &Frame, seen: Body, others: &[Body]) -> View {
+    fn view(frame: &Frame, seen: Body, others: &[Body]) -> BodyView {
         let visibility = Visibility::new(&Config::default().site);
         visibility.view(&visibility.eyes(frame), &seen, others)
     }
@@ -302,7 +307,6 @@ mod tests {
         let frame = frame(36_000.0);
         let legs = view(&frame, body(3.0, 0.0), &[]);
         assert!(legs.top_m < 0.9 && legs.top_m > 0.0, "{legs:?}");
-        let config = Config::default().track;
-        assert_eq!(detection_probability(&config, &View { top_m: 0.4, ..legs }), 0.0);
+        assert_eq!(detection_probability(0.9, &BodyView { top_m: 0.4, ..legs }), 0.0);
     }
 }

@@ -6,9 +6,10 @@ use std::collections::{BTreeMap, VecDeque};
 use umbracast::blockage::Caster;
 use umbracast::config::{BlockageConfig, BlockageMethod, BoxKind};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2, Weights, constant_velocity};
+use umbracast::forecast::constant_velocity::ACCELERATION_PSD_M2PS3;
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
-use umbracast::track::girth::PRIOR_SIGMA;
-use umbracast::track::{Gait, OBSERVED, Observed, Track};
+use umbracast::gait::{GaitPhase, WALKS_FROM_MPS};
+use umbracast::track::{OBSERVED, Observed, Track};
 use umbracast::{Config, Error, STEP_S, STEPS};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
@@ -29,7 +30,7 @@ pub fn constant_velocity_of_truth(truth: &TruthIndex, config: &Config) -> Said {
             truth.people_of(frame).map(|row| true_track(truth, row, person_box(row))).collect();
         let forecasts: Vec<Forecast> = tracks
             .iter()
-            .map(|track| constant_velocity::forecast(track, config.forecast.acceleration_psd_m2ps3))
+            .map(constant_velocity::forecast)
             .collect();
         caster.cast(&tracks, &forecasts, &mut blockages);
         said.add(frame, &blockages);
@@ -45,7 +46,7 @@ pub fn algorithm_1(run: &SceneRun, config: &Config, person_box: BoxKind) -> Said
     let mut caster = Caster::new(&blockage, &config.site);
     let (mut said, mut blockages) = (Said::default(), Vec::new());
     for (frame, rows) in confirmed_by_frame(run) {
-        let ahead = |row: &&TrackRow| with_own_future(row, config.forecast.acceleration_psd_m2ps3);
+        let ahead = |row: &&TrackRow| with_own_future(row);
         let (tracks, forecasts): (Vec<Track>, Vec<Forecast>) = rows.iter().map(ahead).unzip();
         caster.cast(&tracks, &forecasts, &mut blockages);
         said.add(frame, &blockages);
@@ -72,7 +73,7 @@ pub fn true_state(
     let track = |row: &PeopleRow| {
         let own = matching.get(&(row.frame, row.person)).and_then(|track| rows.get(&(row.frame, *track)));
         match own {
-            Some(own) => with_true_state(truth, own, row, config.track.heading_speed_mps),
+            Some(own) => with_true_state(truth, own, row),
             None => true_track(truth, row, person_box(row)),
         }
     };
@@ -98,7 +99,7 @@ pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, conf
             let person = person_of.get(&(frame, row.track));
             match person.and_then(|&person| truth.person(frame, person)) {
                 Some(person) => with_true_future(truth, row, person),
-                None => with_own_future(row, config.forecast.acceleration_psd_m2ps3),
+                None => with_own_future(row),
             }
         };
         let (tracks, forecasts): (Vec<Track>, Vec<Forecast>) = rows.iter().map(ahead).unzip();
@@ -109,11 +110,11 @@ pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, conf
 }
 
 /// Constant velocity from the true state, for comparison with stage 2.
-pub fn constant_velocity_steps(row: &PeopleRow, acceleration_psd_m2ps3: f64) -> [Gaussian2; STEPS] {
+pub fn constant_velocity_steps(row: &PeopleRow) -> [Gaussian2; STEPS] {
     let at = |i| {
         let (p, v) = (DVec2::new(row.x_m, row.y_m), DVec2::new(row.vx_mps, row.vy_mps));
         let coupling =
-            Coupling { acceleration_psd: constant_velocity::alike(acceleration_psd_m2ps3), ..CERTAIN };
+            Coupling { acceleration_psd_m2ps3: constant_velocity::alike(ACCELERATION_PSD_M2PS3), ..CERTAIN };
         constant_velocity::position_at(p, v, &coupling, (i + 1) as f64 * STEP_S)
     };
     std::array::from_fn(at)
@@ -134,17 +135,17 @@ fn confirmed_by_frame(run: &SceneRun) -> BTreeMap<u64, Vec<&TrackRow>> {
 }
 
 /// What is known has no spread.
-const CERTAIN: Coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd: [[0.0; 2]; 2] };
+const CERTAIN: Coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd_m2ps3: [[0.0; 2]; 2] };
 
 /// A track with the true state of its person. Its heading follows the velocity as the tracker's does; below
-/// `heading_speed_mps` the track's own is held.
-fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, heading_speed_mps: f64) -> Track {
+/// walking speed the track's own is held.
+fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow) -> Track {
     let track = true_track(truth, row, box_moved_to(own, row));
-    let walks = track.velocity_mps.length() > heading_speed_mps;
+    let walks = track.velocity_mps.length() > WALKS_FROM_MPS;
     let (heading_rad, heading_sigma_rad) =
         if walks { (track.velocity_mps.to_angle(), 0.0) } else { (own.heading_rad, own.heading_sigma_rad) };
-    let Track { height_m, height_sigma_m, girth, girth_sigma, gait, .. } = track_of(own);
-    Track { heading_rad, heading_sigma_rad, height_m, height_sigma_m, girth, girth_sigma, gait, ..track }
+    let Track { height_m, height_sigma_m, gait, .. } = track_of(own);
+    Track { heading_rad, heading_sigma_rad, height_m, height_sigma_m, gait, ..track }
 }
 
 /// A track at the true positions of its person, now and at every step. The present is moved as well: a body
@@ -165,10 +166,10 @@ fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow) -> (Tra
 }
 
 /// A track with its own forecast. Its spread is that of a constant velocity: tables do not hold the joint one.
-fn with_own_future(own: &TrackRow, acceleration_psd: f64) -> (Track, Forecast) {
+fn with_own_future(own: &TrackRow) -> (Track, Forecast) {
     let track = track_of(own);
-    let coupling =
-        Coupling { state: track.covariance, acceleration_psd: constant_velocity::alike(acceleration_psd) };
+    let acceleration_psd_m2ps3 = constant_velocity::alike(ACCELERATION_PSD_M2PS3);
+    let coupling = Coupling { state: track.covariance, acceleration_psd_m2ps3 };
     (track, Forecast { track: own.track, steps: forecast_of(own), coupling })
 }
 
@@ -192,9 +193,7 @@ pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb))
         heading_sigma_rad: 0.0,
         height_m: row.height_m,
         height_sigma_m: 0.0,
-        girth: 1.0,
-        girth_sigma: PRIOR_SIGMA,
-        gait: Gait::UNKNOWN,
+        gait: GaitPhase::UNKNOWN,
         points: row.returns,
         confirmed: true,
         aabb,
@@ -248,9 +247,7 @@ fn track_of(row: &TrackRow) -> Track {
         heading_sigma_rad: row.heading_sigma_rad,
         height_m: row.height_m,
         height_sigma_m: row.height_sigma_m,
-        girth: row.girth,
-        girth_sigma: row.girth_sigma,
-        gait: Gait { phase_rad: row.gait_phase_rad, concentration: row.gait_concentration },
+        gait: GaitPhase { phase_rad: row.gait_phase_rad, concentration: row.gait_concentration },
         points: row.points,
         confirmed: row.confirmed,
         aabb,
@@ -366,8 +363,8 @@ mod tests {
         let instances = instances(&index);
         let said = true_future(&index, &run, &matching, &config).of_tracks(&instances, &matching);
         assert!(said[0].p[0] > 0.0 && said[0].p[0] < 0.5, "{:?}", said[0].p);
-        let (_, forecast) = with_own_future(&run.tracks[1], 0.2);
-        assert_eq!((forecast.coupling.state[1][1], forecast.coupling.acceleration_psd[1][1]), (4.0, 0.2));
+        let (_, forecast) = with_own_future(&run.tracks[1]);
+        assert_eq!((forecast.coupling.state[1][1], forecast.coupling.acceleration_psd_m2ps3[1][1]), (4.0, 0.01));
     }
 
     #[test]

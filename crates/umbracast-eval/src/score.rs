@@ -177,10 +177,8 @@ pub fn score_scene(
             health: *health,
         });
     }
-    let carried_on = |frame, person| {
-        let psd = runs.first()?.config.forecast.acceleration_psd_m2ps3;
-        Some(casts::constant_velocity_steps(index.person(frame, person)?, psd))
-    };
+    let carried_on =
+        |frame, person| index.person(frame, person).map(casts::constant_velocity_steps);
     Ok(SceneScore {
         scene,
         group: group.to_owned(),

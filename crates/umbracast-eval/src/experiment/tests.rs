@@ -79,9 +79,9 @@ fn a_scene_of_another_experiment_is_refused_and_left_alone() {
     spec.scenes[0].seed += 1;
     refused(experiment(&spec, folder.path()));
     spec.scenes[0].seed -= 1;
-    spec.configs[0].track.gate_m += 0.1;
+    spec.configs[0].track.coast_max_s += 0.1;
     refused(experiment(&spec, folder.path()));
-    spec.configs[0].track.gate_m = Config::default().track.gate_m;
+    spec.configs[0].track.coast_max_s = Config::default().track.coast_max_s;
     assert!(experiment(&spec, folder.path()).missing(Shard::WHOLE).unwrap().0.is_empty());
     assert!(fs::read(&path).unwrap() == before);
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use rand::RngExt;
 use umbracast::blockage::Caster;
-use umbracast::config::{BlockageMethod, BoxKind, ForecastMethod, ObbAxes, Rollout};
+use umbracast::config::{BlockageMethod, BoxKind, ForecastMethod, Rollout};
 use umbracast::detect::{Detection, Measurer, Point};
 use umbracast::forecast::{Forecast, Forecaster, Gaussian2, Weights};
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
@@ -91,9 +91,9 @@ impl Replay {
     pub fn new(crowd: Crowd, around: &Surroundings, seed: u64) -> Self {
         let nobody = Site { access_points: Vec::new(), ..around.site.clone() };
         let mut scene = Scene::truth_only(crowd, &nobody, seed);
-        let mut measurer = whole_body_measurer(&around.site);
+        let measurer = Measurer::new(&Config::for_mode(Mode::Paper).detect, &around.site);
         let (mut truth, mut boxes) = (SceneTruth::default(), BTreeMap::new());
-        let (mut mesh, mut detections) = (Vec::new(), Vec::new());
+        let mut mesh = Vec::new();
         let mut links = vec![Vec::new(); around.widths.len()];
         while let Some(frame) = scene.next_frame() {
             note_truth(0, &frame, &mut truth);
@@ -102,9 +102,8 @@ impl Replay {
             }
             for walker in scene.walkers().iter().filter(|_| frame.index % EVERY == 0) {
                 if walker.mesh_at(frame.time_ns, &mut mesh) {
-                    measure(&mut measurer, &mesh, &mut detections);
-                    let key = (frame.index, walker.trajectory.person);
-                    boxes.extend(detections.iter().map(|d| (key, (d.aabb, d.obb))));
+                    let Detection { aabb, obb, .. } = measure(&measurer, &mesh);
+                    boxes.insert((frame.index, walker.trajectory.person), (aabb, obb));
                 }
             }
         }
@@ -270,20 +269,12 @@ fn note_links(
     }
 }
 
-/// The paper's boxes of a whole body, however many points and however large.
-fn whole_body_measurer(site: &Site) -> Measurer {
-    let mut config = Config::for_mode(Mode::Paper).detect;
-    let m = &mut config.measure;
-    (m.points_min, m.points_max, m.obb_axes) = (1, usize::MAX, ObbAxes::Eigenvectors);
-    (m.diagonal_min_m, m.diagonal_max_m) = (0.0, f64::INFINITY);
-    (m.extent_min_m, m.extent_max_m) = (0.0, f64::INFINITY);
-    Measurer::new(&config, site)
-}
-
-fn measure(measurer: &mut Measurer, mesh: &[DVec3], detections: &mut Vec<Detection>) {
+/// The paper's boxes of a body, however many points and however large.
+fn measure(measurer: &Measurer, mesh: &[DVec3]) -> Detection {
     let points: Vec<Point> =
         mesh.iter().map(|&position_m| Point { position_m, time_ns: 0, sensor: 0 }).collect();
-    measurer.detections(&points, &[(0..mesh.len() as u32).collect()], &[], detections);
+    let all: Vec<u32> = (0..mesh.len() as u32).collect();
+    measurer.detection(&points, &all, &[])
 }
 
 /// A box as high as it was and `scale` times as wide.

@@ -141,8 +141,6 @@ impl Row for TrackRow {
         see(plain("heading_sigma_rad"), Cell::F64(&mut self.heading_sigma_rad));
         see(plain("height_m"), Cell::F64(&mut self.height_m));
         see(plain("height_sigma_m"), Cell::F64(&mut self.height_sigma_m));
-        see(plain("girth"), Cell::F64(&mut self.girth));
-        see(plain("girth_sigma"), Cell::F64(&mut self.girth_sigma));
         see(plain("gait_phase_rad"), Cell::F64(&mut self.gait_phase_rad));
         see(plain("gait_concentration"), Cell::F64(&mut self.gait_concentration));
         see(plain("points"), Cell::U32(&mut self.points));

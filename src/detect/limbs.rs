@@ -1,11 +1,12 @@
-//! How arms and legs swing against each other, which tells where in the stride a walker is.
+//! How arms and legs lie against each other, which tells where in the stride a walker is.
 //!
 //! With the right foot ahead and the left one behind, legs lie along one diagonal seen from above; arms, which swing
 //! against them, along the other one. Half a stride later it is the other way round. So the product of how far a
 //! point lies ahead and how far to the left, mean of the arms less mean of the legs, goes with the cosine of the
 //! phase, once a stride, whichever side was seen.
 
-use super::{Point, Prior, WALKING_MPS};
+use super::{Point, Prior};
+use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::DVec2;
 
 /// Legs without feet, then arms with the trunk between, as shares of the height.
@@ -14,19 +15,19 @@ const ARMS_UP: std::ops::Range<f64> = 0.40..0.72;
 /// With so many points half of what there is to see is believed.
 const POINTS_AT_HALF: f64 = 3.0;
 
-/// What one frame shows of the swing.
+/// Covariance of ahead and left over arms and legs in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Swing {
+pub struct LimbCovariance {
     /// Mean of ahead times left, arms less legs, m^2.
-    pub counter_m2: f64,
-    /// Share of the swing that so many points show.
+    pub arms_less_legs_m2: f64,
+    /// Share of it that so many points show.
     pub seen: f64,
 }
 
-impl Swing {
+impl LimbCovariance {
     /// Of the points of `who`, whose axis stands at `position_m`; nothing of who stands.
     pub fn of<'a>(points: impl Iterator<Item = &'a Point>, position_m: DVec2, who: &Prior) -> Option<Self> {
-        if who.velocity_mps.length() < WALKING_MPS {
+        if who.velocity_mps.length() < WALKS_FROM_MPS {
             return None;
         }
         let ahead = who.velocity_mps.normalize();
@@ -47,7 +48,7 @@ impl Swing {
         let shown = |n: f64| n / (n + POINTS_AT_HALF);
         let mean = |(sum, n): (f64, f64)| sum / (n + POINTS_AT_HALF);
         let seen = 0.5 * (shown(legs.1) + shown(arms.1));
-        (seen > 0.0).then(|| Self { counter_m2: mean(arms) - mean(legs), seen })
+        (seen > 0.0).then(|| Self { arms_less_legs_m2: mean(arms) - mean(legs), seen })
     }
 }
 
@@ -65,7 +66,7 @@ mod tests {
     };
 
     /// A walker along y at a phase: feet under the hips, hands beside them, each a point, a swing apart.
-    fn swing_at(phase_rad: f64, who: &Prior) -> Option<Swing> {
+    fn limbs_at(phase_rad: f64, who: &Prior) -> Option<LimbCovariance> {
         let limb = |left: f64, ahead: f64, up_m: f64| Point {
             position_m: DVec3::new(-left, ahead, up_m),
             time_ns: 0,
@@ -79,12 +80,12 @@ mod tests {
             limb(0.2, 0.2 * wave, 0.8),
             limb(0.0, 0.1, 1.6),
         ];
-        Swing::of(points.iter(), DVec2::ZERO, who)
+        LimbCovariance::of(points.iter(), DVec2::ZERO, who)
     }
 
     #[test]
-    fn the_swing_goes_with_the_cosine_of_the_phase() {
-        let at = |phase_rad: f64| swing_at(phase_rad, &WHO).unwrap().counter_m2;
+    fn the_covariance_goes_with_the_cosine_of_the_phase() {
+        let at = |phase_rad: f64| limbs_at(phase_rad, &WHO).unwrap().arms_less_legs_m2;
         let most = at(0.0);
         assert!(most > 0.01, "{most}");
         for k in 0..16 {
@@ -94,9 +95,9 @@ mod tests {
     }
 
     #[test]
-    fn who_stands_does_not_swing_and_few_points_show_little() {
-        assert_eq!(swing_at(0.0, &Prior { velocity_mps: DVec2::ZERO, ..WHO }), None);
-        let seen = swing_at(0.0, &WHO).unwrap().seen;
+    fn who_stands_shows_none_and_few_points_show_little() {
+        assert_eq!(limbs_at(0.0, &Prior { velocity_mps: DVec2::ZERO, ..WHO }), None);
+        let seen = limbs_at(0.0, &WHO).unwrap().seen;
         assert!((seen - 0.4).abs() < 1e-12, "two points of legs and two of arms: {seen}");
     }
 }

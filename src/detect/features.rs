@@ -4,7 +4,8 @@
 //! own sensor by a constant, and back along the person's way to the mean time of all points; the rest is left to
 //! [`super::axis`], which is told how the points lie, in a frame along the line of sight.
 
-use super::{Point, WALKING_MPS};
+use super::Point;
+use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{DVec2, DVec3};
 
 /// Numbers that stay when the scene is mirrored at the line of sight.
@@ -18,7 +19,7 @@ const TRUNK: std::ops::Range<f64> = 0.5..0.86;
 
 /// A person's points as the model of the body axis sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
+pub struct AxisFeatures {
     /// Mean of the points, each moved away from its sensor.
     pub base_m: DVec2,
     /// Unit vector along the mean line of sight of the sensor that saw more.
@@ -39,7 +40,7 @@ struct Seen {
     sensor: u16,
 }
 
-impl View {
+impl AxisFeatures {
     /// Looks at a person's points. `velocity_mps` is the person's, where it is known.
     pub fn new<'a>(
         points: impl Iterator<Item = &'a Point> + Clone,
@@ -76,7 +77,7 @@ impl View {
         let range_m = of_main().map(|s| s.range_m).sum::<f64>() / of_main().count().max(1) as f64;
         let above_m = sensors_m.get(usize::from(main)).map_or(0.0, |s| s.z);
         let speed_mps = velocity_mps.map_or(0.0, DVec2::length);
-        let walks = speed_mps > WALKING_MPS;
+        let walks = speed_mps > WALKS_FROM_MPS;
         let ahead = velocity_mps.filter(|_| walks).map_or(DVec2::ZERO, |v| along(v.normalize_or_zero()));
 
         let band = |i: usize| (bands[i].mean().x, bands[i].n / n);
@@ -240,7 +241,7 @@ mod tests {
     }
 
     fn position_m(points: &[Point], velocity_mps: DVec2) -> DVec2 {
-        let view = View::new(points.iter(), &[SENSOR_M], 0.1, Some(velocity_mps));
+        let view = AxisFeatures::new(points.iter(), &[SENSOR_M], 0.1, Some(velocity_mps));
         AxisModel::shipped().locate(&view).0
     }
 
@@ -255,16 +256,16 @@ mod tests {
 
     #[test]
     fn the_axis_lies_behind_the_side_that_was_seen() {
-        // The near half of the body that rays meet, whose axis stands at 0.
+        // The near half of a body whose axis stands at 0: trunk, neck and head as shares of the height.
         const HEIGHT_M: f64 = 1.75;
-        let body = crate::Config::default().blockage.body;
+        let slices = [(0.54, 0.072, 0.097), (0.81, 0.074, 0.100), (1.0, 0.045, 0.035)];
         let near: Vec<(f64, f64, f64)> = (0..42)
             .filter_map(|i| {
                 let up = (f64::from(i) + 0.5) / 42.0;
-                let slice = body.slices.iter().find(|slice| slice.top > up)?;
+                let &(_, half_depth, half_width) = slices.iter().find(|(top, ..)| *top > up)?;
                 let around = 0.5 * std::f64::consts::PI * (f64::from(i * 17 % 42) / 21.0 - 1.0);
-                let (depth, width) = (slice.half_depth * around.cos(), slice.half_width * around.sin());
-                Some(((slice.ahead - depth) * HEIGHT_M, width * HEIGHT_M, up * HEIGHT_M))
+                let (depth, width) = (half_depth * around.cos(), half_width * around.sin());
+                Some((-depth * HEIGHT_M, width * HEIGHT_M, up * HEIGHT_M))
             })
             .collect();
         let seen_m = near.iter().map(|p| p.0).sum::<f64>() / near.len() as f64;

