@@ -65,9 +65,11 @@ def plot(link: pd.DataFrame, picture: Path) -> None:
     above.plot(seconds, link[f"p_w{WINDOW_STEPS}"], color="tab:blue", label=f"p_w{WINDOW_STEPS} of the person's track")
     above.set(ylabel="probability", ylim=(-0.02, 1.02), title=f"Person {person}, access point {access_point}")
     above.legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=2, frameon=False)
-    below.plot(seconds, link["track"], ".", color="black", markersize=3)
+    known = link.dropna(subset=["track"])
+    tracks = known["track"].astype("int64").astype(str)
+    below.plot(known["time_ns"] * 1e-9, tracks, ".", color="black", markersize=3)
     below.set(xlabel="time, s", ylabel="track")
-    below.yaxis.get_major_locator().set_params(integer=True)
+    below.margins(y=0.5)
     figure.savefig(picture, dpi=120)
 
 
