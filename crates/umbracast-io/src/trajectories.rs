@@ -369,7 +369,9 @@ pub fn keep_middle(people: &mut Vec<RecordedPerson>, seconds: f64) {
 fn plausible(of_person: &[Row]) -> Result<(), Error> {
     let giant = |row: &Row| row.height_m.filter(|height_m| *height_m > TALLEST_M).map(|h| (row.line, h));
     if let Some((line, height_m)) = of_person.iter().find_map(giant) {
-        let story = format!("height: expected metres, {TALLEST_M} at most, found {height_m} (centimetres?)");
+        let story = format!(
+            "height: expected metres, {TALLEST_M} at most, found {height_m}: centimetres? (PeTrack text: --unit cm)"
+        );
         return Err(at_line(line, story));
     }
     let step = |s: &[Row]| ((s[1].x_m - s[0].x_m).hypot(s[1].y_m - s[0].y_m), s[1].time - s[0].time);

@@ -160,7 +160,7 @@ fn what_is_wrong_is_told_with_file_line_expected_and_found() {
         ),
         (
             "t_s,id,x_m,y_m,height_m\n0,1,2,3,\n1,1,2,3,1.75\n2,1,2,3,175\n",
-            "file: line 4: height: expected metres, 3 at most, found 175 (centimetres?)",
+            "file: line 4: height: expected metres, 3 at most, found 175: centimetres? (PeTrack text: --unit cm)",
         ),
         ("t_s,id,x_m,y_m\n0,1,2,3\n1,1,zwei,3\n", "file: line 3: x: expected a number, found \"zwei\""),
         ("t_s,id,x_m,y_m\n0,1,2,inf\n", "file: line 2: y: expected a number, found \"inf\""),
