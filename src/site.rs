@@ -67,25 +67,55 @@ pub struct Sensor {
     /// Its name, also the topic's.
     pub name: String,
     /// `hdl-32e`, `vlp-16`, or `points` for a sensor known only by its clouds.
+    #[serde(default = "hdl_32e")]
     pub model: String,
     /// Where it hangs, metres.
     pub position_m: [f64; 3],
     /// How it is turned, applied Z-Y'-X''; positive pitch looks down.
     pub rotation_deg: Rotation,
     /// Revolutions a second.
+    #[serde(default = "ten_hz")]
     pub rate_hz: f64,
     /// The cut between two revolutions, degrees of azimuth clockwise from ahead: 180 is behind the sensor.
+    #[serde(default = "behind_deg")]
     pub cut_deg: f64,
     /// Shortest range it reports, metres.
+    #[serde(default = "nearest_m")]
     pub range_min_m: f64,
     /// Longest range it reports, metres.
+    #[serde(default = "farthest_m")]
     pub range_max_m: f64,
     /// Standard deviation of its range, metres (simulation).
+    #[serde(default = "noise_m")]
     pub range_noise_m: f64,
     /// Share of returns that are lost (simulation).
+    #[serde(default = "lost_share")]
     pub dropout: f64,
     /// Seconds after which it falls silent for good (simulation); infinite or left out: never.
     pub lost_after_s: Option<f64>,
+}
+
+// What a site file need not say of a sensor: an HDL-32E as it is delivered, cut behind, as the default site has two.
+fn hdl_32e() -> String {
+    "hdl-32e".to_owned()
+}
+fn ten_hz() -> f64 {
+    10.0
+}
+fn behind_deg() -> f64 {
+    180.0
+}
+fn nearest_m() -> f64 {
+    0.5
+}
+fn farthest_m() -> f64 {
+    50.0
+}
+fn noise_m() -> f64 {
+    0.02
+}
+fn lost_share() -> f64 {
+    0.02
 }
 
 /// Yaw, pitch and roll in degrees.
@@ -132,6 +162,15 @@ impl Ue {
             self.height_share * height_m,
         )
     }
+}
+
+/// The models that a site file may name; of `points` only clouds are known.
+pub const SENSOR_MODELS: [&str; 3] = ["hdl-32e", "vlp-16", "points"];
+
+/// The model of that name, with or without capitals and dashes: `vlp-16` of `VLP-16` and `vlp16`.
+pub fn sensor_model(name: &str) -> Option<&'static str> {
+    let letters = |name: &str| name.to_ascii_lowercase().replace(['-', '_', ' '], "");
+    SENSOR_MODELS.into_iter().find(|model| letters(model) == letters(name))
 }
 
 impl Sensor {

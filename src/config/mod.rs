@@ -9,6 +9,10 @@ mod forecast;
 mod blockage;
 mod overlay;
 mod check;
+#[cfg(test)]
+mod check_site;
+#[cfg(test)]
+mod missing;
 
 use serde::{Deserialize, Serialize};
 

@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use super::packet::{TIME_LIMIT_NS, decode};
 use super::{Cloud, Column, Frame, Model, Packet, RangeImage, Scan};
 use crate::geometry::Pose;
+use crate::site::sensor_model;
 use crate::{Error, Health, STEP_NS, Site};
 
 /// Collects packets and gives frames of 100 ms, counted from the first packet's time rounded down to a whole
@@ -68,11 +69,12 @@ impl Assembler {
     /// A sensor model that is not known.
     pub fn new(site: &Site) -> Result<Self, Error> {
         let intake = |sensor: &crate::site::Sensor| {
-            let model = match sensor.model.as_str() {
-                "points" => None,
-                name => {
-                    Some(Model::by_name(name).map_err(|e| e.within(format!("sensor {:?}", sensor.name)))?)
-                }
+            let model = match sensor_model(&sensor.model) {
+                Some("points") => None,
+                _ => Some(
+                    Model::by_name(&sensor.model)
+                        .map_err(|e| e.within(format!("sensor {:?}", sensor.name)))?,
+                ),
             };
             Ok(Intake {
                 awaited: model.is_some(),

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::Error;
 use crate::geometry::DVec3;
+use crate::site::sensor_model;
 
 /// One laser.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,9 +52,9 @@ impl Model {
     /// # Errors
     /// A name that is not known, with those that are.
     pub fn by_name(name: &str) -> Result<Self, Error> {
-        match name {
-            "hdl-32e" => Ok(Self::hdl_32e()),
-            "vlp-16" => Ok(Self::vlp_16()),
+        match sensor_model(name) {
+            Some("hdl-32e") => Ok(Self::hdl_32e()),
+            Some("vlp-16") => Ok(Self::vlp_16()),
             _ => Err(Error::new(format!("sensor model: expected hdl-32e or vlp-16, found {name:?}"))),
         }
     }
@@ -125,6 +126,16 @@ mod tests {
                 assert!((beam.z_offset_m - expected_m).abs() < 2e-5, "{} {beam:?}", model.name);
             }
         }
+    }
+
+    #[test]
+    fn a_model_is_known_with_or_without_capitals_and_dashes() {
+        for (written, name) in [("VLP-16", "vlp-16"), ("vlp16", "vlp-16"), ("HDL-32E", "hdl-32e")] {
+            assert_eq!(Model::by_name(written).unwrap().name, name);
+        }
+        let message = Model::by_name("hdl-64").unwrap_err().to_string();
+        assert_eq!(message, "sensor model: expected hdl-32e or vlp-16, found \"hdl-64\"");
+        assert!(Model::by_name("points").is_err(), "a sensor known only by its clouds sends no packets");
     }
 
     #[test]

@@ -88,7 +88,7 @@ pub struct CrowdArgs {
     #[arg(long, default_value = "orca-03")]
     pub preset: Preset,
     /// People in a scene.
-    #[arg(long, default_value_t = 10, value_name = "N")]
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = one_or_more)]
     pub people: usize,
     /// Seed of the first scene; the next ones count on. Tests begin at 200000.
     #[arg(long, value_name = "N")]
@@ -122,6 +122,11 @@ pub struct BodyArgs {
     /// Motion capture of somebody who walks, BVH: how people of the kind cmu-walk move.
     #[arg(long, value_name = "FILE", requires = "bodies")]
     pub gait: Option<PathBuf>,
+}
+
+fn one_or_more(text: &str) -> Result<usize, Error> {
+    let number = text.parse().ok().filter(|number| *number > 0);
+    number.ok_or_else(|| Error::new(format!("expected 1 or more, found {text}")))
 }
 
 fn body_share(text: &str) -> Result<(Kind, f64), Error> {
@@ -195,7 +200,7 @@ pub struct Run {
     /// Write every table as CSV too.
     #[arg(long)]
     pub csv: bool,
-    /// Where tracks and links go.
+    /// Where detections, tracks and links go.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }
@@ -226,7 +231,7 @@ pub struct Evaluate {
     #[command(flatten)]
     pub bodies: BodyArgs,
     /// People in a scene of --scenes.
-    #[arg(long, default_value_t = 10, value_name = "N")]
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = one_or_more)]
     pub people: usize,
     /// Seed of the first scene; tests begin at 200000.
     #[arg(long, value_name = "N")]
@@ -334,7 +339,7 @@ pub struct Reproduce {
 /// `inspect`
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// A recording, table, capture, cloud, the LSTM's weights or configuration.
+    /// A recording, table, capture, cloud, a network's weights or configuration.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
 }

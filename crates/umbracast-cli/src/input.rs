@@ -100,6 +100,17 @@ pub fn recordings(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(files)
 }
 
+impl std::fmt::Display for Input {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (first, more) = match self {
+            Self::Recording(file) => (file, 0),
+            Self::Clouds(files) | Self::Captures(files) => (&files[0], files.len() - 1),
+        };
+        write!(f, "{}", first.display())?;
+        if more > 0 { write!(f, " and {more} more") } else { Ok(()) }
+    }
+}
+
 impl Input {
     /// The site that the input was recorded on, where it says so.
     ///

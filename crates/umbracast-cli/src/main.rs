@@ -8,12 +8,14 @@ mod progress;
 mod say;
 mod run_json;
 mod crowds;
+mod flags;
+mod matches;
 mod input;
 mod commands;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches};
 
 use args::{Cli, Command};
 
@@ -27,7 +29,11 @@ pub enum Ending {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let given = Cli::command().get_matches();
+    let cli = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
+    if let Some((_, given)) = given.subcommand() {
+        flags::without_effect(given).iter().for_each(|told| say::note(told));
+    }
     let result = match cli.command.unwrap_or_default() {
         Command::Demo(args) => commands::demo::run(&args, &cli.common),
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),

@@ -1,5 +1,6 @@
 //! `run.json`: times and machine, which are not part of what equal runs have equal. The one place with a clock.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -28,6 +29,49 @@ impl Stopwatch {
     /// Time since the start.
     pub fn elapsed(&self) -> Duration {
         self.0.elapsed()
+    }
+}
+
+/// Ascending frame numbers in a line: `0-299,301`.
+pub fn ranges(frames: &[u64]) -> String {
+    let runs = frames.chunk_by(|before, frame| *frame == before + 1);
+    let run = |run: &[u64]| match run {
+        [one] => one.to_string(),
+        _ => format!("{}-{}", run[0], run[run.len() - 1]),
+    };
+    runs.map(run).collect::<Vec<_>>().join(",")
+}
+
+/// The frames of one scene as `run.json` has them: [`ranges`], or each number as older runs wrote them.
+#[derive(Debug, serde::Deserialize)]
+#[serde(untagged)]
+pub enum Frames {
+    /// As [`ranges`] writes them.
+    Ranges(String),
+    /// One by one.
+    Each(Vec<u64>),
+}
+
+impl Frames {
+    /// Every number.
+    ///
+    /// # Errors
+    /// Text that is no range, with it.
+    pub fn numbers(&self) -> Result<BTreeSet<u64>, Error> {
+        let text = match self {
+            Self::Each(numbers) => return Ok(numbers.iter().copied().collect()),
+            Self::Ranges(text) => text,
+        };
+        let mut numbers = BTreeSet::new();
+        for run in text.split(',').filter(|run| !run.is_empty()) {
+            let (first, last) = run.split_once('-').unwrap_or((run, run));
+            let (Ok(first), Ok(last)) = (first.parse(), last.parse::<u64>()) else {
+                let story = format!("frame_numbers: expected ranges such as 0-299,301, found {run:?}");
+                return Err(Error::new(story));
+            };
+            numbers.extend(first..=last);
+        }
+        Ok(numbers)
     }
 }
 
@@ -70,5 +114,23 @@ impl RunJson {
             true => say::line(format_args!("{:#}", Value::Object(self.0.clone()))),
             false => say::line(text),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_written_as_ranges_and_read_in_both_forms() {
+        let frames = [0, 1, 2, 5, 7, 8];
+        assert_eq!(ranges(&frames), "0-2,5,7-8");
+        assert_eq!(ranges(&[]), "");
+        for text in ["\"0-2,5,7-8\"", "[0, 1, 2, 5, 7, 8]"] {
+            let read: Frames = serde_json::from_str(text).unwrap();
+            assert!(read.numbers().unwrap().into_iter().eq(frames), "{text}");
+        }
+        let message = Frames::Ranges("0-x".to_owned()).numbers().unwrap_err().to_string();
+        assert!(message.contains("expected ranges") && message.contains("0-x"), "{message}");
     }
 }

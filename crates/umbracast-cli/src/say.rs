@@ -12,6 +12,11 @@ pub fn text(text: &str) {
     }
 }
 
+/// A word to the user that is no result: to stderr.
+pub fn note(note: &str) {
+    eprintln!("umbracast: note: {note}");
+}
+
 /// Writes a line.
 pub fn line(line: impl std::fmt::Display) {
     text(&format!("{line}\n"));

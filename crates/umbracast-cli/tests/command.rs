@@ -9,6 +9,9 @@ const CROSSING: &str = "t_s,id,x_m,y_m,height_m\n\
     0.0,1,6.0,-2.0,1.80\n1.0,1,6.0,-0.7,1.80\n2.0,1,6.0,0.6,1.80\n3.0,1,6.0,1.9,1.80\n\
     0.0,2,1.0,0.3,1.70\n1.0,2,0.0,0.3,1.70\n2.0,2,-1.0,0.3,1.70\n3.0,2,-2.0,0.3,1.70\n";
 
+/// One box, in the frame of the first sensor of the default site.
+const LABELS: &str = "frame_file,label_index,x_m,y_m,z_m\n20.pcd,0,10.0,0.0,0.0\n";
+
 fn umbracast(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_umbracast")).args(arguments).arg("--quiet").output().expect("starts")
 }
@@ -120,6 +123,101 @@ fn simulate_run_evaluate_inspect() {
     }
     let tracks = done(&["inspect", text(&out.join("tracks.parquet"))]);
     assert!(tracks.contains("x_s1_m"), "{tracks}");
+    let detections = done(&["inspect", text(&out.join("detections.parquet"))]);
+    assert!(detections.contains("top_m") && detections.contains("cov_xy_m2"), "{detections}");
+    let matches = done(&["inspect", text(&report.join("matches.parquet")), "--json"]);
+    let found: serde_json::Value = serde_json::from_str(&matches).expect("JSON");
+    let rows: u32 = found[0]["found"]["rows"].as_str().expect("rows").parse().expect("a count");
+    assert!((40..=60).contains(&rows), "two people in 30 frames: {rows}");
+    let about = fs::read_to_string(out.join("run.json")).expect("run.json");
+    assert!(about.contains("\"frame_numbers\": [\n    \"0-29\"\n  ]"), "{about}");
+}
+
+#[test]
+fn tables_alone_are_scored_and_scenes_in_memory_leave_theirs() {
+    let folder = folder("tables_alone");
+    let trajectories = folder.join("crossing.csv");
+    fs::write(&trajectories, CROSSING).expect("writes");
+    let kept = folder.join("kept");
+    done(&["evaluate", "--trajectories", text(&trajectories), "--mode", "default", "--out", text(&kept)]);
+    let tables = folder.join("tables");
+    fs::create_dir_all(&tables).expect("a folder");
+    for name in ["people", "people_links", "tracks", "links"] {
+        let name = format!("{name}.parquet");
+        fs::copy(kept.join(&name), tables.join(&name)).expect("the scene that the report shows");
+    }
+    let again = folder.join("again");
+    let said = done(&["evaluate", text(&tables), "--truth", text(&tables), "--out", text(&again)]);
+    assert!(said.contains("without config.toml the tables are taken for mode default"), "{said}");
+    let matches = |folder: &Path| fs::read(folder.join("matches.parquet")).expect("matches");
+    assert_eq!(matches(&kept), matches(&again));
+}
+
+#[test]
+fn a_run_json_that_lists_every_frame_is_still_read() {
+    let folder = folder("old_run_json");
+    let sim = simulate(&folder, "0");
+    let out = folder.join("out");
+    done(&["run", text(&sim), "--out", text(&out)]);
+    let labels = folder.join("labels.csv");
+    fs::write(&labels, LABELS).expect("writes");
+    let score = || done(&["evaluate", text(&out), "--labels", text(&labels)]);
+    let new = score();
+    let about = fs::read_to_string(out.join("run.json")).expect("run.json");
+    let each = (0..30).map(|frame| frame.to_string()).collect::<Vec<_>>().join(", ");
+    fs::write(out.join("run.json"), about.replace("\"0-29\"", &format!("[{each}]"))).expect("writes");
+    assert_eq!(score(), new);
+    assert!(new.contains("1 labels"), "{new}");
+    fs::write(out.join("run.json"), about.replace("0-29", "0-x")).expect("writes");
+    let message = ends_with(1, &["evaluate", text(&out), "--labels", text(&labels)]);
+    assert!(message.contains("run.json: frame_numbers: expected ranges"), "{message}");
+}
+
+#[test]
+fn the_networks_that_ship_are_known() {
+    for (file, kind) in [
+        ("body_axis.toml", "body axis"),
+        ("residual.safetensors", "residual network"),
+        ("paper_lstm.safetensors", "LSTM"),
+    ] {
+        let path = format!("{}/../../models/{file}", env!("CARGO_MANIFEST_DIR"));
+        assert!(done(&["inspect", &path]).contains(kind), "{file}");
+    }
+}
+
+#[test]
+fn what_changes_nothing_and_who_walks_through_walls_is_told() {
+    let folder = folder("told");
+    let (trajectories, sim) = (folder.join("crossing.csv"), folder.join("sim"));
+    fs::write(&trajectories, format!("{CROSSING}0.0,3,14.0,0.0,\n3.0,3,19.0,0.0,\n")).expect("writes");
+    let said = done(&[
+        "simulate",
+        "--trajectories",
+        text(&trajectories),
+        "--fps",
+        "25",
+        "--people",
+        "4",
+        "--out",
+        text(&sim),
+    ]);
+    assert!(said.contains("note: --fps has no effect on") && said.contains("column t_s"), "{said}");
+    assert!(said.contains("note: --people has no effect with --trajectories"), "{said}");
+    assert!(said.contains("of 3 people 1 leave the hall"), "{said}");
+}
+
+#[test]
+fn a_vlp_16_may_be_written_as_its_maker_does() {
+    let folder = folder("vlp_16");
+    let site = folder.join("lab.toml");
+    fs::write(
+        &site,
+        "[[site.sensors]]\nname = \"door\"\nmodel = \"VLP-16\"\nposition_m = [16.0, 0.0, 9.0]\n\
+         rotation_deg = { yaw = 180.0, pitch = 35.0, roll = 0.0 }\n",
+    )
+    .expect("writes");
+    let said = done(&["coverage", "--site", text(&site), "--step", "8", "--headings", "1"]);
+    assert!(said.contains("door"), "{said}");
 }
 
 #[test]
@@ -286,4 +384,6 @@ fn a_wrong_key_in_a_site_file_names_file_place_expected_and_found() {
 fn wrong_arguments_end_with_code_2() {
     ends_with(2, &["simulate"]);
     ends_with(2, &["run", "x", "--out", "y", "--mode", "best"]);
+    let message = ends_with(2, &["simulate", "--people", "0", "--out", "y"]);
+    assert!(message.contains("expected 1 or more, found 0"), "{message}");
 }

@@ -2,6 +2,8 @@
 //!
 //! Format: a tree of joints with offsets and channels, then one line of channel values a frame. Rotations apply in
 //! the order of their channels. Lengths are in the file's unit, y is up.
+//!
+//! By hand: where each joint is, which no parser of the format gives, is most of the work.
 
 use std::path::Path;
 

@@ -1,5 +1,7 @@
 //! UDP payloads from and to captures: classic pcap, either byte order, micro- or nanoseconds, Ethernet with or
 //! without VLAN tags, IPv4. Format: draft-ietf-opsawg-pcap.
+//!
+//! By hand: UDP over IPv4 alone is read, and a capture cut off or broken anywhere gives what is whole before it.
 
 use std::io::{ErrorKind, Read, Write};
 

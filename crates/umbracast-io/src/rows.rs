@@ -2,6 +2,8 @@
 #![allow(missing_docs, reason = "names carry the unit; what needs a word has one")]
 
 use serde::{Deserialize, Serialize};
+use umbracast::detect::Detection;
+use umbracast::geometry::{Aabb, Obb};
 use umbracast::track::Track;
 use umbracast::{Outcome, STEPS};
 
@@ -38,6 +40,34 @@ pub struct PeopleLinkRow {
     pub static_blocked: bool,
     /// By the own body; null while the UE is inside it.
     pub self_blocked: Option<bool>,
+}
+
+/// Our answer: one detection in one frame, before it is joined to a track.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct DetectionRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    pub x_m: f64,
+    pub y_m: f64,
+    /// Upper triangle of the covariance of (x, y): xx xy yy; null where the method does not tell.
+    pub covariance_m2: [Option<f64>; 3],
+    pub points: u32,
+    pub top_m: f64,
+    /// min x y z, max x y z.
+    pub aabb_m: [f64; 6],
+    /// centre x y z, half x y z, then the rotation's columns.
+    pub obb: [f64; 15],
+}
+
+/// Truth and answer joined: whose track a track is, in one frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct MatchRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    pub person: u32,
+    pub track: u64,
 }
 
 /// Our answer: one track in one frame.
@@ -110,11 +140,25 @@ pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, lin
     }));
 }
 
+/// The detections of one outcome.
+pub fn detections(scene: u32, outcome: &Outcome) -> impl Iterator<Item = DetectionRow> + '_ {
+    outcome.detections.iter().map(move |detection: &Detection| DetectionRow {
+        scene,
+        frame: outcome.frame,
+        time_ns: outcome.time_ns,
+        x_m: detection.position_m.x,
+        y_m: detection.position_m.y,
+        covariance_m2: detection.covariance_m2.map_or([None; 3], |c| [c[0][0], c[0][1], c[1][1]].map(Some)),
+        points: detection.points,
+        top_m: detection.top_m,
+        aabb_m: of_aabb(&detection.aabb),
+        obb: of_obb(&detection.obb),
+    })
+}
+
 /// The row of a track without a forecast, of scene 0.
 pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
     let c = &track.covariance;
-    let (b, o) = (&track.aabb, &track.obb);
-    let (lo, hi, m, h, r) = (b.min_m, b.max_m, o.center_m, o.half_m, o.site_from_box.to_cols_array());
     TrackRow {
         frame,
         time_ns,
@@ -134,8 +178,18 @@ pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
         gait_concentration: track.gait.concentration,
         points: track.points,
         confirmed: track.confirmed,
-        aabb_m: [lo.x, lo.y, lo.z, hi.x, hi.y, hi.z],
-        obb: [m.x, m.y, m.z, h.x, h.y, h.z, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]],
+        aabb_m: of_aabb(&track.aabb),
+        obb: of_obb(&track.obb),
         ..TrackRow::default()
     }
+}
+
+fn of_aabb(aabb: &Aabb) -> [f64; 6] {
+    let (low, high) = (aabb.min_m, aabb.max_m);
+    [low.x, low.y, low.z, high.x, high.y, high.z]
+}
+
+fn of_obb(obb: &Obb) -> [f64; 15] {
+    let (m, h, r) = (obb.center_m, obb.half_m, obb.site_from_box.to_cols_array());
+    [m.x, m.y, m.z, h.x, h.y, h.z, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]]
 }

@@ -9,14 +9,20 @@
 //! | CSV of PedPy and Madras | columns `frame,id,x/m,y/m[,z/m]` | the slope of `t/s`, which is rounded, over `frame`, or `fps` to be given |
 //! | PeTrack | `id frame x y [z]`, blanks or tabs, `#` comments | `# framerate:` or `fps` to be given |
 
+mod tabular;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Deserialize;
 use umbracast::Error;
 
-/// Faster than people move: half of all steps faster than this is a wrong unit or rate.
-const MOST_MPS: f64 = 15.0;
+/// Faster than people run: a wrong unit or rate.
+const MOST_MPS: f64 = 12.0;
+/// Shorter steps may be a tracker's jump, however fast: recordings at 25 Hz have some of 0.7 m.
+const JUMP_M: f64 = 1.5;
+/// Nobody is taller: a height in centimetres.
+const TALLEST_M: f64 = 3.0;
 /// Values of z that can be somebody's height; others are not read as such.
 const HEIGHTS_M: std::ops::RangeInclusive<f64> = 1.0..=2.3;
 
@@ -96,32 +102,66 @@ impl std::str::FromStr for Unit {
 /// # Errors
 /// A file that cannot be read, or as [`parse`], with its path.
 pub fn read(path: &Path, options: Options) -> Result<Vec<RecordedPerson>, Error> {
-    let bytes = std::fs::read(path).map_err(|e| Error::new(format!("{}: {e}", path.display())))?;
-    // Headers may hold Latin-1, where each byte is its code point; everything that is read is ASCII.
-    let text: String = match String::from_utf8(bytes) {
-        Ok(text) => text,
-        Err(e) => e.into_bytes().into_iter().map(char::from).collect(),
-    };
-    parse(&text, options, &path.display().to_string())
+    parse(&read_text(path)?, options, &path.display().to_string())
 }
 
 /// The same from text; `file` names it in errors.
 ///
 /// # Errors
 /// With file and line: a row that does not parse, two rows of one person at one time, a rate that is neither in
-/// the file nor given; steps that no person makes (a wrong unit or rate).
+/// the file nor given; heights that nobody has and steps that nobody makes (a wrong unit or rate). Nobody at all.
 pub fn parse(text: &str, options: Options, file: &str) -> Result<Vec<RecordedPerson>, Error> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
-    let rows = match first {
+    let rows = match first_line(text) {
         None => return Err(Error::new(format!("{file}: expected rows of recorded people, found none"))),
         Some(line) if line.starts_with('{') => trajnet_rows(text, options),
-        Some(line) if line.contains(',') => csv_rows(text, options),
+        Some(line) if line.contains(',') => tabular::rows(text, options),
         Some(_) => petrack_rows(text, options),
     };
     let people = rows.and_then(people).map_err(|e| e.within(file))?;
-    plausible(&people).map_err(|e| e.within(file))?;
+    if people.is_empty() {
+        return Err(Error::new(format!(
+            "{file}: expected rows of recorded people below the header, found none"
+        )));
+    }
     Ok(people)
+}
+
+/// What of `options` the file has no use for, because it says so itself: a flag each, with the reason.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn without_effect(path: &Path, options: Options) -> Result<Vec<String>, Error> {
+    let text = read_text(path)?;
+    let first = first_line(&text).unwrap_or_default();
+    let (has_times, in_metres) = match first {
+        _ if first.starts_with('{') => (false, true),
+        _ if first.contains(',') => (first.split(',').any(|column| column.trim() == "t_s"), true),
+        _ => (false, false),
+    };
+    let mut told = Vec::new();
+    if options.fps.is_some() && has_times {
+        told.push(format!("--fps has no effect on {}: its column t_s gives the times", path.display()));
+    }
+    if options.unit.is_some() && in_metres {
+        told.push(format!("--unit has no effect on {}: its format is in metres", path.display()));
+    }
+    Ok(told)
+}
+
+/// The first line that holds something.
+fn first_line(text: &str) -> Option<&str> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'))
+}
+
+fn read_text(path: &Path) -> Result<String, Error> {
+    let bytes = std::fs::read(path).map_err(|e| Error::new(format!("{}: {e}", path.display())))?;
+    // Headers may hold Latin-1, where each byte is its code point; everything that is read is ASCII.
+    Ok(match String::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(e) => e.into_bytes().into_iter().map(char::from).collect(),
+    })
 }
 
 fn at_line(line: usize, story: impl std::fmt::Display) -> Error {
@@ -193,7 +233,8 @@ fn trajnet_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
         }
         let Some(fps) = parsed.scene.and_then(|scene| scene.fps) else { continue };
         if stated.is_some_and(|before| before != fps) {
-            let story = format!("expected the rate of the scenes before, {stated:?}, found {fps}");
+            let before = stated.unwrap_or_default();
+            let story = format!("expected the rate of the scenes before, {before}, found {fps}");
             return Err(at_line(i + 1, story));
         }
         stated = Some(fps);
@@ -218,74 +259,6 @@ fn frame_step(rows: &[Row]) -> Option<f64> {
     }
     let commonest = counts.into_iter().max_by_key(|&(step, count)| (count, std::cmp::Reverse(step)))?;
     Some(commonest.0 as f64)
-}
-
-fn csv_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(i, line)| (i + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    let Some((header_line, header)) = lines.next() else { return Ok(Vec::new()) };
-    let columns: Vec<&str> = header.split(',').map(str::trim).collect();
-    let column = |names: &[&str]| columns.iter().position(|column| names.contains(column));
-    let needed = |names: &[&str]| {
-        let story = || format!("expected the columns t_s,id,x_m,y_m[,height_m], found {header:?}");
-        column(names).ok_or_else(|| at_line(header_line, story()))
-    };
-    let (id, x, y) = (needed(&["id"])?, needed(&["x_m", "x/m"])?, needed(&["y_m", "y/m"])?);
-    let height = column(&["height_m", "z/m"]);
-    let (time, rounded) = match (column(&["t_s"]), column(&["frame"])) {
-        (Some(time), _) => (time, None),
-        (None, Some(frame)) => (frame, column(&["t/s"])),
-        (None, None) => (needed(&["t_s"])?, None),
-    };
-
-    let mut rows = Vec::new();
-    let mut clock = Vec::new();
-    for (line, text) in lines {
-        let cells: Vec<&str> = text.split(',').map(str::trim).collect();
-        if cells.len() != columns.len() {
-            let story =
-                format!("expected {} values, found {}: {}", columns.len(), cells.len(), shorten(text));
-            return Err(at_line(line, story));
-        }
-        let height_m = match height.map(|column| cells[column]).filter(|cell| !cell.is_empty()) {
-            Some(cell) => Some(number(cell, "height", line)?),
-            None => None,
-        };
-        if let Some(rounded) = rounded {
-            clock.push([number(cells[time], "frame", line)?, number(cells[rounded], "t/s", line)?]);
-        }
-        rows.push(Row {
-            line,
-            id: whole(cells[id], "id", line)?,
-            time: number(cells[time], columns[time], line)?,
-            x_m: number(cells[x], "x", line)?,
-            y_m: number(cells[y], "y", line)?,
-            height_m,
-        });
-    }
-    if columns[time] == "t_s" {
-        return Ok(rows);
-    }
-    let fps = options.fps.or_else(|| clock_rate(&clock));
-    Ok(seconds(rows, rate(fps.ok_or_else(|| missing_rate("a column of frame numbers"))?, "fps")?))
-}
-
-/// Frames a second from frame numbers beside times that are rounded to tenths: the slope of the line through
-/// them, to the nearest whole rate where it is that near (cameras have whole ones).
-fn clock_rate(clock: &[[f64; 2]]) -> Option<f64> {
-    let n = clock.len() as f64;
-    let mean = |k: usize| clock.iter().map(|pair| pair[k]).sum::<f64>() / n;
-    let (frame, time) = (mean(0), mean(1));
-    let along: f64 = clock.iter().map(|pair| (pair[0] - frame) * (pair[1] - time)).sum();
-    let across: f64 = clock.iter().map(|pair| (pair[1] - time).powi(2)).sum();
-    let spread: f64 = clock.iter().map(|pair| (pair[0] - frame).powi(2)).sum();
-    // Over a second of frames or less, rounding to tenths hides the rate.
-    let fps = (along > 0.0 && across / n > 0.1).then(|| spread / along)?;
-    let whole = fps.round();
-    Some(if whole > 0.0 && (fps / whole - 1.0).abs() < 0.01 { whole } else { fps })
 }
 
 fn petrack_rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {
@@ -346,6 +319,7 @@ fn people(mut rows: Vec<Row>) -> Result<Vec<RecordedPerson>, Error> {
                 format!("expected one place of person {id} at {time} s, found another in line {first}");
             return Err(at_line(pair[1].line, story));
         }
+        plausible(of_person)?;
         let mut heights: Vec<f64> = of_person.iter().filter_map(|row| row.height_m).collect();
         heights.sort_by(f64::total_cmp);
         // A head's z sways with the steps; its middle is the person's.
@@ -391,21 +365,31 @@ pub fn keep_middle(people: &mut Vec<RecordedPerson>, seconds: f64) {
     people.retain(|person| !person.samples.is_empty());
 }
 
-/// A wrong unit or rate shows in the speeds.
-fn plausible(people: &[RecordedPerson]) -> Result<(), Error> {
-    let mut speeds: Vec<f64> = people
-        .iter()
-        .flat_map(|person| person.samples.windows(2))
-        .map(|s| (s[1][1] - s[0][1]).hypot(s[1][2] - s[0][2]) / (s[1][0] - s[0][0]))
-        .collect();
-    speeds.sort_by(f64::total_cmp);
-    match speeds.get(speeds.len() / 2) {
-        Some(&median) if median > MOST_MPS => Err(Error::new(format!(
-            "expected people on foot, found a median speed of {median:.0} m/s: \
-             give the unit (--unit cm) or the rate (--fps)"
-        ))),
-        _ => Ok(()),
+/// A wrong unit or rate shows in heights and speeds.
+fn plausible(of_person: &[Row]) -> Result<(), Error> {
+    let giant = |row: &Row| row.height_m.filter(|height_m| *height_m > TALLEST_M).map(|h| (row.line, h));
+    if let Some((line, height_m)) = of_person.iter().find_map(giant) {
+        let story = format!(
+            "height: expected metres, {TALLEST_M} at most, found {height_m}: centimetres? (PeTrack text: --unit cm)"
+        );
+        return Err(at_line(line, story));
     }
+    let step = |s: &[Row]| ((s[1].x_m - s[0].x_m).hypot(s[1].y_m - s[0].y_m), s[1].time - s[0].time);
+    let too_fast = |s: &&[Row]| {
+        let (step_m, step_s) = step(s);
+        step_m > JUMP_M && step_m > MOST_MPS * step_s
+    };
+    let Some(pair) = of_person.windows(2).find(too_fast) else { return Ok(()) };
+    let ((step_m, step_s), id) = (step(pair), pair[1].id);
+    Err(at_line(
+        pair[1].line,
+        format!(
+            "expected people on foot, up to {MOST_MPS} m/s, found {:.0} m/s of person {id}: {step_m:.1} m in \
+             {step_s:.3} s since line {}; give the unit (--unit cm) or the rate (--fps)",
+            step_m / step_s,
+            pair[0].line
+        ),
+    ))
 }
 
 /// The beginning of a line, for an error.

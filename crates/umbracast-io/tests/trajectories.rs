@@ -3,7 +3,9 @@
 
 use std::path::PathBuf;
 
-use umbracast_io::trajectories::{Options, RecordedPerson, Unit, keep_middle, middle_m, parse, read, shift};
+use umbracast_io::trajectories::{
+    Options, RecordedPerson, Unit, keep_middle, middle_m, parse, read, shift, without_effect,
+};
 use umbracast_sim::crowd::{Recorded, replay};
 
 /// A folder or file of the real data; prints that the test skips where there is none.
@@ -56,6 +58,29 @@ fn csv_columns_are_found_by_name() {
     assert!(refused(madras).contains("frames per second"));
     let people = parse(madras, Options { fps: Some(10.0), unit: None }, "file").unwrap();
     assert_eq!(people[0].samples[1], [0.3, -2.201, 5.107]);
+}
+
+#[test]
+fn csv_may_quote_its_cells_and_stand_between_comments_and_blank_lines() {
+    let text = "# made by hand\n\n\"t_s\", id ,x_m,y_m,note\n0.0,1,0,0,\"a, b\"\n   \n# more\n1.0,1,1,0,\n";
+    let people = parse_plain(text).unwrap();
+    assert_eq!(people[0].samples, [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]);
+}
+
+#[test]
+fn options_that_a_file_has_no_use_for_are_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = Options { fps: Some(25.0), unit: Some(Unit::Metre) };
+    let told = |name: &str, text: &str| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        without_effect(&path, options).unwrap().join("; ")
+    };
+    let timed = told("timed.csv", "t_s,id,x_m,y_m\n0,1,2,3\n");
+    assert!(timed.contains("--fps has no effect on") && timed.contains("--unit has no effect on"), "{timed}");
+    let numbered = told("numbered.csv", "frame,id,x/m,y/m\n0,1,2,3\n");
+    assert!(!numbered.contains("--fps") && numbered.contains("--unit"), "{numbered}");
+    assert_eq!(told("petrack.txt", "1 1 0 0\n"), "");
 }
 
 #[test]
@@ -126,7 +151,17 @@ fn what_is_wrong_is_told_with_file_line_expected_and_found() {
             "t_s,id,x_m\n0,1,2\n",
             "file: line 1: expected the columns t_s,id,x_m,y_m[,height_m], found \"t_s,id,x_m\"",
         ),
-        ("t_s,id,x_m,y_m\n0,1,2\n", "file: line 2: expected 4 values, found 3"),
+        ("t_s,id,x_m,y_m\n0,1,2\n", "file: line 2: expected 4 values, found 3: \"0,1,2\""),
+        ("t_s,id,x_m,y_m\r\n# none\r\n\r\n0,1,2\r\n", "file: line 4: expected 4 values, found 3"),
+        ("t_s,id,x_m,y_m\n", "file: expected rows of recorded people below the header, found none"),
+        (
+            "{\"scene\": {\"fps\": 2.5}}",
+            "file: expected rows of recorded people below the header, found none",
+        ),
+        (
+            "t_s,id,x_m,y_m,height_m\n0,1,2,3,\n1,1,2,3,1.75\n2,1,2,3,175\n",
+            "file: line 4: height: expected metres, 3 at most, found 175: centimetres? (PeTrack text: --unit cm)",
+        ),
         ("t_s,id,x_m,y_m\n0,1,2,3\n1,1,zwei,3\n", "file: line 3: x: expected a number, found \"zwei\""),
         ("t_s,id,x_m,y_m\n0,1,2,inf\n", "file: line 2: y: expected a number, found \"inf\""),
         ("t_s,id,x_m,y_m\n0,1.5,2,3\n", "file: line 2: id: expected a whole number, found \"1.5\""),
@@ -146,7 +181,7 @@ fn what_is_wrong_is_told_with_file_line_expected_and_found() {
         ),
         (
             "# framerate: 25\n1 1 0 0\n1 2 5 0\n",
-            "file: expected people on foot, found a median speed of 125 m/s",
+            "file: line 3: expected people on foot, up to 12 m/s, found 125 m/s of person 1: 5.0 m in 0.040 s since line 2",
         ),
     ] {
         let found = refused(text);

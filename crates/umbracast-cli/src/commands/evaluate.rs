@@ -4,20 +4,22 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use umbracast::forecast::Weights;
-use umbracast::{Config, Error, Health};
+use umbracast::site::AccessPoint;
+use umbracast::{Config, Error, Health, Mode};
 use umbracast_eval::chain::{self, Spec};
 use umbracast_eval::labels;
 use umbracast_eval::pooled::{self, Scores, pool};
 use umbracast_eval::report::{self, Context, Kept};
 use umbracast_eval::scene::{SceneRun, SceneTruth};
 use umbracast_eval::score::{ModeRun, SceneScore, score_scene};
-use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
+use umbracast_io::rows::{LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
 use umbracast_io::tables;
 
 use crate::args::{Common, Evaluate};
 use crate::progress::bar;
+use crate::run_json::Frames;
 use crate::setup::{self, TEST_SEED};
-use crate::{Ending, crowds, say};
+use crate::{Ending, crowds, matches, say};
 
 /// Why rungs of the ladder lie below the reference, found by switching one trait of the bodies off at a time.
 const HARSHER_BODIES: &str = "the walking bodies sway over their stance foot, swing their arms and differ in \
@@ -27,7 +29,7 @@ const HARSHER_BODIES: &str = "the walking bodies sway over their stance foot, sw
 pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
     match (&args.dir, &args.truth, &args.labels) {
         (Some(dir), Some(truth), _) => from_tables(dir, truth, args, common),
-        (Some(dir), None, Some(file)) => against_labels(dir, file, common),
+        (Some(dir), None, Some(file)) => against_labels(dir, file, args, common),
         (Some(dir), None, None) => {
             Err(Error::new("expected --truth or --labels beside the run, found neither")
                 .within(dir.display()))
@@ -45,7 +47,9 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
                 .map(|&mode| setup::config(mode, args.site.site.as_deref()))
                 .collect::<Result<Vec<Config>, _>>()?;
             let weights = setup::weights(args.weights.as_deref())?;
-            in_memory(configs, weights, crowds::dressed(drawn, &args.bodies)?, args.out.as_deref(), common)
+            let (scenes, mut told) = crowds::dressed(drawn, &args.bodies)?;
+            told.extend(crowds::through_walls(&scenes, &configs[0].site));
+            in_memory(configs, weights, (scenes, told), args.out.as_deref(), common)
         }
     }
 }
@@ -79,12 +83,26 @@ pub fn in_memory(
         truth,
         run: &runs[best],
     });
-    show(&scores, &spec.configs, kept, &told, out, common)
+    let ending = show(&scores, &spec.configs, kept, &told, out, common)?;
+    if let (Some(folder), Some((truth, runs))) = (out, &results[0].kept) {
+        write_scene(folder, &spec.configs[best], truth, &runs[best])?;
+    }
+    Ok(ending)
+}
+
+/// The scene that the report shows, as tables: its truth, what the last mode said, and whose track is whose.
+fn write_scene(folder: &Path, config: &Config, truth: &SceneTruth, run: &SceneRun) -> Result<(), Error> {
+    let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    tables::write(folder, &names, false, &truth.people)?;
+    tables::write(folder, &names, false, &truth.links)?;
+    tables::write(folder, &names, false, &run.tracks)?;
+    tables::write(folder, &names, false, &run.links)?;
+    tables::write(folder, &names, false, &matches::of_scene(0, &truth.people, &run.tracks))
 }
 
 /// Scores the tables of a run against those of its truth, scene by scene.
 fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Result<Ending, Error> {
-    let config = setup::config_of_run(dir)?;
+    let config = config_of(dir, args)?;
     same_access_points(&config, truth)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut scenes: BTreeMap<u32, (SceneTruth, SceneRun)> = BTreeMap::new();
@@ -127,7 +145,34 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
         truth,
         run,
     });
-    show(&scores, std::slice::from_ref(&config), kept, &[], args.out.as_deref(), common)
+    let ending = show(&scores, std::slice::from_ref(&config), kept, &[], args.out.as_deref(), common)?;
+    if let Some(folder) = &args.out {
+        let of_scene = |(&number, (truth, run)): (&u32, &(SceneTruth, SceneRun))| {
+            matches::of_scene(number, &truth.people, &run.tracks)
+        };
+        let pairs: Vec<MatchRow> = scenes.iter().flat_map(of_scene).collect();
+        tables::write(folder, &names, false, &pairs)?;
+    }
+    Ok(ending)
+}
+
+/// What the run was of: as it wrote beside its tables, else the site given or the default one.
+fn config_of(dir: &Path, args: &Evaluate) -> Result<Config, Error> {
+    if dir.join("config.toml").exists() {
+        return setup::config_of_run(dir);
+    }
+    let mode = match args.mode[..] {
+        [mode] => mode,
+        _ => Mode::Default,
+    };
+    let config = setup::config(mode, args.site.site.as_deref())?;
+    say::note(&format!(
+        "{}: without config.toml the tables are taken for mode {} on site {}",
+        dir.display(),
+        mode.name(),
+        config.site.name
+    ));
+    Ok(config)
 }
 
 /// Refuses the truth of other links, where its folder says of which.
@@ -141,20 +186,37 @@ fn same_access_points(run: &Config, truth: &Path) -> Result<(), Error> {
     match found == *expected {
         true => Ok(()),
         false => Err(Error::new(format!(
-            "expected the truth of the run's access points {expected:?}, found {found:?}"
+            "expected the truth of the run's access points {}, found those of {}",
+            named(expected),
+            named(&found)
         ))
         .within(truth.display())),
     }
 }
 
+/// `side (14, 0, 2) m, centre (0, 0, 3) m`
+fn named(access_points: &[AccessPoint]) -> String {
+    let name = |ap: &AccessPoint| {
+        let [x_m, y_m, z_m] = ap.position_m;
+        format!("{} ({x_m}, {y_m}, {z_m}) m", ap.name)
+    };
+    access_points.iter().map(name).collect::<Vec<_>>().join(", ")
+}
+
 /// Stage 1 against people labelled by hand.
-fn against_labels(dir: &Path, file: &Path, common: &Common) -> Result<Ending, Error> {
-    let config = setup::config_of_run(dir)?;
+fn against_labels(dir: &Path, file: &Path, args: &Evaluate, common: &Common) -> Result<Ending, Error> {
+    let config = config_of(dir, args)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let pose = config.site.sensors[0].site_from_sensor();
     let labels = labels::parse(&setup::read_text(file)?, &pose, &file.display().to_string())?;
     let tracks: Vec<TrackRow> = tables::read(dir, &names)?;
-    let run_frames: BTreeSet<u64> = about_run(dir)?.frame_numbers.into_iter().flatten().collect();
+    let run_frames: BTreeSet<u64> = match about_run(dir)?.frame_numbers {
+        Some(scenes) => {
+            let numbers = scenes.iter().map(Frames::numbers).collect::<Result<Vec<_>, _>>();
+            numbers.map_err(|e| e.within(dir.join("run.json").display()))?.into_iter().flatten().collect()
+        }
+        None => tracks.iter().map(|row| row.frame).collect(),
+    };
     // The hall is what is watched; not every mode cuts what lies outside.
     let hall = config.site.hall;
     let watched = |x_m: f64, y_m: f64| 2.0 * x_m.abs() <= hall.length_m && 2.0 * y_m.abs() <= hall.width_m;
@@ -185,15 +247,18 @@ fn against_labels(dir: &Path, file: &Path, common: &Common) -> Result<Ending, Er
 }
 
 /// What a run says of itself in `run.json`.
-#[derive(serde::Deserialize)]
+#[derive(Default, serde::Deserialize)]
 struct AboutRun {
     /// By scene: every frame, also those without a track.
-    frame_numbers: Vec<Vec<u64>>,
+    frame_numbers: Option<Vec<Frames>>,
     health: Health,
 }
 
 fn about_run(dir: &Path) -> Result<AboutRun, Error> {
     let path = dir.join("run.json");
+    if !path.exists() {
+        return Ok(AboutRun::default());
+    }
     serde_json::from_slice(&setup::read(&path)?)
         .map_err(|e| Error::new(format!("expected what `run` writes, found: {e}")).within(path.display()))
 }

@@ -6,7 +6,8 @@ use std::io::BufReader;
 use std::path::Path;
 
 use serde_json::json;
-use umbracast::forecast::Weights;
+use umbracast::detect::axis::AxisModel;
+use umbracast::forecast::{Residual, Weights};
 use umbracast::{Config, Error};
 use umbracast_io::pcap::PcapReader;
 use umbracast_io::pcd::read_pcd;
@@ -63,12 +64,27 @@ fn look(file: &Path) -> Result<Findings, Error> {
         "pcd" => cloud(&bytes()?, file, &mut found)?,
         "pcap" => capture(file, &mut found)?,
         "safetensors" => {
-            Weights::from_safetensors(&bytes()?).map_err(|e| e.within(file.display()))?;
-            found.say("kind", "weights of the paper's LSTM");
-            found.say("bytes", bytes()?.len());
+            let bytes = bytes()?;
+            let kind = match (Weights::from_safetensors(&bytes), Residual::from_safetensors(&bytes)) {
+                (Ok(_), _) => "weights of the paper's LSTM",
+                (_, Ok(_)) => "weights of the default forecast's residual network",
+                (Err(no_lstm), Err(no_residual)) => {
+                    let story = format!("neither the LSTM ({no_lstm}) nor the residual ({no_residual})");
+                    return Err(Error::new(story).within(file.display()));
+                }
+            };
+            found.say("kind", kind);
+            found.say("bytes", bytes.len());
         }
         "toml" => {
-            let config = Config::of_run(&setup::read_text(file)?, &file.display().to_string())?;
+            let text = setup::read_text(file)?;
+            if let Ok(model) = AxisModel::parse(&text) {
+                found.say("kind", "weights of the network that finds the body axis");
+                found.say("inputs", model.even_mean.len() + model.odd_scale.len());
+                found.say("hidden units", model.hidden.len());
+                return Ok(found);
+            }
+            let config = Config::of_run(&text, &file.display().to_string())?;
             found.say("kind", "configuration");
             found.say("mode", config.mode.name());
             found.say("site", &config.site.name);
@@ -149,7 +165,7 @@ fn cloud(bytes: &[u8], file: &Path, found: &mut Findings) -> Result<(), Error> {
         let finite = || field.values.iter().copied().filter(|v| v.is_finite());
         let (low, high) =
             (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
-        found.say(&field.name, format!("{:?}, {low} to {high}", field.kind));
+        found.say(&field.name, format!("{}, {low} to {high}", format!("{:?}", field.kind).to_lowercase()));
     }
     Ok(())
 }

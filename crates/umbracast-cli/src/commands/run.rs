@@ -1,4 +1,4 @@
-//! `run`: recorded input through the pipeline; tracks and links to tables.
+//! `run`: recorded input through the pipeline; detections, tracks and links to tables.
 
 use std::path::{Path, PathBuf};
 
@@ -6,13 +6,13 @@ use rayon::prelude::*;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
 use umbracast_eval::scene::SceneRun;
-use umbracast_io::rows::{self, LinkRow, TrackRow};
+use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::tables::TableWriter;
 
 use crate::args::{Common, Run};
 use crate::input::{self, Input};
 use crate::progress::bar;
-use crate::run_json::{RunJson, Stopwatch};
+use crate::run_json::{RunJson, Stopwatch, ranges};
 use crate::{Ending, setup};
 
 /// What came out of one scene.
@@ -24,6 +24,42 @@ struct Done {
     step_s: Vec<f64>,
     /// Number of every frame, with tracks or without.
     frames: Vec<u64>,
+}
+
+/// The rows of some frames.
+#[derive(Debug, Default)]
+struct Rows {
+    detections: Vec<DetectionRow>,
+    said: SceneRun,
+}
+
+/// The tables of a run.
+struct Tables {
+    detections: TableWriter<DetectionRow>,
+    tracks: TableWriter<TrackRow>,
+    links: TableWriter<LinkRow>,
+}
+
+impl Tables {
+    fn create(folder: &Path, access_points: &[String], csv: bool) -> Result<Self, Error> {
+        Ok(Self {
+            detections: TableWriter::create(folder, access_points, csv)?,
+            tracks: TableWriter::create(folder, access_points, csv)?,
+            links: TableWriter::create(folder, access_points, csv)?,
+        })
+    }
+
+    fn write(&mut self, rows: &Rows) -> Result<(), Error> {
+        self.detections.write(&rows.detections)?;
+        self.tracks.write(&rows.said.tracks)?;
+        self.links.write(&rows.said.links)
+    }
+
+    fn finish(self) -> Result<(), Error> {
+        self.detections.finish()?;
+        self.tracks.finish()?;
+        self.links.finish()
+    }
 }
 
 /// Every input is a scene with a pipeline of its own; tables are written in the order of the scenes.
@@ -41,8 +77,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let watch = Stopwatch::start();
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
-    let mut tracks = TableWriter::<TrackRow>::create(&args.out, &names, args.csv)?;
-    let mut links = TableWriter::<LinkRow>::create(&args.out, &names, args.csv)?;
+    let mut tables = Tables::create(&args.out, &names, args.csv)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
     let (mut step_s, mut frames) = (Vec::new(), Vec::new());
     let run_all = || -> Result<(), Error> {
@@ -56,10 +91,10 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         if let [input] = &inputs[..] {
             // A single input may go on for ever: its rows are written as they come.
             take(run_scene(number_of(0, input), input, &config, &weights, &empty, |rows| {
-                tracks.write(&rows.tracks)?;
-                links.write(&rows.links)?;
-                rows.tracks.clear();
-                rows.links.clear();
+                tables.write(rows)?;
+                rows.detections.clear();
+                rows.said.tracks.clear();
+                rows.said.links.clear();
                 Ok(())
             })?);
             return Ok(());
@@ -67,18 +102,18 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         let numbered: Vec<(usize, &Input)> = inputs.iter().enumerate().collect();
         for some in numbered.chunks(rayon::current_num_threads()) {
             let scene = |&(number, input): &(usize, &Input)| {
-                let mut all = SceneRun::default();
+                let mut all = Rows::default();
                 let done = run_scene(number_of(number, input), input, &config, &weights, &empty, |rows| {
-                    all.tracks.append(&mut rows.tracks);
-                    all.links.append(&mut rows.links);
+                    all.detections.append(&mut rows.detections);
+                    all.said.tracks.append(&mut rows.said.tracks);
+                    all.said.links.append(&mut rows.said.links);
                     Ok(())
                 });
                 done.map(|done| (done, all))
             };
-            for result in some.par_iter().map(scene).collect::<Vec<Result<(Done, SceneRun), Error>>>() {
+            for result in some.par_iter().map(scene).collect::<Vec<Result<(Done, Rows), Error>>>() {
                 let (done, rows) = result?;
-                tracks.write(&rows.tracks)?;
-                links.write(&rows.links)?;
+                tables.write(&rows)?;
                 take(done);
             }
         }
@@ -86,8 +121,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     };
     let result = setup::with_threads(common.threads, run_all)?;
     // What is done stays, also when a later input fails.
-    tracks.finish()?;
-    links.finish()?;
+    tables.finish()?;
     result?;
     progress.finish_and_clear();
     step_s.sort_by(f64::total_cmp);
@@ -97,7 +131,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         .with("mode", args.mode)
         .with("scenes", inputs.len())
         .with("frames", step_s.len())
-        .with("frame_numbers", &frames)
+        .with("frame_numbers", frames.iter().map(|frames| ranges(frames)).collect::<Vec<_>>())
         .with("step_ms_median", ms(0.5))
         .with("step_ms_p99", ms(0.99))
         .with("health", health)
@@ -140,7 +174,7 @@ fn recorded_site(inputs: &[Input]) -> Result<Option<Site>, Error> {
             let (expected, found) = (&first.name, &site.name);
             let story =
                 format!("site: expected {expected:?} as in the first recording, found another, {found:?}");
-            return Err(Error::new(story).within(format_args!("{input:?}")));
+            return Err(Error::new(story).within(input));
         }
         first = first.or(site);
     }
@@ -150,7 +184,7 @@ fn recorded_site(inputs: &[Input]) -> Result<Option<Site>, Error> {
             "expected --site, or recordings alone: a recording among the inputs names its site, {:?}, these name none",
             site.name
         );
-        return Err(Error::new(story).within(format_args!("{silent:?}")));
+        return Err(Error::new(story).within(silent));
     }
     Ok(first)
 }
@@ -166,9 +200,9 @@ fn run_scene(
     config: &Config,
     weights: &Weights,
     empty: &[Frame],
-    mut sink: impl FnMut(&mut SceneRun) -> Result<(), Error>,
+    mut sink: impl FnMut(&mut Rows) -> Result<(), Error>,
 ) -> Result<Done, Error> {
-    let mut rows = SceneRun::default();
+    let mut rows = Rows::default();
     let mut pipeline = Pipeline::new(config, Some(weights))?;
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     let mut done = Done::default();
@@ -178,7 +212,8 @@ fn run_scene(
         let outcome = pipeline.step(frame);
         done.step_s.push(watch.seconds());
         done.frames.push(frame.index);
-        rows::of_outcome(scene, outcome, &mut rows.tracks, &mut rows.links);
+        rows.detections.extend(rows::detections(scene, outcome));
+        rows::of_outcome(scene, outcome, &mut rows.said.tracks, &mut rows.said.links);
         stage_health = outcome.health;
         sink(&mut rows)
     })?;

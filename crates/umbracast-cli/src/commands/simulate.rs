@@ -19,7 +19,7 @@ use crate::args::{Common, Simulate};
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
-use crate::{Ending, crowds, input};
+use crate::{Ending, crowds, input, say};
 
 /// Simulates every scene, several at a time; tables are written in the order of the scenes.
 pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
@@ -30,7 +30,8 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
         true => (chain::drawn_scenes(&[preset], count, args.crowd.people, seed), Vec::new()),
         false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed)?,
     };
-    let (scenes, told) = crowds::dressed(drawn, &args.bodies)?;
+    let (scenes, mut told) = crowds::dressed(drawn, &args.bodies)?;
+    told.extend(crowds::through_walls(&scenes, &config.site));
     setup::make_dir(&args.out)?;
     refuse_other_scenes(&args.out, scenes.len())?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
@@ -69,6 +70,9 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     summary.write(&args.out)?;
     let (count, folder, wall_s) = (scenes.len(), args.out.display(), watch.seconds());
     summary.print(common, &format!("{count} scenes, {frames} frames in {folder}: {wall_s:.1} s"));
+    if !common.json {
+        told.iter().for_each(say::line);
+    }
     Ok(Ending::Done)
 }
 

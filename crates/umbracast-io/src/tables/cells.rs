@@ -4,7 +4,7 @@ use std::fmt;
 
 use umbracast::STEPS;
 
-use crate::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
+use crate::rows::{DetectionRow, LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
 
 /// A row of a table.
 pub trait Row: Copy + Default {
@@ -122,6 +122,46 @@ const OBB: [&str; 15] = [
 const STEP: [(&str, &str); 5] =
     [("x_s", "_m"), ("y_s", "_m"), ("cov_xx_s", "_m2"), ("cov_xy_s", "_m2"), ("cov_yy_s", "_m2")];
 
+impl Row for DetectionRow {
+    const TABLE: &'static str = "detections";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("x_m"), Cell::F64(&mut self.x_m));
+        see(plain("y_m"), Cell::F64(&mut self.y_m));
+        for (name, value) in ["cov_xx_m2", "cov_xy_m2", "cov_yy_m2"].into_iter().zip(&mut self.covariance_m2)
+        {
+            see(plain(name), Cell::MaybeF64(value));
+        }
+        see(plain("points"), Cell::U32(&mut self.points));
+        see(plain("top_m"), Cell::F64(&mut self.top_m));
+        see_boxes(&mut self.aabb_m, &mut self.obb, see);
+    }
+}
+
+impl Row for MatchRow {
+    const TABLE: &'static str = "matches";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("person"), Cell::U32(&mut self.person));
+        see(plain("track"), Cell::U64(&mut self.track));
+    }
+}
+
+fn see_boxes(aabb_m: &mut [f64; 6], obb: &mut [f64; 15], see: &mut dyn FnMut(Name, Cell)) {
+    for (name, value) in AABB.into_iter().zip(aabb_m) {
+        see(plain(name), Cell::F64(value));
+    }
+    for (name, value) in OBB.into_iter().zip(obb) {
+        see(plain(name), Cell::F64(value));
+    }
+}
+
 impl Row for TrackRow {
     const TABLE: &'static str = "tracks";
 
@@ -145,12 +185,7 @@ impl Row for TrackRow {
         see(plain("gait_concentration"), Cell::F64(&mut self.gait_concentration));
         see(plain("points"), Cell::U32(&mut self.points));
         see(plain("confirmed"), Cell::Bool(&mut self.confirmed));
-        for (name, value) in AABB.into_iter().zip(&mut self.aabb_m) {
-            see(plain(name), Cell::F64(value));
-        }
-        for (name, value) in OBB.into_iter().zip(&mut self.obb) {
-            see(plain(name), Cell::F64(value));
-        }
+        see_boxes(&mut self.aabb_m, &mut self.obb, see);
         for (h, step) in (1..).zip(&mut self.steps) {
             for ((before, after), value) in STEP.into_iter().zip(step) {
                 see(Name(before, Some(h), after), Cell::F64(value));

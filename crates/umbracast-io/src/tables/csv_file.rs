@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use csv::Writer;
 use umbracast::Error;
 
 use super::{Cell, Row, Values};
@@ -13,67 +13,75 @@ use super::{Cell, Row, Values};
 #[derive(Debug)]
 pub struct CsvFile {
     path: PathBuf,
-    file: File,
+    writer: Writer<File>,
     access_points: Vec<String>,
 }
 
 impl CsvFile {
     pub fn create<R: Row>(path: &Path, access_points: &[String]) -> Result<Self, Error> {
-        let failed = |e| Error::new(format!("{}: cannot be written: {e}", path.display()));
-        let mut file = File::create(path).map_err(failed)?;
         let mut names = Vec::new();
         R::default().visit(&mut |name, _| names.push(name.to_string()));
-        writeln!(file, "{}", names.join(",")).map_err(failed)?;
-        let access_points = access_points.iter().map(|name| quoted(name)).collect();
-        Ok(Self { path: path.to_owned(), file, access_points })
+        let writer = open(path, &names).map_err(|e| cannot_write(path, &e))?;
+        Ok(Self { path: path.to_owned(), writer, access_points: access_points.to_vec() })
     }
 
     pub fn write<R: Row>(&mut self, rows: &mut [R]) -> Result<(), Error> {
+        self.write_rows(rows).map_err(|e| cannot_write(&self.path, &e))
+    }
+
+    fn write_rows<R: Row>(&mut self, rows: &mut [R]) -> csv::Result<()> {
         let mut text = String::new();
         for row in rows {
+            let mut written = Ok(());
             row.visit(&mut |_, cell| {
+                text.clear();
                 // Writing to a String cannot fail.
                 let _ = match cell {
-                    Cell::U32(v) => write!(text, "{v},"),
-                    Cell::U64(v) => write!(text, "{v},"),
-                    Cell::I64(v) => write!(text, "{v},"),
-                    Cell::F64(v) => write!(text, "{v},"),
-                    Cell::Bool(v) | Cell::MaybeBool(Some(v)) => write!(text, "{v},"),
-                    Cell::MaybeF64(Some(v)) => write!(text, "{v},"),
-                    Cell::MaybeBool(None) | Cell::MaybeF64(None) => write!(text, ","),
-                    Cell::AccessPoint(v) => write!(text, "{},", self.access_points[*v as usize]),
+                    Cell::U32(v) => write!(text, "{v}"),
+                    Cell::U64(v) => write!(text, "{v}"),
+                    Cell::I64(v) => write!(text, "{v}"),
+                    Cell::F64(v) | Cell::MaybeF64(Some(v)) => write!(text, "{v}"),
+                    Cell::Bool(v) | Cell::MaybeBool(Some(v)) => write!(text, "{v}"),
+                    Cell::MaybeBool(None) | Cell::MaybeF64(None) => Ok(()),
+                    Cell::AccessPoint(v) => write!(text, "{}", self.access_points[*v as usize]),
                 };
+                if written.is_ok() {
+                    written = self.writer.write_field(&text);
+                }
             });
-            text.pop();
-            text.push('\n');
+            written?;
+            self.writer.write_record(None::<&[u8]>)?;
         }
-        let failed = |e| Error::new(format!("{}: cannot be written: {e}", self.path.display()));
-        self.file.write_all(text.as_bytes()).map_err(failed)
+        Ok(self.writer.flush()?)
     }
 }
 
 /// Writes a whole table whose columns are known at run time only.
 pub fn write_columns(path: &Path, columns: &[(String, Values)]) -> Result<(), Error> {
-    let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
-    let mut text = names.join(",") + "\n";
     let cell = |values: &Values, row: usize| match values {
         Values::F64(v) => v[row].to_string(),
         Values::MaybeF64(v) => v[row].map_or(String::new(), |v| v.to_string()),
         Values::U32(v) => v[row].to_string(),
         Values::Bool(v) => v[row].to_string(),
     };
-    for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
-        let cells: Vec<String> = columns.iter().map(|(_, values)| cell(values, row)).collect();
-        text += &(cells.join(",") + "\n");
-    }
-    let failed = |e| Error::new(format!("{}: cannot be written: {e}", path.display()));
-    std::fs::write(path, text).map_err(failed)
+    let write_all = || -> csv::Result<()> {
+        let mut writer = open(path, columns.iter().map(|(name, _)| name))?;
+        for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
+            writer.write_record(columns.iter().map(|(_, values)| cell(values, row)))?;
+        }
+        Ok(writer.flush()?)
+    };
+    write_all().map_err(|e| cannot_write(path, &e))
 }
 
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", name.replace('"', "\"\""))
-    } else {
-        name.to_owned()
-    }
+/// A new file that begins with these names.
+fn open<T: AsRef<[u8]>>(path: &Path, names: impl IntoIterator<Item = T>) -> csv::Result<Writer<File>> {
+    let mut writer = Writer::from_path(path)?;
+    writer.write_record(names)?;
+    writer.flush()?;
+    Ok(writer)
+}
+
+fn cannot_write(path: &Path, error: &csv::Error) -> Error {
+    Error::new(format!("{}: cannot be written: {error}", path.display()))
 }

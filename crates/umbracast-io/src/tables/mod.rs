@@ -172,7 +172,7 @@ pub fn describe(path: &Path) -> Result<TableSummary, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
+    use crate::rows::{DetectionRow, LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
     use umbracast::STEPS;
 
     fn access_points() -> Vec<String> {
@@ -240,6 +240,8 @@ mod tests {
         survives::<PeopleLinkRow>(50);
         survives::<TrackRow>(50);
         survives::<LinkRow>(50);
+        survives::<DetectionRow>(50);
+        survives::<MatchRow>(50);
     }
 
     #[test]
@@ -277,6 +279,30 @@ mod tests {
             ["tracks.parquet", "tracks.csv"].map(|name| std::fs::read(directory.path().join(name)).unwrap())
         });
         assert_eq!(bytes[0], bytes[1]);
+    }
+
+    #[test]
+    fn numbers_in_csv_are_as_short_as_they_read_back() {
+        let directory = tempfile::tempdir().unwrap();
+        let row = DetectionRow {
+            frame: u64::MAX,
+            time_ns: -1,
+            x_m: -1.0,
+            y_m: 0.1 + 0.2,
+            covariance_m2: [Some(1e-7), None, Some(f64::MIN_POSITIVE)],
+            top_m: f64::NAN,
+            ..Default::default()
+        };
+        write(directory.path(), &[], true, &[row]).unwrap();
+        let text = std::fs::read_to_string(directory.path().join("detections.csv")).unwrap();
+        let line = text.lines().nth(1).unwrap();
+        assert!(
+            line.starts_with("0,18446744073709551615,-1,-1,0.30000000000000004,0.0000001,,0.0"),
+            "{line}"
+        );
+        let tiny: f64 = line.split(',').nth(7).unwrap().parse().unwrap();
+        assert_eq!(tiny, f64::MIN_POSITIVE);
+        assert!(line.contains(",0,NaN,0,0"), "{line}");
     }
 
     #[test]

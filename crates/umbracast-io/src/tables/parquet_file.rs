@@ -284,6 +284,17 @@ enum Value {
     Null,
 }
 
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Whole(v) => write!(f, "{v}"),
+            Self::Real(v) => write!(f, "{v}"),
+            Self::Truth(v) => write!(f, "{v}"),
+            Self::Null => f.write_str("null"),
+        }
+    }
+}
+
 impl Value {
     fn put(self, cell: Cell) {
         match (cell, self) {
@@ -361,7 +372,7 @@ fn read_column(
     .map_err(broken)?;
     let fits = |value: &Value| !matches!((cell, value), (Cell::U32(_), Value::Whole(v)) if u32::try_from(*v).is_err());
     if let Some(row) = values.iter().position(|value| !fits(value)) {
-        return Err(Error::new(format!("row {row}: expected 0 to {}, found {:?}", u32::MAX, values[row])));
+        return Err(Error::new(format!("row {row}: expected 0 to {}, found {}", u32::MAX, values[row])));
     }
     if let (Some(row), false) = (
         values.iter().position(|v| matches!(v, Value::Null)),

@@ -1,0 +1,218 @@
+//! A site that cannot be: what stands outside the hall, angles and shares out of their range, unknown models.
+
+use crate::site::{AccessPoint, Furniture, Pillar, SENSOR_MODELS, Sensor, Ue, sensor_model};
+use crate::{Error, Site};
+
+/// No hall is longer; a longer one is in another unit.
+const HALL_MAX_M: f64 = 1000.0;
+
+/// Refuses the first value that cannot be, with its key, the name of its sensor or access point, what was expected
+/// and what was found.
+///
+/// # Errors
+/// As said; names that are empty or given twice, for recordings, tables and links go by them; no sensor.
+pub(super) fn check_site(site: &Site) -> Result<(), Error> {
+    let hall = &site.hall;
+    for (key, size_m) in [("length_m", hall.length_m), ("width_m", hall.width_m), ("height_m", hall.height_m)]
+    {
+        above_0(&format!("site.hall.{key}"), size_m, HALL_MAX_M)?;
+    }
+    if site.sensors.is_empty() {
+        return Err(Error::new("site.sensors: expected one or more, found none"));
+    }
+    names("site.sensors", site.sensors.iter().map(|sensor| &*sensor.name))?;
+    names("site.access_points", site.access_points.iter().map(|ap| &*ap.name))?;
+    site.sensors.iter().try_for_each(|s| sensor(s, site))?;
+    site.access_points.iter().try_for_each(|ap| access_point(ap, site))?;
+    site.pillars.iter().enumerate().try_for_each(|(i, p)| pillar(i, p, site))?;
+    site.furniture.iter().enumerate().try_for_each(|(i, f)| furniture(i, f, site))?;
+    ue(&site.ue)
+}
+
+fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
+    let key = |key: &str| format!("site.sensors.{}.{key}", sensor.name);
+    if sensor_model(&sensor.model).is_none() {
+        let (known, found) = (SENSOR_MODELS.join(", "), &sensor.model);
+        return Err(Error::new(format!("{}: expected one of {known}, found {found:?}", key("model"))));
+    }
+    // Outdoors, the hall is the part that is watched, and a sensor known by its clouds may stand beside it.
+    match sensor_model(&sensor.model) {
+        Some("points") => within(&key("position_m, z"), sensor.position_m[2], 0.0, site.hall.height_m)?,
+        _ => in_hall(&key("position_m"), sensor.position_m, site)?,
+    }
+    let turn = &sensor.rotation_deg;
+    within(&key("rotation_deg.yaw"), turn.yaw, -360.0, 360.0)?;
+    within(&key("rotation_deg.pitch"), turn.pitch, -90.0, 90.0)?;
+    within(&key("rotation_deg.roll"), turn.roll, -180.0, 180.0)?;
+    within(&key("rate_hz"), sensor.rate_hz, 1.0, 50.0)?;
+    within(&key("cut_deg"), sensor.cut_deg, 0.0, 360.0)?;
+    within(&key("range_min_m"), sensor.range_min_m, 0.0, HALL_MAX_M)?;
+    above_0(&key("range_max_m"), sensor.range_max_m, HALL_MAX_M)?;
+    if sensor.range_max_m <= sensor.range_min_m {
+        let (min_m, max_m) = (sensor.range_min_m, sensor.range_max_m);
+        let story = format!("{}: expected more than range_min_m, {min_m}, found {max_m}", key("range_max_m"));
+        return Err(Error::new(story));
+    }
+    within(&key("range_noise_m"), sensor.range_noise_m, 0.0, 1.0)?;
+    within(&key("dropout"), sensor.dropout, 0.0, 1.0)?;
+    // Infinite: never.
+    within(&key("lost_after_s"), sensor.lost_after_s.unwrap_or(0.0), 0.0, f64::INFINITY)
+}
+
+fn access_point(ap: &AccessPoint, site: &Site) -> Result<(), Error> {
+    in_hall(&format!("site.access_points.{}.position_m", ap.name), ap.position_m, site)
+}
+
+fn pillar(index: usize, pillar: &Pillar, site: &Site) -> Result<(), Error> {
+    let key = |key: &str| format!("site.pillars[{index}].{key}");
+    on_floor(&key("position_m"), pillar.position_m, site)?;
+    above_0(&key("radius_m"), pillar.radius_m, 0.5 * site.hall.length_m.min(site.hall.width_m))
+}
+
+fn furniture(index: usize, furniture: &Furniture, site: &Site) -> Result<(), Error> {
+    let key = |key: &str| format!("site.furniture[{index}].{key}");
+    on_floor(&key("position_m"), furniture.position_m, site)?;
+    let [length_m, width_m, height_m] = furniture.size_m;
+    let longest_m = site.hall.length_m.hypot(site.hall.width_m);
+    above_0(&key("size_m, x"), length_m, longest_m)?;
+    above_0(&key("size_m, y"), width_m, longest_m)?;
+    above_0(&key("size_m, z"), height_m, site.hall.height_m)?;
+    within(&key("yaw_deg"), furniture.yaw_deg, -360.0, 360.0)
+}
+
+fn ue(ue: &Ue) -> Result<(), Error> {
+    within("site.ue.forward_m", ue.forward_m, -2.0, 2.0)?;
+    within("site.ue.left_m", ue.left_m, -2.0, 2.0)?;
+    // Over the head of who holds it up.
+    within("site.ue.height_share", ue.height_share, 0.0, 1.5)
+}
+
+fn names<'a>(key: &str, names: impl Iterator<Item = &'a str>) -> Result<(), Error> {
+    let mut before = Vec::new();
+    for name in names {
+        if name.is_empty() || before.contains(&name) {
+            let story = format!("{key}: expected a name of its own for each, found {name:?} twice or empty");
+            return Err(Error::new(story));
+        }
+        before.push(name);
+    }
+    Ok(())
+}
+
+fn in_hall(key: &str, [x_m, y_m, z_m]: [f64; 3], site: &Site) -> Result<(), Error> {
+    on_floor(key, [x_m, y_m], site)?;
+    within(&format!("{key}, z (from the floor to the ceiling)"), z_m, 0.0, site.hall.height_m)
+}
+
+fn on_floor(key: &str, [x_m, y_m]: [f64; 2], site: &Site) -> Result<(), Error> {
+    let (ahead_m, aside_m) = (0.5 * site.hall.length_m, 0.5 * site.hall.width_m);
+    within(&format!("{key}, x (within the hall)"), x_m, -ahead_m, ahead_m)?;
+    within(&format!("{key}, y (within the hall)"), y_m, -aside_m, aside_m)
+}
+
+/// Not a number is within nothing.
+fn within(key: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {
+    match (least..=most).contains(&value) {
+        true => Ok(()),
+        false => Err(Error::new(format!("{key}: expected {least} to {most}, found {value}"))),
+    }
+}
+
+fn above_0(key: &str, value: f64, most: f64) -> Result<(), Error> {
+    match value > 0.0 && value <= most {
+        true => Ok(()),
+        false => Err(Error::new(format!("{key}: expected more than 0 and {most} at most, found {value}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Config, Mode};
+
+    const SITES: [&str; 2] = [
+        include_str!("../../config/sites/logictronix.toml"),
+        include_str!("../../config/sites/lost-sensor.toml"),
+    ];
+
+    #[test]
+    fn every_site_that_ships_is_accepted() {
+        for text in SITES.into_iter().chain([""]) {
+            let config = Config::with_overlay(Mode::Default, text, "site.toml").unwrap();
+            check_site(&config.site).unwrap();
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_key_name_expected_and_found() {
+        type Change = fn(&mut Site);
+        let wrong: [(Change, &str); 24] = [
+            (|s| s.hall.height_m = 0.0, "site.hall.height_m: expected more than 0 and 1000 at most, found 0"),
+            (|s| s.hall.width_m = f64::NAN, "site.hall.width_m: expected more than 0"),
+            (|s| s.sensors.clear(), "site.sensors: expected one or more, found none"),
+            (|s| s.sensors[1].name = "lidar_east".into(), "site.sensors: expected a name of its own"),
+            (|s| s.access_points[0].name.clear(), "site.access_points: expected a name of its own"),
+            (
+                |s| s.sensors[0].model = "hdl-64".into(),
+                "site.sensors.lidar_east.model: expected one of hdl-32e, vlp-16, points, found \"hdl-64\"",
+            ),
+            (
+                |s| s.sensors[0].position_m[2] = -1.0,
+                "site.sensors.lidar_east.position_m, z (from the floor to the ceiling): expected 0 to 10, found -1",
+            ),
+            (|s| s.sensors[1].position_m[2] = 11.0, "site.sensors.lidar_west.position_m, z"),
+            (
+                |s| s.sensors[0].position_m[0] = 40.0,
+                "site.sensors.lidar_east.position_m, x (within the hall): expected -17 to 17, found 40",
+            ),
+            (
+                |s| s.sensors[0].rotation_deg.pitch = 120.0,
+                "site.sensors.lidar_east.rotation_deg.pitch: expected -90 to 90, found 120",
+            ),
+            (|s| s.sensors[0].rotation_deg.yaw = f64::INFINITY, "site.sensors.lidar_east.rotation_deg.yaw"),
+            (|s| s.sensors[0].rotation_deg.roll = 181.0, "site.sensors.lidar_east.rotation_deg.roll"),
+            (
+                |s| s.sensors[0].rate_hz = 600.0,
+                "site.sensors.lidar_east.rate_hz: expected 1 to 50, found 600",
+            ),
+            (
+                |s| s.sensors[0].cut_deg = 500.0,
+                "site.sensors.lidar_east.cut_deg: expected 0 to 360, found 500",
+            ),
+            (
+                |s| s.sensors[0].range_min_m = 60.0,
+                "site.sensors.lidar_east.range_max_m: expected more than range_min_m, 60, found 50",
+            ),
+            (|s| s.sensors[0].range_noise_m = -0.1, "site.sensors.lidar_east.range_noise_m: expected 0 to 1"),
+            (|s| s.sensors[0].dropout = 2.0, "site.sensors.lidar_east.dropout: expected 0 to 1, found 2"),
+            (|s| s.sensors[0].lost_after_s = Some(-3.0), "site.sensors.lidar_east.lost_after_s: expected 0"),
+            (|s| s.access_points[1].position_m[2] = 12.0, "site.access_points.centre.position_m, z"),
+            (|s| s.access_points[0].position_m[1] = -30.0, "site.access_points.side.position_m, y"),
+            (|s| s.pillars[2].radius_m = -1.0, "site.pillars[2].radius_m: expected more than 0"),
+            (|s| s.furniture[1].size_m[2] = 20.0, "site.furniture[1].size_m, z: expected more than 0 and 10"),
+            (|s| s.furniture[0].position_m[0] = 99.0, "site.furniture[0].position_m, x"),
+            (|s| s.ue.height_share = 50.0, "site.ue.height_share: expected 0 to 1.5, found 50"),
+        ];
+        for (change, story) in wrong {
+            let mut site = Config::default().site;
+            change(&mut site);
+            let found = check_site(&site).unwrap_err().to_string();
+            assert!(found.starts_with(story), "{found}");
+        }
+    }
+
+    /// Six values were to be repeated for each sensor though all are defaults.
+    #[test]
+    fn a_sensor_needs_name_place_and_rotation_alone() {
+        let text = "[[site.sensors]]\nname = \"door\"\nposition_m = [16.0, 0.0, 9.0]\n\
+                    rotation_deg = { yaw = 180.0, pitch = 35.0, roll = 0.0 }\n";
+        let site = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap().site;
+        check_site(&site).unwrap();
+        let default = &Config::default().site.sensors[0];
+        let expected = Sensor { name: "door".into(), lost_after_s: None, ..default.clone() };
+        assert_eq!(site.sensors, [expected]);
+        let unknown = format!("{text}range_m = 3.0\n");
+        let message = Config::with_overlay(Mode::Default, &unknown, "lab.toml").unwrap_err().to_string();
+        assert!(message.starts_with("lab.toml:5:") && message.contains("`range_m`"), "{message}");
+    }
+}
