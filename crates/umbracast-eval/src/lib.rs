@@ -2,8 +2,9 @@
 //!
 //! Every score is computed from the rows of the tables (`umbracast_io::rows`), so a run in memory and a run
 //! read back from files give the same numbers. A scene is scored alone and leaves sums behind; the sums of many
-//! scenes are pooled, and the spread between scenes gives the intervals.
+//! scenes are pooled, and the spread between recordings gives the intervals.
 
+pub mod fingerprint;
 pub mod scene;
 #[cfg(test)]
 mod hand_made;

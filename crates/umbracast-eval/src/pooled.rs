@@ -1,4 +1,4 @@
-//! The scores: sums of all scenes pooled, by preset and together, with intervals by bootstrap over scenes.
+//! The scores: sums of all scenes pooled, by preset and together, with intervals by bootstrap over recordings.
 
 use serde::{Deserialize, Serialize};
 use umbracast::{Health, Mode, STEPS, Site};
@@ -15,12 +15,12 @@ use crate::times::{TimeTally, Times};
 /// The group of all scenes, where there are several presets.
 pub const ALL: &str = "all";
 
-/// A score and where it lies in 95 % of resamples of the scenes. Null where it is not defined.
+/// A score and where it lies in 95 % of resamples of the recordings. Null where it is not defined.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Of all scenes pooled.
     pub value: Option<f64>,
-    /// Lower and upper end; null with fewer than five scenes.
+    /// Lower and upper end; null with fewer than five recordings.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -38,6 +38,8 @@ pub struct Group {
     pub name: String,
     /// How many scenes.
     pub scenes: usize,
+    /// How many recordings they replay: as many as scenes, unless one was replayed several times.
+    pub recordings: usize,
     /// Frames of all of them.
     pub frames: u64,
     /// Stage 3: one a predictor and access point.
@@ -237,7 +239,8 @@ impl Group {
 }
 
 fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group {
-    let bootstrap = Bootstrap::new(scenes.len());
+    let recordings: Vec<u64> = scenes.iter().map(|scene| scene.recording).collect();
+    let bootstrap = Bootstrap::new(&recordings);
     let mut links = Vec::new();
     let mut modes = Vec::new();
     let mut constant_velocity_m = Vec::new();
@@ -266,6 +269,7 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
     Group {
         name: name.to_owned(),
         scenes: scenes.len(),
+        recordings: bootstrap.recordings(),
         frames,
         links,
         modes,

@@ -97,6 +97,8 @@ pub struct SceneScore {
     pub scene: u32,
     /// What it is pooled with: the preset, or the file it was replayed from.
     pub group: String,
+    /// What it replays ([`TruthIndex::recording`]): scenes of one recording say the same thing several times.
+    pub recording: u64,
     /// How many frames it has.
     pub frames: u64,
     /// Constant velocity from the true state, for comparison with stage 2.
@@ -184,6 +186,7 @@ pub fn score_scene(
     Ok(SceneScore {
         scene,
         group: group.to_owned(),
+        recording: index.recording(),
         frames: index.frames.len() as u64,
         constant_velocity: Displacement::of(&index, carried_on),
         said,
