@@ -12,6 +12,7 @@ pub mod bootstrap;
 pub mod instances;
 pub mod tally;
 pub mod matching;
+pub mod device;
 pub mod identity;
 pub mod stage1;
 pub mod displacement;

@@ -10,6 +10,7 @@ use umbracast_io::rows::TrackRow;
 use umbracast_sim::body::Walker;
 
 use crate::casts;
+use crate::device::bound_once;
 use crate::displacement::Displacement;
 use crate::instances::instances;
 use crate::links::{Said, never, persistence_of_truth};
@@ -26,6 +27,8 @@ use crate::true_forecasts::TrueForecasts;
 pub enum Predictor {
     /// The mode itself.
     Run,
+    /// The mode itself, heard through devices that are bound to a track once ([`crate::device`]).
+    BoundOnce,
     /// The mode with Algorithm 1 on axis-aligned boxes for its stage 3.
     Aabb,
     /// The mode with Algorithm 1 on boxes along people's own axes for its stage 3.
@@ -51,6 +54,7 @@ impl Predictor {
     pub fn name(self) -> &'static str {
         match self {
             Self::Run => "run",
+            Self::BoundOnce => "run with devices bound once",
             Self::Aabb => "AABB",
             Self::Obb => "OBB",
             Self::Never => "never",
@@ -151,7 +155,9 @@ pub fn score_scene(
         let of_tracks = |said: Said| said.of_tracks(&instances, &matching);
         let of_persons = |said: Said| said.of_persons(&instances);
         add(mode, Predictor::PersistenceOfTracks, own.persistence(&instances, &matching));
-        add(mode, Predictor::Run, of_tracks(own));
+        let bound = bound_once(&index, rows, &matching);
+        add(mode, Predictor::Run, own.of_tracks(&instances, &matching));
+        add(mode, Predictor::BoundOnce, own.of_tracks(&instances, &bound));
         add(mode, Predictor::Aabb, of_tracks(casts::algorithm_1(rows, config, BoxKind::Aabb)));
         add(mode, Predictor::Obb, of_tracks(casts::algorithm_1(rows, config, BoxKind::Obb)));
         add(
