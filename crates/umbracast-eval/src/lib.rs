@@ -19,7 +19,7 @@ pub mod displacement;
 pub mod links;
 pub mod times;
 pub mod true_forecasts;
-pub mod casts;
+pub mod oracles;
 pub mod true_bodies;
 pub mod score;
 pub mod ladder;

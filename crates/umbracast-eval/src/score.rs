@@ -9,12 +9,12 @@ use umbracast::{Config, Error, Health, Mode};
 use umbracast_io::rows::TrackRow;
 use umbracast_sim::body::Walker;
 
-use crate::casts;
 use crate::device::bound_once;
 use crate::displacement::Displacement;
 use crate::instances::instances;
 use crate::links::{Said, never, persistence_of_truth};
 use crate::matching::match_scene;
+use crate::oracles;
 use crate::scene::{SceneRun, SceneTruth, TruthIndex};
 use crate::stage1::Stage1;
 use crate::tally::{LinkTally, Prediction};
@@ -158,16 +158,16 @@ pub fn score_scene(
         let bound = bound_once(&index, rows, &matching);
         add(mode, Predictor::Run, own.of_tracks(&instances, &matching));
         add(mode, Predictor::BoundOnce, own.of_tracks(&instances, &bound));
-        add(mode, Predictor::Aabb, of_tracks(casts::algorithm_1(rows, config, BoxKind::Aabb)));
-        add(mode, Predictor::Obb, of_tracks(casts::algorithm_1(rows, config, BoxKind::Obb)));
+        add(mode, Predictor::Aabb, of_tracks(oracles::algorithm_1(rows, config, BoxKind::Aabb)));
+        add(mode, Predictor::Obb, of_tracks(oracles::algorithm_1(rows, config, BoxKind::Obb)));
         add(
             mode,
             Predictor::ConstantVelocityOfTruth,
-            of_persons(casts::constant_velocity_of_truth(&index, config)),
+            of_persons(oracles::constant_velocity_of_truth(&index, config)),
         );
-        let true_state = casts::true_state(&index, rows, &matching, config, weights, &mut true_forecasts)?;
+        let true_state = oracles::true_state(&index, rows, &matching, config, weights, &mut true_forecasts)?;
         add(mode, Predictor::TrueState, of_persons(true_state));
-        add(mode, Predictor::TrueFuture, of_tracks(casts::true_future(&index, rows, &matching, config)));
+        add(mode, Predictor::TrueFuture, of_tracks(oracles::true_future(&index, rows, &matching, config)));
         if let Some(walkers) = walkers {
             add(mode, Predictor::TrueBody, of_tracks(true_bodies(rows, &matching, walkers, &config.site)));
         }
@@ -175,7 +175,7 @@ pub fn score_scene(
             rows.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
         let forecast = |frame, person| {
             let track = matching.get(&(frame, person))?;
-            forecasts.get(&(frame, *track)).map(|row| casts::forecast_of(row))
+            forecasts.get(&(frame, *track)).map(|row| oracles::forecast_of(row))
         };
         modes.push(ModeSums {
             mode: config.mode,
@@ -187,7 +187,7 @@ pub fn score_scene(
     }
     let carried_on = |frame, person| {
         let psd = runs.first()?.config.forecast.acceleration_psd_m2ps3;
-        Some(casts::constant_velocity_steps(index.person(frame, person)?, psd))
+        Some(oracles::constant_velocity_steps(index.person(frame, person)?, psd))
     };
     Ok(SceneScore {
         scene,

@@ -9,8 +9,8 @@ use umbracast_io::rows::TrackRow;
 use umbracast_sim::body::Walker;
 use umbracast_sim::truth::BodyMesh;
 
-use crate::casts::forecast_of;
 use crate::links::Said;
+use crate::oracles::forecast_of;
 use crate::scene::{Matching, SceneRun};
 use crate::tally::Prediction;
 

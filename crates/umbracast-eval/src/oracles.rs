@@ -1,4 +1,4 @@
-//! Casts that no run makes, from the rows of truth and run: the constant-velocity baseline, and the error budget,
+//! What oracles would cast and no run does, from the rows of truth and run: the constant-velocity baseline, and the error budget,
 //! in which each stage in turn is replaced by the truth and the rest stays as in the mode.
 
 use std::collections::{BTreeMap, VecDeque};
