@@ -8,9 +8,10 @@ pub mod fingerprint;
 pub mod scene;
 #[cfg(test)]
 mod hand_made;
+pub mod counts;
 pub mod bootstrap;
 pub mod instances;
-pub mod tally;
+pub mod link_counts;
 pub mod matching;
 pub mod device;
 pub mod identity;

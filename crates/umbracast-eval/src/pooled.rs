@@ -5,12 +5,13 @@ use umbracast::{Health, Mode, STEPS, Site};
 
 use crate::bootstrap::{Bootstrap, Pooled, interval};
 use crate::chain::SceneResult;
+use crate::counts::Counts;
 use crate::displacement::Displacement;
 use crate::ladder::{self, LadderRow, SceneLadder};
+use crate::link_counts::{Bin, LinkCounts};
 use crate::score::{Predictor, SceneScore};
 use crate::stage1::Stage1;
-use crate::tally::{Bin, Counts, LinkTally};
-use crate::times::{TimeTally, Times};
+use crate::times::{TimeCounts, Times};
 
 /// The group of all scenes, where there are several presets.
 pub const ALL: &str = "all";
@@ -159,12 +160,12 @@ pub struct TimeScores {
 }
 
 impl TimeScores {
-    fn of(tally: &TimeTally) -> Self {
+    fn of(counts: &TimeCounts) -> Self {
         Self {
-            told: tally.told,
-            coverage: tally.coverage(),
-            mean_error_s: tally.mean_error_s(),
-            median_error_s: tally.median_error_s(),
+            told: counts.told,
+            coverage: counts.coverage(),
+            mean_error_s: counts.mean_error_s(),
+            median_error_s: counts.median_error_s(),
         }
     }
 }
@@ -247,7 +248,7 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
     if let Some(first) = scenes.first() {
         for (i, said) in first.said.iter().enumerate() {
             for (a, access_point) in access_points.iter().enumerate() {
-                let of_scenes: Vec<&LinkTally> =
+                let of_scenes: Vec<&LinkCounts> =
                     scenes.iter().filter_map(|scene| scene.said.get(i)?.access_points.get(a)).collect();
                 let mut windows = windows(&bootstrap, &of_scenes);
                 if said.predictor != Predictor::Run {
@@ -278,28 +279,28 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
     }
 }
 
-fn windows(bootstrap: &Bootstrap, scenes: &[&LinkTally]) -> Vec<WindowScores> {
-    let pooled = LinkTally::pooled(scenes);
+fn windows(bootstrap: &Bootstrap, scenes: &[&LinkCounts]) -> Vec<WindowScores> {
+    let pooled = LinkCounts::pooled(scenes);
     let of = |i: usize| {
-        let (tally, leads) = (&pooled.windows[i], &pooled.leads[i]);
+        let (counts, leads) = (&pooled.windows[i], &pooled.leads[i]);
         let all = Spread::of(bootstrap, scenes.iter().map(|scene| scene.windows[i].all));
         let onset = Spread::of(bootstrap, scenes.iter().map(|scene| scene.windows[i].onset));
         WindowScores {
             w: i + 1,
-            counts: tally.all,
-            onset_counts: tally.onset,
+            counts: counts.all,
+            onset_counts: counts.onset,
             base_rate: all.estimate(Counts::base_rate),
             accuracy: all.estimate(Counts::accuracy),
             precision: all.estimate(Counts::precision),
             recall: all.estimate(Counts::recall),
             f1: all.estimate(Counts::f1),
             onset_f1: onset.estimate(Counts::f1),
-            auprc: tally.auprc(),
-            brier: tally.brier(),
-            ece: tally.ece(),
+            auprc: counts.auprc(),
+            brier: counts.brier(),
+            ece: counts.ece(),
             lead_median_s: leads.median_s(),
             lead_warned: leads.warned_share(),
-            bins: tally.bins.to_vec(),
+            bins: counts.bins.to_vec(),
         }
     };
     (0..STEPS).map(of).collect()

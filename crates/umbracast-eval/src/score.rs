@@ -12,12 +12,12 @@ use umbracast_sim::body::Walker;
 use crate::device::bound_once;
 use crate::displacement::Displacement;
 use crate::instances::instances;
+use crate::link_counts::{LinkCounts, Prediction};
 use crate::links::{Said, never, persistence_of_truth};
 use crate::matching::match_scene;
 use crate::oracles;
 use crate::scene::{SceneRun, SceneTruth, TruthIndex};
 use crate::stage1::Stage1;
-use crate::tally::{LinkTally, Prediction};
 use crate::times::Times;
 use crate::true_bodies::true_bodies;
 use crate::true_forecasts::TrueForecasts;
@@ -70,13 +70,13 @@ impl Predictor {
 
 /// What a predictor said in one scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PredictorTally {
+pub struct PredictorCounts {
     /// `None` for baselines that need no mode.
     pub mode: Option<Mode>,
     /// Who.
     pub predictor: Predictor,
     /// One an access point of the site.
-    pub access_points: Vec<LinkTally>,
+    pub access_points: Vec<LinkCounts>,
 }
 
 /// Stages 1 and 2 of a mode in one scene.
@@ -108,7 +108,7 @@ pub struct SceneScore {
     /// Constant velocity from the true state, for comparison with stage 2.
     pub constant_velocity: Displacement,
     /// In the order of the tables.
-    pub said: Vec<PredictorTally>,
+    pub said: Vec<PredictorCounts>,
     /// In the order of the modes.
     pub modes: Vec<ModeSums>,
 }
@@ -142,8 +142,8 @@ pub fn score_scene(
     let site_access_points = runs.first().map_or(0, |run| run.config.site.access_points.len()) as u32;
     let mut said = Vec::new();
     let mut add = |mode: Option<Mode>, predictor: Predictor, predictions: Vec<Prediction>| {
-        let access_points = LinkTally::each(&instances, &predictions, site_access_points);
-        said.push(PredictorTally { mode, predictor, access_points });
+        let access_points = LinkCounts::each(&instances, &predictions, site_access_points);
+        said.push(PredictorCounts { mode, predictor, access_points });
     };
     add(None, Predictor::Never, never(&instances));
     add(None, Predictor::PersistenceOfTruth, persistence_of_truth(&instances));

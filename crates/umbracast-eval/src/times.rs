@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use umbracast::{STEP_S, STEPS};
 use umbracast_io::rows::LinkRow;
 
+use crate::counts::ratio;
 use crate::instances::Instance;
 use crate::scene::{Matching, SceneRun, TruthIndex};
-use crate::tally::ratio;
 
 /// Quantiles that were told of one kind of time at one access point.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct TimeTally {
+pub struct TimeCounts {
     /// Links whose 10 % quantile was told: a chance of one in ten that it happens within the steps.
     pub told: u64,
     /// Those of them where it happened between the 10 and the 90 % quantile; one that was not told is later than
@@ -26,11 +26,11 @@ pub struct TimeTally {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Times {
     /// From in sight to blocked.
-    pub onset: TimeTally,
+    pub onset: TimeCounts,
     /// From blocked to in sight.
-    pub duration: TimeTally,
+    pub duration: TimeCounts,
     /// From in sight, through the first blockage that comes, to in sight again; where one came.
-    pub again: TimeTally,
+    pub again: TimeCounts,
 }
 
 impl Times {
@@ -76,7 +76,7 @@ impl Times {
     }
 }
 
-impl TimeTally {
+impl TimeCounts {
     fn add(&mut self, quantiles_s: &[Option<f64>; 3], happened: Option<usize>) {
         let [Some(low_s), median_s, high_s] = *quantiles_s else { return };
         // Times are whole steps; half a step of room for rounding.
@@ -121,14 +121,14 @@ mod tests {
 
     #[test]
     fn what_happens_later_than_the_last_step_is_later_than_any_quantile() {
-        let mut tally = TimeTally::default();
-        tally.add(&[Some(0.2), Some(0.4), None], None);
-        assert_eq!((tally.told, tally.covered, tally.errors_s.len()), (1, 1, 0));
-        tally.add(&[Some(0.2), Some(0.4), Some(0.6)], None);
-        tally.add(&[Some(0.2), Some(0.4), None], Some(1));
-        assert_eq!((tally.told, tally.covered), (3, 1));
-        tally.add(&[None; 3], Some(3));
-        assert_eq!(tally.told, 3, "nothing told");
+        let mut counts = TimeCounts::default();
+        counts.add(&[Some(0.2), Some(0.4), None], None);
+        assert_eq!((counts.told, counts.covered, counts.errors_s.len()), (1, 1, 0));
+        counts.add(&[Some(0.2), Some(0.4), Some(0.6)], None);
+        counts.add(&[Some(0.2), Some(0.4), None], Some(1));
+        assert_eq!((counts.told, counts.covered), (3, 1));
+        counts.add(&[None; 3], Some(3));
+        assert_eq!(counts.told, 3, "nothing told");
     }
 
     #[test]

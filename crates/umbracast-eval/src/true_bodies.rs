@@ -9,10 +9,10 @@ use umbracast_io::rows::TrackRow;
 use umbracast_sim::body::Walker;
 use umbracast_sim::truth::BodyMesh;
 
+use crate::link_counts::Prediction;
 use crate::links::Said;
 use crate::oracles::forecast_of;
 use crate::scene::{Matching, SceneRun};
-use crate::tally::Prediction;
 
 /// Casts, yes or no, at the forecast means. Who is not followed blocks nobody; a track of nobody has no body.
 ///
