@@ -334,12 +334,12 @@ pub(crate) mod tests {
 
     #[test]
     fn three_people_in_the_open_are_followed_and_their_truth_is_kept() {
-        let told = AtomicU64::new(0);
+        let reported = AtomicU64::new(0);
         let results = run(&spec(1), |_| {
-            told.fetch_add(1, Ordering::Relaxed);
+            reported.fetch_add(1, Ordering::Relaxed);
         })
         .unwrap();
-        assert_eq!(told.into_inner(), 25);
+        assert_eq!(reported.into_inner(), 25);
         let (truth, runs) = results[0].kept.as_ref().unwrap();
         assert_eq!(truth.people.len(), 3 * 25);
         assert_eq!(runs.len(), 1);

@@ -146,11 +146,11 @@ pub struct ModeScores {
     pub health: Health,
 }
 
-/// Times told by their quantiles: of the onset of a blockage, or of its end.
+/// Times reported by their quantiles: of the onset of a blockage, or of its end.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TimeScores {
-    /// Links of which a time was told.
-    pub told: u64,
+    /// Links of which a time was reported.
+    pub reported: u64,
     /// Share of them between the 10 and the 90 % quantile.
     pub coverage: Option<f64>,
     /// Mean size of the 50 % quantile's error, seconds.
@@ -162,7 +162,7 @@ pub struct TimeScores {
 impl TimeScores {
     fn of(counts: &TimeCounts) -> Self {
         Self {
-            told: counts.told,
+            reported: counts.reported,
             coverage: counts.coverage(),
             mean_error_s: counts.mean_error_s(),
             median_error_s: counts.median_error_s(),

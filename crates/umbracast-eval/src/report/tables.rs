@@ -265,7 +265,7 @@ pub fn baselines(group: &Group, access_point: &str) -> Table {
     )
 }
 
-/// When a link is blocked and when it is clear again, of every mode that tells it.
+/// When a link is blocked and when it is clear again, of every mode that reports it.
 pub fn times(group: &Group) -> Table {
     let header =
         ["mode", "access point", "time until", "links", "in 10 to 90 %", "median error, s", "mean error, s"];
@@ -273,12 +273,12 @@ pub fn times(group: &Group) -> Table {
     for mode in &group.modes {
         for (access_point, kinds) in group.access_points().into_iter().zip(&mode.times) {
             let until = ["blocked", "clear", "clear again"];
-            for (until, scores) in until.into_iter().zip(kinds).filter(|(_, s)| s.told > 0) {
+            for (until, scores) in until.into_iter().zip(kinds).filter(|(_, s)| s.reported > 0) {
                 table.rows.push(vec![
                     mode.mode.name().to_owned(),
                     access_point.to_owned(),
                     until.to_owned(),
-                    scores.told.to_string(),
+                    scores.reported.to_string(),
                     number(scores.coverage, 3),
                     number(scores.median_error_s, 2),
                     number(scores.mean_error_s, 2),
