@@ -148,7 +148,7 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, heading_
 }
 
 /// A track at the true positions of its person, now and at every step. The present is moved as well: a body
-/// turns as its way does, and a way from an estimate to the truth would turn it by the estimate's error.
+/// turns as its trajectory does, and one from an estimate to the truth would turn it by the estimate's error.
 fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow) -> (Track, Forecast) {
     let (aabb, obb) = box_moved_to(own, now);
     let position_m = DVec2::new(now.x_m, now.y_m);
