@@ -105,8 +105,8 @@ pub fn quantile(sorted: &[f64], q: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn scene(hits: u64, misses: u64) -> Counts {
-        Counts { true_positive: hits, false_negative: misses, ..Counts::default() }
+    fn scene(matched: u64, missed: u64) -> Counts {
+        Counts { true_positive: matched, false_negative: missed, ..Counts::default() }
     }
 
     fn interval_of(scenes: &[Counts], score: fn(&Counts) -> Option<f64>) -> Option<[f64; 2]> {
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn the_interval_is_that_of_the_binomial_when_scenes_are_all_or_nothing() {
-        // 50 scenes of one instance each, half of them hit: recall is a mean of 50 coin flips, sd 0.0707.
+        // 50 scenes of one instance each, half of them matched: recall is a mean of 50 coin flips, sd 0.0707.
         let scenes: Vec<Counts> = (0..50).map(|i| scene(i % 2, 1 - i % 2)).collect();
         let [low, high] = interval_of(&scenes, Counts::recall).unwrap();
         assert!((low - 0.36).abs() < 0.03 && (high - 0.64).abs() < 0.03, "{low} {high}");

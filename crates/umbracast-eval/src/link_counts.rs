@@ -125,11 +125,11 @@ impl WindowCounts {
     /// times the gain in recall. `None` when nothing was blocked.
     pub fn auprc(&self) -> Option<f64> {
         let positives: u64 = self.ranking.iter().map(|r| u64::from(r.2)).sum();
-        let (mut hits, mut said, mut area) = (0_u64, 0_u64, 0.0);
+        let (mut matched, mut said, mut area) = (0_u64, 0_u64, 0.0);
         for &(_, clear, blocked) in &self.ranking {
-            hits += u64::from(blocked);
+            matched += u64::from(blocked);
             said += u64::from(blocked) + u64::from(clear);
-            area += f64::from(blocked) * hits as f64 / said as f64;
+            area += f64::from(blocked) * matched as f64 / said as f64;
         }
         (positives > 0).then(|| area / positives as f64)
     }
