@@ -160,7 +160,7 @@ fn boxes(group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
         title: format!("The paper's figure again: AABB and OBB, access point {access_point}"),
         caption: format!(
             "Algorithm 1 with axis-aligned (line) and oriented boxes (dashed) on the tracks and forecasts of every \
-             mode; shaded: 95 % intervals over recordings. The paper finds more recall and the higher F1 with OBB, more \
+             mode; shaded: 95 % intervals over scenes. The paper finds more recall and the higher F1 with OBB, more \
              precision with AABB, and precision and recall crossing near 300 ms. Blocked at 300 ms: {} here, {:.2} \
              in the paper.",
             base_rate(group, access_point),
@@ -183,7 +183,7 @@ fn metrics(group: &Group, access_point: &str) -> Result<Figure, Error> {
         title: format!("Blockage within the window, access point {access_point}"),
         caption: format!(
             "Accuracy, precision, recall and F1 of every mode over the prediction window, with what the paper \
-             prints for 300 ms and the level at which its F1 settles; shaded: 95 % intervals over recordings. The \
+             prints for 300 ms and the level at which its F1 settles; shaded: 95 % intervals over scenes. The \
              share of blocked windows differs: {} here at 300 ms, {:.2} in the paper.",
             base_rate(group, access_point),
             published::BASE_RATE_AT_300_MS
