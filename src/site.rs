@@ -1,6 +1,8 @@
 //! Where everything stands: hall, sensors, access points, and where on a body the UE is. SI units, site frame,
 //! z up, floor at z = 0. Read from the `site` part of a configuration file; see `config/default.toml`.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +26,8 @@ pub struct Site {
     pub access_points: Vec<AccessPoint>,
     /// Where on a body the UE is.
     pub ue: Ue,
+    /// What only a simulator reads.
+    pub simulation: Simulation,
 }
 
 /// A rectangular room centred on the origin.
@@ -85,14 +89,9 @@ pub struct Sensor {
     /// Longest range it reports, metres.
     #[serde(default = "farthest_m")]
     pub range_max_m: f64,
-    /// Standard deviation of its range, metres (simulation).
+    /// Standard deviation of its range, metres: how near the background a return may lie and still be new follows.
     #[serde(default = "noise_m")]
     pub range_noise_m: f64,
-    /// Share of returns that are lost (simulation).
-    #[serde(default = "lost_share")]
-    pub dropout: f64,
-    /// Seconds after which it falls silent for good (simulation); infinite or left out: never.
-    pub lost_after_s: Option<f64>,
 }
 
 // What a site file need not say of a sensor: an HDL-32E as it is delivered, cut behind, as the default site has two.
@@ -114,8 +113,15 @@ fn farthest_m() -> f64 {
 fn noise_m() -> f64 {
     0.02
 }
-fn lost_share() -> f64 {
-    0.02
+
+/// How simulated sensors fail.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Simulation {
+    /// Share of returns that are lost.
+    pub dropout: f64,
+    /// Sensors that fall silent for good, by name: after how many seconds.
+    pub lost_after_s: BTreeMap<String, f64>,
 }
 
 /// Yaw, pitch and roll in degrees.

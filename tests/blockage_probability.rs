@@ -60,6 +60,8 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         heading_sigma_rad: 0.0,
         height_m: HEIGHT_M,
         height_sigma_m: 0.0,
+        width_scale: 1.0,
+        width_scale_sigma: 0.0,
         gait: GaitPhase::UNKNOWN,
         points: 30,
         confirmed: true,

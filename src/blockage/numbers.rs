@@ -15,8 +15,8 @@ pub struct Numbers {
     pub joint: bool,
     /// What a ray meets.
     pub body: BodyModel,
-    /// How people differ from that body in depth and width, one standard deviation as a share of it: the trunks of adults
-    /// over their heights (0.058), and what arms and clothes add on tuning scenes (0.055).
+    /// How bodies differ in depth and width from the scales that tracks know, one standard deviation as a share of the
+    /// body: arms and clothes on tuning scenes.
     pub width_sigma: f64,
     /// How bodies differ from the heights that tracks know, one standard deviation.
     pub height_sigma_m: f64,
@@ -43,7 +43,7 @@ impl Numbers {
             seed: config.seed,
             joint: !without(Mechanism::JointSampling),
             body,
-            width_sigma: 0.08,
+            width_sigma: 0.055,
             height_sigma_m: 0.02,
             heading_sigma_rad: 10.0_f64.to_radians(),
         }

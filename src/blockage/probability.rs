@@ -256,6 +256,7 @@ impl Traits {
     ) -> Self {
         let height_sigma_m = track.height_sigma_m.hypot(numbers.height_sigma_m);
         let height_m = (track.height_m + height_sigma_m * draws.height[k]).max(0.5);
+        let width_sigma = track.width_scale_sigma.hypot(numbers.width_sigma);
         let speed_mps = (velocity + drift).length();
         let trunk_rad = numbers.heading_sigma_rad;
         let turn_rad = if velocity.length() > WALKS_FROM_MPS {
@@ -268,7 +269,7 @@ impl Traits {
         Self {
             turn: DVec2::from_angle(turn_rad),
             height_m,
-            width_scale: (1.0 + numbers.width_sigma * draws.width[k]).clamp(0.5, 1.8),
+            width_scale: (track.width_scale + width_sigma * draws.width[k]).clamp(0.5, 1.8),
             speed_mps,
             phase_rad: phases.at(draws.phase[k]),
             phase_step_rad: if stride_m > 0.0 { TAU * speed_mps * STEP_S / stride_m } else { 0.0 },

@@ -1,7 +1,8 @@
 //! Values of the right kind that cannot work.
 
+use super::check_site::check_site;
 use super::{Config, Mechanism};
-use crate::{Error, Site};
+use crate::Error;
 
 /// More samples than this take longer than a frame lasts, and more memory than is there.
 const SAMPLES_MAX: usize = 16_384;
@@ -41,33 +42,7 @@ pub(super) fn check(config: &Config) -> Result<(), Error> {
             return Err(Error::new(format!("{stage}.without: expected {own}, found {found}")));
         }
     }
-    site(&config.site)
-}
-
-/// Recordings, tables and links find sensors and access points by their names.
-fn site(site: &Site) -> Result<(), Error> {
-    if site.sensors.is_empty() {
-        return Err(Error::new("site.sensors: expected one or more, found none"));
-    }
-    let sensors: Vec<&str> = site.sensors.iter().map(|sensor| sensor.name.as_str()).collect();
-    let access_points: Vec<&str> = site.access_points.iter().map(|ap| ap.name.as_str()).collect();
-    for (key, names) in [("site.sensors", sensors), ("site.access_points", access_points)] {
-        if let Some((_, twice)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
-            return Err(Error::new(format!("{key}: expected a name for each, found {twice:?} twice")));
-        }
-    }
-    let hall = &site.hall;
-    for (key, size_m) in [("length_m", hall.length_m), ("width_m", hall.width_m), ("height_m", hall.height_m)] {
-        more_than_0(&format!("site.hall.{key}"), size_m)?;
-    }
-    for sensor in &site.sensors {
-        more_than_0(&format!("site.sensors {}: rate_hz", sensor.name), sensor.rate_hz)?;
-    }
-    for pillar in &site.pillars {
-        more_than_0("site.pillars: radius_m", pillar.radius_m)?;
-    }
-    let mut sizes_m = site.furniture.iter().flat_map(|furniture| furniture.size_m);
-    sizes_m.try_for_each(|size_m| more_than_0("site.furniture: size_m", size_m))
+    check_site(&config.site)
 }
 
 fn more_than_0(key: &str, value: f64) -> Result<(), Error> {
@@ -91,10 +66,10 @@ mod tests {
             ("[blockage]\nsamples = 0", "blockage.samples"),
             ("[blockage]\nthreshold = 1.5", "blockage.threshold"),
             ("[site]\nsensors = []", "site.sensors"),
-            ("[[site.pillars]]\nposition_m = [1.0, 2.0]\nradius_m = -1.0", "site.pillars: radius_m"),
+            ("[[site.pillars]]\nposition_m = [1.0, 2.0]\nradius_m = -1.0", "site.pillars[0].radius_m"),
             (
                 "[[site.furniture]]\nposition_m = [1.0, 2.0]\nsize_m = [1.0, 0.0, 1.0]\nyaw_deg = 0.0",
-                "site.furniture: size_m",
+                "site.furniture[0].size_m",
             ),
         ] {
             let message = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();

@@ -26,7 +26,8 @@ pub(super) fn check_site(site: &Site) -> Result<(), Error> {
     site.access_points.iter().try_for_each(|ap| access_point(ap, site))?;
     site.pillars.iter().enumerate().try_for_each(|(i, p)| pillar(i, p, site))?;
     site.furniture.iter().enumerate().try_for_each(|(i, f)| furniture(i, f, site))?;
-    ue(&site.ue)
+    ue(&site.ue)?;
+    simulation(site)
 }
 
 fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
@@ -53,10 +54,20 @@ fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
         let story = format!("{}: expected more than range_min_m, {min_m}, found {max_m}", key("range_max_m"));
         return Err(Error::new(story));
     }
-    within(&key("range_noise_m"), sensor.range_noise_m, 0.0, 1.0)?;
-    within(&key("dropout"), sensor.dropout, 0.0, 1.0)?;
-    // Infinite: never.
-    within(&key("lost_after_s"), sensor.lost_after_s.unwrap_or(0.0), 0.0, f64::INFINITY)
+    within(&key("range_noise_m"), sensor.range_noise_m, 0.0, 1.0)
+}
+
+fn simulation(site: &Site) -> Result<(), Error> {
+    within("site.simulation.dropout", site.simulation.dropout, 0.0, 1.0)?;
+    for (name, &after_s) in &site.simulation.lost_after_s {
+        let key = format!("site.simulation.lost_after_s.{name}");
+        if !site.sensors.iter().any(|sensor| sensor.name == *name) {
+            let known: Vec<&str> = site.sensors.iter().map(|sensor| &*sensor.name).collect();
+            return Err(Error::new(format!("{key}: expected one of {}, found {name}", known.join(", "))));
+        }
+        within(&key, after_s, 0.0, f64::INFINITY)?;
+    }
+    Ok(())
 }
 
 fn access_point(ap: &AccessPoint, site: &Site) -> Result<(), Error> {
@@ -184,8 +195,11 @@ mod tests {
                 "site.sensors.lidar_east.range_max_m: expected more than range_min_m, 60, found 50",
             ),
             (|s| s.sensors[0].range_noise_m = -0.1, "site.sensors.lidar_east.range_noise_m: expected 0 to 1"),
-            (|s| s.sensors[0].dropout = 2.0, "site.sensors.lidar_east.dropout: expected 0 to 1, found 2"),
-            (|s| s.sensors[0].lost_after_s = Some(-3.0), "site.sensors.lidar_east.lost_after_s: expected 0"),
+            (|s| s.simulation.dropout = 2.0, "site.simulation.dropout: expected 0 to 1, found 2"),
+            (
+                |s| drop(s.simulation.lost_after_s.insert("door".into(), 3.0)),
+                "site.simulation.lost_after_s.door: expected one of lidar_east, lidar_west, found door",
+            ),
             (|s| s.access_points[1].position_m[2] = 12.0, "site.access_points.centre.position_m, z"),
             (|s| s.access_points[0].position_m[1] = -30.0, "site.access_points.side.position_m, y"),
             (|s| s.pillars[2].radius_m = -1.0, "site.pillars[2].radius_m: expected more than 0"),
@@ -209,7 +223,7 @@ mod tests {
         let site = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap().site;
         check_site(&site).unwrap();
         let default = &Config::default().site.sensors[0];
-        let expected = Sensor { name: "door".into(), lost_after_s: None, ..default.clone() };
+        let expected = Sensor { name: "door".into(), ..default.clone() };
         assert_eq!(site.sensors, [expected]);
         let unknown = format!("{text}range_m = 3.0\n");
         let message = Config::with_overlay(Mode::Default, &unknown, "lab.toml").unwrap_err().to_string();

@@ -28,6 +28,8 @@ pub enum Mechanism {
     LimbPhase,
     /// Stage 1: how tall a person is; plainest: as tall as adults on the mean.
     Height,
+    /// Stage 1: how wide a body is; plainest: as wide as usual.
+    BodyWidth,
     /// Stage 1: children and people who sit.
     ChildrenAndSeated,
     /// Stage 2: the residual network; plainest: constant velocity.
@@ -48,7 +50,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All, in the order of the data.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::RangeModel,
         Self::CountTest,
         Self::GuidedAssignment,
@@ -59,6 +61,7 @@ impl Mechanism {
         Self::Sway,
         Self::LimbPhase,
         Self::Height,
+        Self::BodyWidth,
         Self::ChildrenAndSeated,
         Self::Residual,
         Self::ResidualDeparture,
@@ -81,7 +84,8 @@ impl Mechanism {
             | Self::StandingModel
             | Self::Sway
             | Self::LimbPhase
-            | Self::Height => &["track"],
+            | Self::Height
+            | Self::BodyWidth => &["track"],
             Self::ResidualDeparture | Self::ResidualNeighbours => &["forecast"],
             Self::Arms | Self::ArmSwing | Self::TrunkSway | Self::JointSampling => &["blockage"],
         }
@@ -100,6 +104,7 @@ impl Mechanism {
             Self::Sway => "sway",
             Self::LimbPhase => "limb-phase",
             Self::Height => "height",
+            Self::BodyWidth => "body-width",
             Self::ChildrenAndSeated => "children-and-seated",
             Self::Residual => "residual",
             Self::ResidualDeparture => "residual-departure",

@@ -7,12 +7,10 @@ mod detect;
 mod track;
 mod forecast;
 mod blockage;
-mod overlay;
-mod check;
-#[cfg(test)]
-mod check_site;
-#[cfg(test)]
 mod missing;
+mod overlay;
+mod check_site;
+mod check;
 
 use serde::{Deserialize, Serialize};
 

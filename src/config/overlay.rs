@@ -5,6 +5,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
+use super::missing;
 use crate::Error;
 
 /// Parses `(file name, text)` layers, each over the ones before it. The first layer is complete and says which
@@ -22,8 +23,17 @@ pub(super) fn parse<T: DeserializeOwned>(layers: &[(&str, &str)]) -> Result<T, E
         known.get_or_insert_with(|| table.clone());
         merge(&mut merged, table);
     }
-    let file = layers.last().map_or("", |layer| layer.0);
-    merged.try_into().map_err(|e: toml::de::Error| Error::new(e.message().to_owned()).within(file))
+    let (file, text) = layers.last().copied().unwrap_or_default();
+    merged.try_into().map_err(|e: toml::de::Error| {
+        let lacking = e.message().strip_prefix("missing field `").and_then(|rest| rest.strip_suffix('`'));
+        let place = lacking.and_then(|field| {
+            missing::place(DeTable::parse(text).ok()?.get_ref(), known.as_ref()?, field)
+        });
+        match place {
+            Some((offset, path)) => at(file, text, offset, format!("{path}: {}", e.message())),
+            None => Error::new(e.message().to_owned()).within(file),
+        }
+    })
 }
 
 fn merge(base: &mut Table, over: Table) {
@@ -40,6 +50,10 @@ fn merge(base: &mut Table, over: Table) {
 type Complain<'a> = &'a dyn Fn(usize, String) -> Error;
 
 fn check_table(found: &DeTable<'_>, known: &Table, path: &str, complain: Complain<'_>) -> Result<(), Error> {
+    // A table that is empty in the defaults takes names that are the user's.
+    if known.is_empty() && !path.is_empty() {
+        return Ok(());
+    }
     for (key, value) in found {
         let name = key.get_ref();
         let Some(expected) = known.get(name.as_ref()) else {

@@ -179,6 +179,8 @@ pub(super) mod tests {
             heading_sigma_rad: 0.0,
             height_m: 1.75,
             height_sigma_m: 0.0,
+            width_scale: 1.0,
+            width_scale_sigma: 0.0,
             gait: crate::gait::GaitPhase::UNKNOWN,
             points: 30,
             confirmed: true,

@@ -10,6 +10,7 @@ pub mod kalman;
 mod limb_phase;
 pub mod visibility;
 mod height;
+mod width;
 mod person;
 pub mod mixture;
 pub mod paper;
@@ -33,6 +34,9 @@ const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
 /// How fast who stands may turn away from the last heading: 40 degrees (one sigma) in a second. A guess: nothing
 /// that is measured here tells it.
 const STANDING_TURN_RAD2PS: f64 = 0.5;
+
+/// One standard deviation of the width scale of adults of whom nothing is known.
+pub const WIDTH_SCALE_SIGMA: f64 = width::PRIOR_SIGMA;
 
 /// Follows people by the method of the config.
 #[derive(Debug, Clone)]
@@ -92,6 +96,10 @@ pub struct Track {
     pub height_m: f64,
     /// One standard deviation of `height_m`.
     pub height_sigma_m: f64,
+    /// Depths and widths of the body beside those of a usual one of this height: 1.
+    pub width_scale: f64,
+    /// One standard deviation of `width_scale`.
+    pub width_scale_sigma: f64,
     /// Where in the stride, as arms and legs tell it.
     pub gait: GaitPhase,
     /// Points of this frame's detection; 0 while it coasts.

@@ -44,6 +44,8 @@ pub struct Numbers {
     pub visibility: bool,
     /// Whether arms and legs tell the phase of the gait.
     pub limb_phase: bool,
+    /// Whether extents of detections tell how wide a body is.
+    pub body_width: bool,
     /// One standard deviation of adults' heights.
     pub height_sigma_m: f64,
     /// Chance that somebody new is a child, or sits: of any height up to 1.5 m. Below 1. How often they come does not
@@ -74,6 +76,7 @@ impl Numbers {
             noise_share: 0.7,
             visibility: !without(Mechanism::Visibility),
             limb_phase: !without(Mechanism::LimbPhase),
+            body_width: !without(Mechanism::BodyWidth),
             height_sigma_m: if without(Mechanism::Height) { 1e-3 } else { 0.09 },
             children_share: 0.1,
             clutter_per_m2: config.clutter_per_m2,

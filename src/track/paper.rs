@@ -7,7 +7,7 @@
 
 use super::association::{FORBIDDEN, greedy, in_order, optimal};
 use super::gaussian::State;
-use super::{ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, seconds};
+use super::{ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, WIDTH_SCALE_SIGMA, seconds};
 use crate::Frame;
 use crate::detect::Detection;
 use crate::gait::{GaitPhase, WALKS_FROM_MPS};
@@ -218,6 +218,8 @@ impl Person {
             heading_sigma_rad: self.heading_variance_rad2.sqrt(),
             height_m: self.top_m,
             height_sigma_m: 0.0,
+            width_scale: 1.0,
+            width_scale_sigma: WIDTH_SCALE_SIGMA,
             gait: GaitPhase::UNKNOWN,
             points: self.points,
             confirmed: true,

@@ -6,6 +6,7 @@ use super::kalman::Filter;
 use super::limb_phase::LimbPhase;
 use super::numbers::Numbers;
 use super::visibility::{Body, BodyView};
+use super::width::BodyWidth;
 use super::{ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, seconds};
 use crate::detect::{Detection, Prior};
 use crate::gait::WALKS_FROM_MPS;
@@ -62,6 +63,7 @@ pub(super) struct Person {
     /// When the track was last given out.
     given_ns: i64,
     height: Height,
+    width: BodyWidth,
     /// Averaged extent along x and y.
     extent_m: DVec2,
     observed: Observations,
@@ -86,6 +88,7 @@ impl Person {
             heading_variance_rad2: ANY_HEADING_RAD2,
             given_ns: time_ns,
             height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
+            width: BodyWidth::default(),
             extent_m: DVec2::splat(WIDTH_M),
             observed: Observations::default(),
         };
@@ -161,6 +164,7 @@ impl Person {
         self.given_ns = time_ns;
         self.observed.push(time_ns, position_m, velocity_mps);
         let (aabb, obb) = self.boxes(position_m);
+        let (width_scale, width_scale_sigma) = self.width.scale();
         Track {
             id: self.id,
             position_m,
@@ -170,6 +174,8 @@ impl Person {
             heading_sigma_rad: self.heading_variance_rad2.sqrt(),
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
+            width_scale,
+            width_scale_sigma,
             gait: self.limb_phase.phase(velocity_mps.length()),
             points: self.points,
             confirmed: self.confirmed && largest_sigma(state.position_covariance()) < REPORTED_SIGMA_MAX_M,
@@ -194,10 +200,14 @@ impl Person {
     /// Learns what a detection says of the body's shape and gait.
     fn see(&mut self, numbers: &Numbers, detection: &Detection, view: &BodyView, step_s: f64) {
         self.points = detection.points;
+        let speed_mps = self.speed_mps();
         if let Some(limbs) = detection.limbs.as_ref().filter(|_| numbers.limb_phase) {
-            self.limb_phase.see(limbs, self.speed_mps(), self.height.mean_m());
+            self.limb_phase.see(limbs, speed_mps, self.height.mean_m());
         }
         self.height.see(detection.top_m, view.beams_per_m_at_top);
+        if numbers.body_width {
+            self.width.see(detection, view, self.height.mean_m(), speed_mps);
+        }
         let new = 1.0 - (-step_s / BOX_AVERAGE_S).exp();
         self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
     }

@@ -301,7 +301,7 @@ fn a_sensor_that_the_site_loses_is_counted_in_the_run_s_health() {
     let site = folder.join("lost.toml");
     let sensors =
         fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/sites/lost-sensor.toml"));
-    let sensors = sensors.expect("a site that ships").replace("lost_after_s = 14.0", "lost_after_s = 1.0");
+    let sensors = sensors.expect("a site that ships").replace("lidar_west = 14.0", "lidar_west = 1.0");
     fs::write(&site, sensors).expect("writes");
     let (trajectories, sim, out) = (folder.join("crossing.csv"), folder.join("sim"), folder.join("out"));
     fs::write(&trajectories, CROSSING).expect("writes");

@@ -22,10 +22,10 @@ use umbracast_eval::explain::table_one::{
     displacement_m, fitted, means_m, off_table_one_m, standing_still_m,
 };
 use umbracast_eval::ladder;
+use umbracast_eval::link_counts::LinkCounts;
 use umbracast_eval::report::published::{DISPLACEMENT_M, F1_AT_300_MS};
 use umbracast_eval::report::tables::Table;
 use umbracast_eval::score::Predictor;
-use umbracast_eval::tally::LinkTally;
 use umbracast_sim::crowd::Preset;
 
 /// Tuning seeds only (docs/CONVENTIONS.md).
@@ -184,13 +184,13 @@ fn whole_chain(scenes: usize, weights: &Weights) -> Result<Chain, Error> {
 }
 
 /// What a run said of the links of `side`, the first access point.
-fn side_links(results: &[SceneResult], run: usize) -> LinkTally {
+fn side_links(results: &[SceneResult], run: usize) -> LinkCounts {
     let of = |scene: &'_ SceneResult| {
         let mut runs = scene.score.said.iter().filter(|said| said.predictor == Predictor::Run);
         runs.nth(run).map(|said| said.access_points[0].clone())
     };
-    let scenes: Vec<LinkTally> = results.iter().filter_map(of).collect();
-    LinkTally::pooled(&scenes.iter().collect::<Vec<_>>())
+    let scenes: Vec<LinkCounts> = results.iter().filter_map(of).collect();
+    LinkCounts::pooled(&scenes.iter().collect::<Vec<_>>())
 }
 
 fn blockage_table(scenes: usize) -> Table {

@@ -12,16 +12,17 @@ use umbracast::{Config, Error, Frame, Pipeline};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
 use crate::bootstrap::{Bootstrap, Pooled, interval, quantile};
-use crate::casts;
 use crate::chain::{Chain, Lane, SceneSpec, Spec};
 use crate::displacement::Displacement;
 use crate::instances::instances;
 use crate::labels;
 use crate::links::Said;
 use crate::matching::match_scene;
+use crate::oracles;
 use crate::scene::{Matching, SceneRun, SceneTruth, TruthIndex};
 use crate::stage1::Stage1;
-use crate::tally::{Counts, ECE_BINS, LinkTally, Tally};
+use crate::counts::Counts;
+use crate::link_counts::{ECE_BINS, LinkCounts, WindowCounts};
 
 mod table;
 
@@ -160,8 +161,8 @@ impl Sums {
         let instances = instances(&index);
         let matching = match_scene(&truth.people, &run.tracks);
         let predictions = Said::by_run(run).of_tracks(&instances, &matching);
-        let first = LinkTally::each(&instances, &predictions, access_points).into_iter().next();
-        let Tally { all, onset, bins, .. } = first.unwrap_or_default().windows[WINDOW - 1].clone();
+        let first = LinkCounts::each(&instances, &predictions, access_points).into_iter().next();
+        let WindowCounts { all, onset, bins, .. } = first.unwrap_or_default().windows[WINDOW - 1].clone();
         Self {
             all,
             onset,
@@ -182,7 +183,7 @@ fn displacement(index: &TruthIndex, matching: &Matching, run: &SceneRun) -> Disp
         run.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
     Displacement::of(index, |frame, person| {
         let track = matching.get(&(frame, person))?;
-        rows.get(&(frame, *track)).map(|row| casts::forecast_of(row))
+        rows.get(&(frame, *track)).map(|row| oracles::forecast_of(row))
     })
 }
 

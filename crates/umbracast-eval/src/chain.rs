@@ -44,7 +44,7 @@ pub struct Spec {
 pub struct SceneSpec {
     /// What it is pooled with in the tables.
     pub group: String,
-    /// Of the people's ways, bodies and sensors.
+    /// Of the people's trajectories, bodies and sensors.
     pub seed: u64,
     /// Who walks.
     pub people: People,
@@ -67,7 +67,7 @@ pub enum People {
 }
 
 impl SceneSpec {
-    /// Everybody's way.
+    /// Everybody's trajectory.
     pub fn crowd(&self) -> Crowd {
         let seed = self.seed;
         match &self.people {
@@ -323,7 +323,7 @@ pub(crate) mod tests {
     /// `scenes` scenes of people who walk for so many frames; `at_m` gives the place of a person after so many steps of
     /// 10 ms.
     pub(crate) fn walk(scenes: u64, people: u32, frames: i32, at_m: impl Fn(f64, f64) -> DVec2) -> Spec {
-        let way = |person: u32| Trajectory {
+        let trajectory = |person: u32| Trajectory {
             person,
             start_ns: 0,
             step_ns: 10_000_000,
@@ -332,7 +332,7 @@ pub(crate) mod tests {
             height_m: None,
         };
         let duration_ns = i64::from(frames) * STEP_NS;
-        let crowd = Crowd { trajectories: (0..people).map(way).collect(), duration_ns };
+        let crowd = Crowd { trajectories: (0..people).map(trajectory).collect(), duration_ns };
         let scene = |seed| SceneSpec {
             group: "walk".to_owned(),
             seed,
@@ -371,12 +371,12 @@ pub(crate) mod tests {
 
     #[test]
     fn three_people_in_the_open_are_followed_and_their_truth_is_kept() {
-        let told = AtomicU64::new(0);
+        let reported = AtomicU64::new(0);
         let results = run(&spec(1), |_| {
-            told.fetch_add(1, Ordering::Relaxed);
+            reported.fetch_add(1, Ordering::Relaxed);
         })
         .unwrap();
-        assert_eq!(told.into_inner(), 25);
+        assert_eq!(reported.into_inner(), 25);
         let (truth, runs) = results[0].kept.as_ref().unwrap();
         assert_eq!(truth.people.len(), 3 * 25);
         assert_eq!(runs.len(), 1);
@@ -404,8 +404,8 @@ pub(crate) mod tests {
             spec.configs[0].blockage.person_box = person_box;
             // One behind the other, in line with the access point `side`.
             let People::Replayed(crowd) = &mut spec.scenes[0].people else { unreachable!() };
-            let ways = crowd.trajectories.iter_mut().flat_map(|way| &mut way.positions_m);
-            ways.for_each(|at| *at = DVec2::new(at.x - at.y, 0.0));
+            let positions_m = crowd.trajectories.iter_mut().flat_map(|walk| &mut walk.positions_m);
+            positions_m.for_each(|at| *at = DVec2::new(at.x - at.y, 0.0));
             let said = run(&spec, |_| {}).unwrap().remove(0).score.said;
             let of = |who| &said.iter().find(|said| said.predictor == who).unwrap().access_points;
             assert_eq!(of(predictor), of(Predictor::Run));

@@ -5,9 +5,9 @@ use umbracast::geometry::DVec2;
 use umbracast::{STEPS, forecast::Gaussian2};
 
 use crate::bootstrap::Pooled;
+use crate::counts::{ratio, squared_mahalanobis};
 use crate::instances::person_counts;
 use crate::scene::TruthIndex;
-use crate::tally::{ratio, squared_mahalanobis};
 
 /// Squared Mahalanobis distance within which 50 % of a plane Gaussian lies (chi-square, 2 degrees of freedom).
 const CHI2_50: f64 = 1.386;

@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use umbracast::Error;
 
 use crate::chain::{Chain, Progress, SceneResult, Spec};
-use crate::scene_file::{self, Fault, Stamp, fingerprint};
+use crate::fingerprint::fingerprint;
+use crate::scene_file::{self, Fault, Stamp};
 
 /// Where the sums of an experiment are kept.
 #[derive(Debug)]

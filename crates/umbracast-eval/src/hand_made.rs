@@ -5,7 +5,7 @@ use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
 
 use crate::scene::SceneTruth;
 
-/// `people` persons who stand 10 m apart for `frames` frames, one access point, blocked as told by
+/// `people` persons who stand 10 m apart for `frames` frames, one access point; `blocked` takes
 /// (person, frame).
 pub fn truth_of(people: u32, frames: u64, blocked: impl Fn(u32, u64) -> bool) -> SceneTruth {
     let mut truth = SceneTruth::default();

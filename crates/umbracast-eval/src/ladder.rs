@@ -15,9 +15,9 @@ use umbracast_sim::scene::Scene;
 use umbracast_sim::truth::BodyMesh;
 
 use crate::instances::instances;
+use crate::link_counts::{LinkCounts, Prediction};
 use crate::links::Said;
 use crate::scene::{SceneTruth, TruthIndex};
-use crate::tally::{LinkTally, Prediction};
 
 /// What a ray meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,7 +89,7 @@ const ERROR_KEPT: f64 = 0.9;
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SceneLadder {
     /// By rung, then by access point.
-    pub rungs: Vec<Vec<LinkTally>>,
+    pub rungs: Vec<Vec<LinkCounts>>,
 }
 
 /// One figure of the report.
@@ -122,11 +122,11 @@ pub fn climb(scene: &Scene, truth: &SceneTruth, site: &Site, seed: u64) -> Scene
     let errors = lasting_errors(moments.len(), scene.walkers().len(), ERROR_KEPT, rng);
     let play = Play { site, walkers: scene.walkers(), moments, errors };
     let instances = instances(&TruthIndex::new(truth));
-    let tallies = |oracle: &Oracle| {
+    let counts = |oracle: &Oracle| {
         let said = play.ask(oracle).of_persons(&instances);
-        LinkTally::each(&instances, &said, site.access_points.len() as u32)
+        LinkCounts::each(&instances, &said, site.access_points.len() as u32)
     };
-    SceneLadder { rungs: ORACLES.iter().map(tallies).collect() }
+    SceneLadder { rungs: ORACLES.iter().map(counts).collect() }
 }
 
 /// The figures of many scenes together.
@@ -134,16 +134,16 @@ pub fn rows(scenes: &[&SceneLadder], site: &Site) -> Vec<LadderRow> {
     let mut rows = Vec::new();
     for (rung, oracle) in ORACLES.iter().enumerate() {
         for (ap, access_point) in site.access_points.iter().enumerate() {
-            let pooled = LinkTally::pooled(&scenes.iter().map(|s| &s.rungs[rung][ap]).collect::<Vec<_>>());
-            rows.extend(pooled.windows.iter().enumerate().map(|(i, tally)| LadderRow {
+            let pooled = LinkCounts::pooled(&scenes.iter().map(|s| &s.rungs[rung][ap]).collect::<Vec<_>>());
+            rows.extend(pooled.windows.iter().enumerate().map(|(i, counts)| LadderRow {
                 oracle: oracle.name,
                 access_point: access_point.name.clone(),
                 window: i + 1,
-                base_rate: tally.all.base_rate(),
-                precision: tally.all.precision(),
-                recall: tally.all.recall(),
-                f1: tally.all.f1(),
-                onset_f1: tally.onset.f1(),
+                base_rate: counts.all.base_rate(),
+                precision: counts.all.precision(),
+                recall: counts.all.recall(),
+                f1: counts.all.f1(),
+                onset_f1: counts.onset.f1(),
             }));
         }
     }

@@ -2,22 +2,25 @@
 //!
 //! Every score is computed from the rows of the tables (`umbracast_io::rows`), so a run in memory and a run
 //! read back from files give the same numbers. A scene is scored alone and leaves sums behind; the sums of many
-//! scenes are pooled, and the spread between scenes gives the intervals.
+//! scenes are pooled, and the spread between recordings gives the intervals.
 
+pub mod fingerprint;
 pub mod scene;
 #[cfg(test)]
 mod hand_made;
+pub mod counts;
 pub mod bootstrap;
 pub mod instances;
-pub mod tally;
+pub mod link_counts;
 pub mod matching;
+pub mod device;
 pub mod identity;
 pub mod stage1;
 pub mod displacement;
 pub mod links;
 pub mod times;
 pub mod true_forecasts;
-pub mod casts;
+pub mod oracles;
 pub mod true_bodies;
 pub mod score;
 pub mod ladder;

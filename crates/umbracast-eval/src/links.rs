@@ -7,8 +7,8 @@ use umbracast::STEPS;
 use umbracast::blockage::Blockage;
 
 use crate::instances::Instance;
+use crate::link_counts::Prediction;
 use crate::scene::{Matching, SceneRun};
-use crate::tally::Prediction;
 
 /// What was said of links, by (frame, access point, track or person).
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -82,8 +82,8 @@ mod tests {
     use super::*;
     use crate::hand_made::{link_row, truth_of};
     use crate::instances::instances;
+    use crate::link_counts::WindowCounts;
     use crate::scene::TruthIndex;
-    use crate::tally::Tally;
 
     #[test]
     fn who_has_no_track_counts_as_predicted_not_blocked() {
@@ -92,7 +92,8 @@ mod tests {
         let instances = instances(&TruthIndex::new(&truth));
         let run = SceneRun { tracks: Vec::new(), links: vec![link_row(9, 77, true)] };
         let matching = Matching::from([((9, 0), 77)]);
-        let counts = Tally::of(&instances, &Said::by_run(&run).of_tracks(&instances, &matching), 3).all;
+        let counts =
+            WindowCounts::of(&instances, &Said::by_run(&run).of_tracks(&instances, &matching), 3).all;
         assert_eq!((counts.true_positive, counts.false_negative, counts.total()), (1, 1, 2));
     }
 
@@ -109,17 +110,17 @@ mod tests {
     fn persistence_of_the_truth_is_right_until_something_changes() {
         let truth = truth_of(1, 60, |_, frame| (30..40).contains(&frame));
         let instances = instances(&TruthIndex::new(&truth));
-        let counts = Tally::of(&instances, &persistence_of_truth(&instances), 1).all;
+        let counts = WindowCounts::of(&instances, &persistence_of_truth(&instances), 1).all;
         // Wrong once as it begins and once as it ends.
         assert_eq!((counts.false_negative, counts.false_positive, counts.true_positive), (1, 1, 9));
-        assert_eq!(Tally::of(&instances, &persistence_of_truth(&instances), 1).onset.f1(), Some(0.0));
+        assert_eq!(WindowCounts::of(&instances, &persistence_of_truth(&instances), 1).onset.f1(), Some(0.0));
     }
 
     #[test]
     fn never_has_the_accuracy_of_what_is_in_sight() {
         let truth = truth_of(1, 60, |_, frame| (30..40).contains(&frame));
         let instances = instances(&TruthIndex::new(&truth));
-        let tally = Tally::of(&instances, &never(&instances), 1);
-        assert_eq!((tally.all.f1(), tally.all.accuracy()), (Some(0.0), Some(32.0 / 42.0)));
+        let counts = WindowCounts::of(&instances, &never(&instances), 1);
+        assert_eq!((counts.all.f1(), counts.all.accuracy()), (Some(0.0), Some(32.0 / 42.0)));
     }
 }

@@ -1,26 +1,27 @@
-//! The scores: sums of all scenes pooled, by preset and together, with intervals by bootstrap over scenes.
+//! The scores: sums of all scenes pooled, by preset and together, with intervals by bootstrap over recordings.
 
 use serde::{Deserialize, Serialize};
 use umbracast::{Health, Mode, STEPS, Site};
 
 use crate::bootstrap::{Bootstrap, Pooled, interval};
 use crate::chain::SceneResult;
+use crate::counts::Counts;
 use crate::displacement::Displacement;
 use crate::ladder::{self, LadderRow, SceneLadder};
+use crate::link_counts::{Bin, LinkCounts};
 use crate::score::{Predictor, SceneScore};
 use crate::stage1::Stage1;
-use crate::tally::{Bin, Counts, LinkTally};
-use crate::times::{TimeTally, Times};
+use crate::times::{TimeCounts, Times};
 
 /// The group of all scenes, where there are several presets.
 pub const ALL: &str = "all";
 
-/// A score and where it lies in 95 % of resamples of the scenes. Null where it is not defined.
+/// A score and where it lies in 95 % of resamples of the recordings. Null where it is not defined.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Of all scenes pooled.
     pub value: Option<f64>,
-    /// Lower and upper end; null with fewer than five scenes.
+    /// Lower and upper end; null with fewer than five recordings.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -38,6 +39,8 @@ pub struct Group {
     pub name: String,
     /// How many scenes.
     pub scenes: usize,
+    /// How many recordings they replay: as many as scenes, unless one was replayed several times.
+    pub recordings: usize,
     /// Frames of all of them.
     pub frames: u64,
     /// Stage 3: one a predictor and access point.
@@ -143,11 +146,11 @@ pub struct ModeScores {
     pub health: Health,
 }
 
-/// Times told by their quantiles: of the onset of a blockage, or of its end.
+/// Times reported by their quantiles: of the onset of a blockage, or of its end.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TimeScores {
-    /// Links of which a time was told.
-    pub told: u64,
+    /// Links of which a time was reported.
+    pub reported: u64,
     /// Share of them between the 10 and the 90 % quantile.
     pub coverage: Option<f64>,
     /// Mean size of the 50 % quantile's error, seconds.
@@ -157,12 +160,12 @@ pub struct TimeScores {
 }
 
 impl TimeScores {
-    fn of(tally: &TimeTally) -> Self {
+    fn of(counts: &TimeCounts) -> Self {
         Self {
-            told: tally.told,
-            coverage: tally.coverage(),
-            mean_error_s: tally.mean_error_s(),
-            median_error_s: tally.median_error_s(),
+            reported: counts.reported,
+            coverage: counts.coverage(),
+            mean_error_s: counts.mean_error_s(),
+            median_error_s: counts.median_error_s(),
         }
     }
 }
@@ -237,14 +240,15 @@ impl Group {
 }
 
 fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group {
-    let bootstrap = Bootstrap::new(scenes.len());
+    let recordings: Vec<u64> = scenes.iter().map(|scene| scene.recording).collect();
+    let bootstrap = Bootstrap::new(&recordings);
     let mut links = Vec::new();
     let mut modes = Vec::new();
     let mut constant_velocity_m = Vec::new();
     if let Some(first) = scenes.first() {
         for (i, said) in first.said.iter().enumerate() {
             for (a, access_point) in access_points.iter().enumerate() {
-                let of_scenes: Vec<&LinkTally> =
+                let of_scenes: Vec<&LinkCounts> =
                     scenes.iter().filter_map(|scene| scene.said.get(i)?.access_points.get(a)).collect();
                 let mut windows = windows(&bootstrap, &of_scenes);
                 if said.predictor != Predictor::Run {
@@ -266,6 +270,7 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
     Group {
         name: name.to_owned(),
         scenes: scenes.len(),
+        recordings: bootstrap.recordings(),
         frames,
         links,
         modes,
@@ -274,28 +279,28 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
     }
 }
 
-fn windows(bootstrap: &Bootstrap, scenes: &[&LinkTally]) -> Vec<WindowScores> {
-    let pooled = LinkTally::pooled(scenes);
+fn windows(bootstrap: &Bootstrap, scenes: &[&LinkCounts]) -> Vec<WindowScores> {
+    let pooled = LinkCounts::pooled(scenes);
     let of = |i: usize| {
-        let (tally, leads) = (&pooled.windows[i], &pooled.leads[i]);
+        let (counts, leads) = (&pooled.windows[i], &pooled.leads[i]);
         let all = Spread::of(bootstrap, scenes.iter().map(|scene| scene.windows[i].all));
         let onset = Spread::of(bootstrap, scenes.iter().map(|scene| scene.windows[i].onset));
         WindowScores {
             w: i + 1,
-            counts: tally.all,
-            onset_counts: tally.onset,
+            counts: counts.all,
+            onset_counts: counts.onset,
             base_rate: all.estimate(Counts::base_rate),
             accuracy: all.estimate(Counts::accuracy),
             precision: all.estimate(Counts::precision),
             recall: all.estimate(Counts::recall),
             f1: all.estimate(Counts::f1),
             onset_f1: onset.estimate(Counts::f1),
-            auprc: tally.auprc(),
-            brier: tally.brier(),
-            ece: tally.ece(),
+            auprc: counts.auprc(),
+            brier: counts.brier(),
+            ece: counts.ece(),
             lead_median_s: leads.median_s(),
             lead_warned: leads.warned_share(),
-            bins: tally.bins.to_vec(),
+            bins: counts.bins.to_vec(),
         }
     };
     (0..STEPS).map(of).collect()

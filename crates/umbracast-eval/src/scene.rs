@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
 
+use crate::fingerprint::fingerprint;
+
 /// What was so: the tables `people` and `people_links` of one scene, in any order.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SceneTruth {
@@ -79,6 +81,16 @@ impl<'a> TruthIndex<'a> {
         self.persons.iter().filter_map(move |&person| self.person(frame, person))
     }
 
+    /// A fingerprint of everybody's trajectory: the same for two scenes exactly when they replay one recording (or
+    /// draw), however their bodies, sensors and noise differ.
+    pub fn recording(&self) -> u64 {
+        let people = self.frames.iter().flat_map(|&frame| self.people_of(frame));
+        let places = people.flat_map(|row| {
+            [row.frame, u64::from(row.person), row.x_m.to_bits(), row.y_m.to_bits()].map(u64::to_le_bytes)
+        });
+        fingerprint(&[places.collect::<Vec<_>>().as_flattened()])
+    }
+
     fn place(&self, frame: u64, person: u32) -> Option<usize> {
         let k = self.frames.binary_search(&frame).ok()?;
         let person = self.persons.binary_search(&person).ok()?;
@@ -96,4 +108,23 @@ fn ascending<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
     values.sort_unstable();
     values.dedup();
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made::truth_of;
+
+    #[test]
+    fn scenes_of_the_same_trajectories_are_one_recording_whoever_is_blocked() {
+        let recording = |truth: &SceneTruth| TruthIndex::new(truth).recording();
+        let (mut again, mut another) = (truth_of(2, 20, |_, _| true), truth_of(2, 20, |_, _| true));
+        again.people.iter_mut().for_each(|row| (row.height_m, row.returns) = (1.9, 3));
+        again.people.reverse();
+        another.people[7].x_m += 1e-9;
+        let first = recording(&truth_of(2, 20, |_, _| false));
+        assert_eq!(recording(&again), first);
+        assert_ne!(recording(&another), first);
+        assert_ne!(recording(&truth_of(2, 21, |_, _| false)), first);
+    }
 }

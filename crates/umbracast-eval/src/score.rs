@@ -9,14 +9,15 @@ use umbracast::{Config, Error, Health, Mode};
 use umbracast_io::rows::TrackRow;
 use umbracast_sim::body::Walker;
 
-use crate::casts;
+use crate::device::bound_once;
 use crate::displacement::Displacement;
 use crate::instances::instances;
+use crate::link_counts::{LinkCounts, Prediction};
 use crate::links::{Said, never, persistence_of_truth};
 use crate::matching::match_scene;
+use crate::oracles;
 use crate::scene::{SceneRun, SceneTruth, TruthIndex};
 use crate::stage1::Stage1;
-use crate::tally::{LinkTally, Prediction};
 use crate::times::Times;
 use crate::true_bodies::true_bodies;
 use crate::true_forecasts::TrueForecasts;
@@ -26,6 +27,8 @@ use crate::true_forecasts::TrueForecasts;
 pub enum Predictor {
     /// The mode itself.
     Run,
+    /// The mode itself, heard through devices that are bound to a track once ([`crate::device`]).
+    BoundOnce,
     /// The mode with Algorithm 1 on axis-aligned boxes for its stage 3.
     Aabb,
     /// The mode with Algorithm 1 on boxes along people's own axes for its stage 3.
@@ -51,6 +54,7 @@ impl Predictor {
     pub fn name(self) -> &'static str {
         match self {
             Self::Run => "run",
+            Self::BoundOnce => "run with devices bound once",
             Self::Aabb => "AABB",
             Self::Obb => "OBB",
             Self::Never => "never",
@@ -66,13 +70,13 @@ impl Predictor {
 
 /// What a predictor said in one scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PredictorTally {
+pub struct PredictorCounts {
     /// `None` for baselines that need no mode.
     pub mode: Option<Mode>,
     /// Who.
     pub predictor: Predictor,
     /// One an access point of the site.
-    pub access_points: Vec<LinkTally>,
+    pub access_points: Vec<LinkCounts>,
 }
 
 /// Stages 1 and 2 of a mode in one scene.
@@ -97,12 +101,14 @@ pub struct SceneScore {
     pub scene: u32,
     /// What it is pooled with: the preset, or the file it was replayed from.
     pub group: String,
+    /// What it replays ([`TruthIndex::recording`]): scenes of one recording say the same thing several times.
+    pub recording: u64,
     /// How many frames it has.
     pub frames: u64,
     /// Constant velocity from the true state, for comparison with stage 2.
     pub constant_velocity: Displacement,
     /// In the order of the tables.
-    pub said: Vec<PredictorTally>,
+    pub said: Vec<PredictorCounts>,
     /// In the order of the modes.
     pub modes: Vec<ModeSums>,
 }
@@ -136,8 +142,8 @@ pub fn score_scene(
     let site_access_points = runs.first().map_or(0, |run| run.config.site.access_points.len()) as u32;
     let mut said = Vec::new();
     let mut add = |mode: Option<Mode>, predictor: Predictor, predictions: Vec<Prediction>| {
-        let access_points = LinkTally::each(&instances, &predictions, site_access_points);
-        said.push(PredictorTally { mode, predictor, access_points });
+        let access_points = LinkCounts::each(&instances, &predictions, site_access_points);
+        said.push(PredictorCounts { mode, predictor, access_points });
     };
     add(None, Predictor::Never, never(&instances));
     add(None, Predictor::PersistenceOfTruth, persistence_of_truth(&instances));
@@ -149,17 +155,19 @@ pub fn score_scene(
         let of_tracks = |said: Said| said.of_tracks(&instances, &matching);
         let of_persons = |said: Said| said.of_persons(&instances);
         add(mode, Predictor::PersistenceOfTracks, own.persistence(&instances, &matching));
-        add(mode, Predictor::Run, of_tracks(own));
-        add(mode, Predictor::Aabb, of_tracks(casts::algorithm_1(rows, config, BoxKind::Aabb)));
-        add(mode, Predictor::Obb, of_tracks(casts::algorithm_1(rows, config, BoxKind::Obb)));
+        let bound = bound_once(&index, rows, &matching);
+        add(mode, Predictor::Run, own.of_tracks(&instances, &matching));
+        add(mode, Predictor::BoundOnce, own.of_tracks(&instances, &bound));
+        add(mode, Predictor::Aabb, of_tracks(oracles::algorithm_1(rows, config, BoxKind::Aabb)));
+        add(mode, Predictor::Obb, of_tracks(oracles::algorithm_1(rows, config, BoxKind::Obb)));
         add(
             mode,
             Predictor::ConstantVelocityOfTruth,
-            of_persons(casts::constant_velocity_of_truth(&index, config)),
+            of_persons(oracles::constant_velocity_of_truth(&index, config)),
         );
-        let true_state = casts::true_state(&index, rows, &matching, config, weights, &mut true_forecasts)?;
+        let true_state = oracles::true_state(&index, rows, &matching, config, weights, &mut true_forecasts)?;
         add(mode, Predictor::TrueState, of_persons(true_state));
-        add(mode, Predictor::TrueFuture, of_tracks(casts::true_future(&index, rows, &matching, config)));
+        add(mode, Predictor::TrueFuture, of_tracks(oracles::true_future(&index, rows, &matching, config)));
         if let Some(walkers) = walkers {
             add(mode, Predictor::TrueBody, of_tracks(true_bodies(rows, &matching, walkers, &config.site)));
         }
@@ -167,7 +175,7 @@ pub fn score_scene(
             rows.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
         let forecast = |frame, person| {
             let track = matching.get(&(frame, person))?;
-            forecasts.get(&(frame, *track)).map(|row| casts::forecast_of(row))
+            forecasts.get(&(frame, *track)).map(|row| oracles::forecast_of(row))
         };
         modes.push(ModeSums {
             mode: config.mode,
@@ -178,10 +186,11 @@ pub fn score_scene(
         });
     }
     let carried_on =
-        |frame, person| index.person(frame, person).map(casts::constant_velocity_steps);
+        |frame, person| index.person(frame, person).map(oracles::constant_velocity_steps);
     Ok(SceneScore {
         scene,
         group: group.to_owned(),
+        recording: index.recording(),
         frames: index.frames.len() as u64,
         constant_velocity: Displacement::of(&index, carried_on),
         said,

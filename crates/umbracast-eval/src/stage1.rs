@@ -9,9 +9,9 @@ use umbracast::geometry::DVec2;
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
 use crate::bootstrap::Pooled;
+use crate::counts::{ratio, squared_mahalanobis};
 use crate::identity::{ALPHAS, HotaSums, hota_sums, identity_true_positives};
 use crate::matching::{apart_m, by_frame, match_frame};
-use crate::tally::{ratio, squared_mahalanobis};
 
 /// How many classes of people by returns there are: none, 1 to 5, 6 and more.
 pub const RETURN_CLASSES: usize = 3;

@@ -9,10 +9,10 @@ use umbracast_io::rows::TrackRow;
 use umbracast_sim::body::Walker;
 use umbracast_sim::truth::BodyMesh;
 
-use crate::casts::forecast_of;
+use crate::link_counts::Prediction;
 use crate::links::Said;
+use crate::oracles::forecast_of;
 use crate::scene::{Matching, SceneRun};
-use crate::tally::Prediction;
 
 /// Casts, yes or no, at the forecast means. Who is not followed blocks nobody; a track of nobody has no body.
 ///
@@ -99,7 +99,7 @@ mod tests {
     use umbracast_sim::crowd::Trajectory;
 
     fn standing(person: u32, x_m: f64) -> Walker {
-        let way = Trajectory {
+        let trajectory = Trajectory {
             person,
             start_ns: 0,
             step_ns: 10_000_000,
@@ -107,7 +107,7 @@ mod tests {
             arrived_ns: None,
             height_m: Some(1.75),
         };
-        Walker::new(way, u64::from(person))
+        Walker::new(trajectory, u64::from(person))
     }
 
     fn track(track: u64, x_m: f64, moves_to_y_m: f64) -> TrackRow {

@@ -66,7 +66,7 @@ impl Scene {
         let mut sensors = sensors.clone();
         sensors.restart(stream(seed, "sensors", 0).next_u64());
         for (number, sensor) in site.sensors.iter().enumerate() {
-            if let Some(seconds) = sensor.lost_after_s {
+            if let Some(seconds) = site.simulation.lost_after_s.get(&sensor.name) {
                 sensors.power(number, 0..(seconds * 1e9) as i64);
             }
         }
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn a_sensor_that_the_site_loses_falls_silent_and_is_there_in_the_empty_hall() {
         let mut site = Config::default().site;
-        site.sensors[1].lost_after_s = Some(0.15);
+        site.simulation.lost_after_s.insert(site.sensors[1].name.clone(), 0.15);
         let mut scene = Scene::new(crowd(), &site, 7).unwrap();
         let frames: Vec<SceneFrame> = (0..3).filter_map(|_| scene.next_frame()).collect();
         let sent = |sensor: usize| -> Vec<usize> { frames.iter().map(|f| f.packets[sensor].len()).collect() };

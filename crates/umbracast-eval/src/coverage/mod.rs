@@ -127,7 +127,7 @@ fn check(site: &Site, options: &Options, floor_m: DVec2) -> Result<(), Error> {
 
 /// A body at the origin that looks along x.
 fn standing(height_m: f64, seed: u64) -> Walker {
-    let way = Trajectory {
+    let trajectory = Trajectory {
         person: 0,
         start_ns: 0,
         step_ns: 10_000_000,
@@ -135,7 +135,7 @@ fn standing(height_m: f64, seed: u64) -> Walker {
         arrived_ns: None,
         height_m: Some(height_m),
     };
-    Walker::new(way, seed)
+    Walker::new(trajectory, seed)
 }
 
 /// Outside of every pillar and piece of furniture, with room for the elbows.

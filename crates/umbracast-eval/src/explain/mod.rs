@@ -1,4 +1,4 @@
-//! Why the paper's figures are what they are: its stages 2 and 3 played on true ways to which an error of stage 1
+//! Why the paper's figures are what they are: its stages 2 and 3 played on true trajectories to which an error of stage 1
 //! is added, and a search for the error, the box and the access point under which they print what was published.
 
 pub mod replay;

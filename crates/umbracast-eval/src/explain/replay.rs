@@ -17,13 +17,13 @@ use umbracast_sim::random::stream;
 use umbracast_sim::scene::{Scene, SceneFrame};
 use umbracast_sim::truth::BodyMesh;
 
-use crate::casts::true_track;
 use crate::chain::note_truth;
+use crate::counts::Counts;
 use crate::displacement::Displacement;
 use crate::instances::{Instance, instances};
 use crate::ladder::lasting_errors;
+use crate::oracles::true_track;
 use crate::scene::{SceneTruth, TruthIndex};
-use crate::tally::Counts;
 
 /// Every which instant is asked: neighbours are nearly equal.
 const EVERY: u64 = 5;

@@ -30,12 +30,20 @@ pub struct Row {
     pub position_m: Estimate,
     /// The same of the velocity, metres a second.
     pub velocity_mps: Estimate,
+    /// Squared errors of position over the covariance that tracks claim: 2 if they are honest.
+    pub position_nees: Estimate,
+    /// The same of velocity.
+    pub velocity_nees: Estimate,
     /// Mean displacement of the forecast at 900 ms, metres.
     pub displacement_m: Estimate,
     /// F1 at 300 ms by access point.
     pub f1: Vec<(String, Estimate)>,
     /// The same over links in sight when it was said.
     pub onset_f1: Vec<(String, Estimate)>,
+    /// F1 at 300 ms of devices that are bound to a track once.
+    pub bound_f1: Vec<(String, Estimate)>,
+    /// F1 at 300 ms of who says "as now", the present being the truth's.
+    pub persistence_f1: Vec<(String, Estimate)>,
     /// Scans of sensors that were not there.
     pub scans_missing: u64,
 }
@@ -78,6 +86,8 @@ struct Stage1 {
     switches_per_scene: Estimate,
     position_rmse_m: Estimate,
     velocity_rmse_mps: Estimate,
+    position_nees: Estimate,
+    velocity_nees: Estimate,
     displacement_m: Vec<Estimate>,
     health: Health,
 }
@@ -100,14 +110,15 @@ pub fn rows(name: &str, scores_json: &[u8]) -> Result<Vec<Row>, Error> {
 }
 
 fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
-    let own = |links: &&Links| links.mode == Some(scores.mode) && links.predictor == Predictor::Run.name();
-    let at_300_ms = |score: fn(&Window) -> Estimate| {
+    let at_300_ms = |mode: Option<Mode>, predictor: Predictor, score: fn(&Window) -> Estimate| {
+        let own = |links: &&Links| links.mode == mode && links.predictor == predictor.name();
         let of = |links: &Links| {
             let window = links.windows.iter().find(|window| window.w == 3);
             (links.access_point.clone(), window.map(score).unwrap_or_default())
         };
         group.links.iter().filter(own).map(of).collect()
     };
+    let mode = Some(scores.mode);
     Row {
         name: name.to_owned(),
         group: group.name.clone(),
@@ -119,9 +130,13 @@ fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
         switches: scores.switches_per_scene,
         position_m: scores.position_rmse_m,
         velocity_mps: scores.velocity_rmse_mps,
+        position_nees: scores.position_nees,
+        velocity_nees: scores.velocity_nees,
         displacement_m: scores.displacement_m.last().copied().unwrap_or_default(),
-        f1: at_300_ms(|window| window.f1),
-        onset_f1: at_300_ms(|window| window.onset_f1),
+        f1: at_300_ms(mode, Predictor::Run, |window| window.f1),
+        onset_f1: at_300_ms(mode, Predictor::Run, |window| window.onset_f1),
+        bound_f1: at_300_ms(mode, Predictor::BoundOnce, |window| window.f1),
+        persistence_f1: at_300_ms(None, Predictor::PersistenceOfTruth, |window| window.f1),
         scans_missing: scores.health.sensors_missing,
     }
 }
@@ -159,19 +174,24 @@ fn table(title: &str, rows: &[Row], text: impl Fn(Estimate, usize) -> String) ->
         "switches",
         "position, m",
         "velocity, m/s",
+        "NEES",
+        "of velocity",
         "900 ms, m",
     ];
     let mut table = Table::new(title, 3, &header);
-    table.header.extend(access_points.iter().map(|name| format!("F1 {name}")));
-    table.header.extend(access_points.iter().map(|name| format!("onset {name}")));
+    for score in ["F1", "onset", "bound once", "persistence"] {
+        table.header.extend(access_points.iter().map(|name| format!("{score} {name}")));
+    }
     table.header.push("scans missing".to_owned());
     for row in rows {
         let mut cells = vec![row.name.clone(), row.group.clone(), row.mode.name().to_owned()];
         cells.push(row.scenes.to_string());
         cells.extend([row.recall, row.mota, row.idf1].map(|score| text(score, 3)));
         cells.push(text(row.switches, 2));
-        cells.extend([row.position_m, row.velocity_mps, row.displacement_m].map(|score| text(score, 3)));
-        for scores in [&row.f1, &row.onset_f1] {
+        cells.extend([row.position_m, row.velocity_mps].map(|score| text(score, 3)));
+        cells.extend([row.position_nees, row.velocity_nees].map(|score| text(score, 2)));
+        cells.push(text(row.displacement_m, 3));
+        for scores in [&row.f1, &row.onset_f1, &row.bound_f1, &row.persistence_f1] {
             let of = |name: &&str| scores.iter().find(|(own, _)| own == name).map(|(_, f1)| *f1);
             cells.extend(access_points.iter().map(|name| text(of(name).unwrap_or_default(), 3)));
         }
@@ -207,6 +227,9 @@ mod tests {
         let rows = rows("lost", json.as_bytes()).unwrap();
         assert_eq!((rows.len(), rows[0].scans_missing), (1, 12));
         assert_eq!((rows[0].f1[0].0.as_str(), rows[0].f1[0].1.value), ("side", Some(1.0)));
+        // Blocked in frames 30 to 39 of 40: at 27 to 29 persistence knows nothing of it yet, at 30 it does.
+        assert_eq!(rows[0].persistence_f1[0].1.value, Some(0.4));
+        assert_eq!((rows[0].bound_f1[0].1.value, rows[0].position_nees.value), (Some(1.0), None));
         let text = to_text(&rows);
         assert!(!text.contains("intervals"), "of a single scene: {text}");
         let line = text.lines().last().unwrap();

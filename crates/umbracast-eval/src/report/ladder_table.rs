@@ -155,6 +155,7 @@ mod tests {
         Group {
             name: String::new(),
             scenes: 1,
+            recordings: 1,
             frames: 1,
             links: Vec::new(),
             modes: Vec::new(),

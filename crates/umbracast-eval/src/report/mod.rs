@@ -147,7 +147,9 @@ mod tests {
             let run = ModeRun { config, rows: &run, health: Health::default() };
             score_scene(0, group, &truth, &[run], None, None).unwrap()
         };
-        let scenes: Vec<_> = groups.iter().map(of).collect();
+        let mut scenes: Vec<_> = groups.iter().map(of).collect();
+        // The same truth each time, taken for that of different recordings.
+        (0..).zip(&mut scenes).for_each(|(recording, scene)| scene.recording = recording);
         pool(&scenes.iter().collect::<Vec<_>>(), &["side".to_owned()])
     }
 

@@ -181,6 +181,8 @@ impl Row for TrackRow {
         see(plain("heading_sigma_rad"), Cell::F64(&mut self.heading_sigma_rad));
         see(plain("height_m"), Cell::F64(&mut self.height_m));
         see(plain("height_sigma_m"), Cell::F64(&mut self.height_sigma_m));
+        see(plain("width_scale"), Cell::F64(&mut self.width_scale));
+        see(plain("width_scale_sigma"), Cell::F64(&mut self.width_scale_sigma));
         see(plain("gait_phase_rad"), Cell::F64(&mut self.gait_phase_rad));
         see(plain("gait_concentration"), Cell::F64(&mut self.gait_concentration));
         see(plain("points"), Cell::U32(&mut self.points));

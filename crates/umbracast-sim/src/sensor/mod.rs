@@ -60,7 +60,7 @@ impl Sensors {
     /// A sensor model that cannot be simulated, a sensor that does not turn or hangs outside the hall.
     pub fn new(site: &Site, seed: u64) -> Result<Self, Error> {
         let simulate = |(number, sensor): (usize, &Sensor)| {
-            Simulated::new(site, sensor, Noise::new(sensor, seed, number as u64))
+            Simulated::new(site, sensor, Noise::new(sensor, site.simulation.dropout, seed, number as u64))
                 .map_err(|error| error.within(format_args!("site.sensors.{}", sensor.name)))
         };
         let sensors = site.sensors.iter().enumerate().map(simulate).collect::<Result<_, _>>()?;

@@ -19,11 +19,11 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// For the sensor that stands at place `number` in the site.
-    pub fn new(sensor: &Sensor, seed: u64, number: u64) -> Self {
+    /// For the sensor that stands at place `number` in the site, of whose returns a share drops out.
+    pub fn new(sensor: &Sensor, dropout: f64, seed: u64, number: u64) -> Self {
         Self {
             range_noise_m: sensor.range_noise_m as f32,
-            dropout: sensor.dropout,
+            dropout,
             // Nearer than a packet's unit of 2 mm is no return.
             range_limits_m: sensor.range_min_m.max(0.002) as f32..=sensor.range_max_m as f32,
             seed,

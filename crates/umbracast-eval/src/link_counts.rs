@@ -1,10 +1,10 @@
 //! Sums from which every score of stage 3 follows: added up over instances, and again over scenes.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use umbracast::geometry::DVec2;
 use umbracast::{STEP_NS, STEPS};
 
 use crate::bootstrap::Pooled;
+use crate::counts::{Counts, ratio};
 use crate::instances::Instance;
 
 /// Bins of the calibration error, equally wide from 0 to 1.
@@ -43,74 +43,6 @@ impl Prediction {
     }
 }
 
-/// True and false, positive and negative.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Counts {
-    /// Blocked and said so.
-    pub true_positive: u64,
-    /// In sight, said blocked.
-    pub false_positive: u64,
-    /// Blocked, said in sight.
-    pub false_negative: u64,
-    /// In sight and said so.
-    pub true_negative: u64,
-}
-
-impl Counts {
-    /// Adds one instance.
-    pub fn count(&mut self, truth: bool, said: bool) {
-        *match (truth, said) {
-            (true, true) => &mut self.true_positive,
-            (false, true) => &mut self.false_positive,
-            (true, false) => &mut self.false_negative,
-            (false, false) => &mut self.true_negative,
-        } += 1;
-    }
-
-    /// Instances.
-    pub fn total(&self) -> u64 {
-        self.true_positive + self.false_positive + self.false_negative + self.true_negative
-    }
-
-    /// Share of instances that were blocked.
-    pub fn base_rate(&self) -> Option<f64> {
-        ratio(self.true_positive + self.false_negative, self.total())
-    }
-
-    /// Share of instances said rightly.
-    pub fn accuracy(&self) -> Option<f64> {
-        ratio(self.true_positive + self.true_negative, self.total())
-    }
-
-    /// Of those said blocked, the share that was. `None` when none was said.
-    pub fn precision(&self) -> Option<f64> {
-        ratio(self.true_positive, self.true_positive + self.false_positive)
-    }
-
-    /// Of those blocked, the share that was said. `None` when none was blocked.
-    pub fn recall(&self) -> Option<f64> {
-        ratio(self.true_positive, self.true_positive + self.false_negative)
-    }
-
-    /// Harmonic mean of precision and recall, 2 TP / (2 TP + FP + FN).
-    pub fn f1(&self) -> Option<f64> {
-        ratio(2 * self.true_positive, 2 * self.true_positive + self.false_positive + self.false_negative)
-    }
-}
-
-/// A quotient, or `None` over nothing.
-pub fn ratio(numerator: u64, denominator: u64) -> Option<f64> {
-    (denominator > 0).then(|| numerator as f64 / denominator as f64)
-}
-
-/// The squared length of an error in standard deviations of its covariance (xx, xy, yy), and the covariance's
-/// determinant; nothing where it is not positive definite.
-pub(crate) fn squared_mahalanobis([xx, xy, yy]: [f64; 3], d: DVec2) -> Option<(f64, f64)> {
-    let determinant = xx * yy - xy * xy;
-    let squared = || (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / determinant;
-    (xx > 0.0 && determinant > 0.0).then(|| (squared(), determinant))
-}
-
 /// One bin of the reliability diagram.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Bin {
@@ -124,7 +56,7 @@ pub struct Bin {
 
 /// Everything that was said for one window of one access point.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Tally {
+pub struct WindowCounts {
     /// All instances.
     pub all: Counts,
     /// Those in sight at `t_e`: who says "as now" scores nothing here.
@@ -138,26 +70,26 @@ pub struct Tally {
     ranking: Vec<(f32, u32, u32)>,
 }
 
-impl Tally {
+impl WindowCounts {
     /// What was said for window `w` of these instances; `predictions[i]` belongs to `instances[i]`.
     pub fn of(instances: &[Instance], predictions: &[Prediction], w: usize) -> Self {
-        let mut tally = Self::default();
+        let mut counts = Self::default();
         for (instance, prediction) in instances.iter().zip(predictions) {
             let (truth, said) = (instance.blocked_within(w), prediction.blocked[w - 1]);
-            tally.all.count(truth, said);
+            counts.all.count(truth, said);
             if !instance.blocked_now {
-                tally.onset.count(truth, said);
+                counts.onset.count(truth, said);
             }
             let p = prediction.p[w - 1];
-            tally.brier_sum += (p - f64::from(u8::from(truth))).powi(2);
-            let bin = &mut tally.bins[((p * ECE_BINS as f64) as usize).min(ECE_BINS - 1)];
+            counts.brier_sum += (p - f64::from(u8::from(truth))).powi(2);
+            let bin = &mut counts.bins[((p * ECE_BINS as f64) as usize).min(ECE_BINS - 1)];
             bin.count += 1;
             bin.p_sum += p;
             bin.blocked += u64::from(truth);
-            tally.ranking.push((p as f32, u32::from(!truth), u32::from(truth)));
+            counts.ranking.push((p as f32, u32::from(!truth), u32::from(truth)));
         }
-        tally.ranking = ranked(tally.ranking);
-        tally
+        counts.ranking = ranked(counts.ranking);
+        counts
     }
 
     /// Those of all scenes together.
@@ -193,11 +125,11 @@ impl Tally {
     /// times the gain in recall. `None` when nothing was blocked.
     pub fn auprc(&self) -> Option<f64> {
         let positives: u64 = self.ranking.iter().map(|r| u64::from(r.2)).sum();
-        let (mut hits, mut said, mut area) = (0_u64, 0_u64, 0.0);
+        let (mut matched, mut said, mut area) = (0_u64, 0_u64, 0.0);
         for &(_, clear, blocked) in &self.ranking {
-            hits += u64::from(blocked);
+            matched += u64::from(blocked);
             said += u64::from(blocked) + u64::from(clear);
-            area += f64::from(blocked) * hits as f64 / said as f64;
+            area += f64::from(blocked) * matched as f64 / said as f64;
         }
         (positives > 0).then(|| area / positives as f64)
     }
@@ -295,18 +227,18 @@ impl LeadTimes {
 
 /// Everything a predictor said of the links of one access point.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct LinkTally {
+pub struct LinkCounts {
     /// Index w - 1.
-    pub windows: [Tally; STEPS],
+    pub windows: [WindowCounts; STEPS],
     /// Index w - 1.
     pub leads: [LeadTimes; STEPS],
 }
 
-impl LinkTally {
+impl LinkCounts {
     /// Of the instances of one access point.
     pub fn of(instances: &[Instance], predictions: &[Prediction]) -> Self {
         Self {
-            windows: std::array::from_fn(|i| Tally::of(instances, predictions, i + 1)),
+            windows: std::array::from_fn(|i| WindowCounts::of(instances, predictions, i + 1)),
             leads: std::array::from_fn(|i| LeadTimes::of(instances, predictions, i + 1)),
         }
     }
@@ -324,7 +256,9 @@ impl LinkTally {
     /// Those of all scenes together.
     pub fn pooled(scenes: &[&Self]) -> Self {
         Self {
-            windows: std::array::from_fn(|i| Tally::pooled(scenes.iter().map(|scene| &scene.windows[i]))),
+            windows: std::array::from_fn(|i| {
+                WindowCounts::pooled(scenes.iter().map(|scene| &scene.windows[i]))
+            }),
             leads: std::array::from_fn(|i| LeadTimes::pooled(scenes.iter().map(|scene| &scene.leads[i]))),
         }
     }
@@ -347,14 +281,14 @@ mod tests {
     }
 
     /// Truth of window 1 and what was said, by hand.
-    fn tally(cases: &[(bool, bool, f64)]) -> Tally {
+    fn counts(cases: &[(bool, bool, f64)]) -> WindowCounts {
         let instances: Vec<_> = cases
             .iter()
             .enumerate()
             .map(|(i, &(now, truth, _))| instance(i as u64, now, truth.then_some(1)))
             .collect();
         let predictions: Vec<_> = cases.iter().map(|&(_, _, p)| says(p)).collect();
-        Tally::of(&instances, &predictions, 1)
+        WindowCounts::of(&instances, &predictions, 1)
     }
 
     fn close(found: Option<f64>, expected: f64) -> bool {
@@ -362,72 +296,65 @@ mod tests {
     }
 
     #[test]
-    fn counts_of_a_confusion_matrix_by_hand() {
-        let counts = Counts { true_positive: 6, false_positive: 2, false_negative: 3, true_negative: 9 };
-        assert!(close(counts.base_rate(), 9.0 / 20.0));
-        assert!(close(counts.accuracy(), 15.0 / 20.0));
-        assert!(close(counts.precision(), 6.0 / 8.0));
-        assert!(close(counts.recall(), 6.0 / 9.0));
-        assert!(close(counts.f1(), 12.0 / 17.0));
-    }
-
-    #[test]
     fn who_never_warns_has_an_f1_of_0_and_no_precision() {
-        let tally = tally(&[(false, true, 0.0), (false, false, 0.0)]);
-        assert_eq!((tally.all.f1(), tally.all.precision()), (Some(0.0), None));
-        assert!(close(tally.all.accuracy(), 0.5));
+        let counts = counts(&[(false, true, 0.0), (false, false, 0.0)]);
+        assert_eq!((counts.all.f1(), counts.all.precision()), (Some(0.0), None));
+        assert!(close(counts.all.accuracy(), 0.5));
     }
 
     #[test]
     fn scores_over_nothing_are_none() {
-        let empty = Tally::default();
+        let empty = WindowCounts::default();
         assert_eq!((empty.all.f1(), empty.brier(), empty.ece(), empty.auprc()), (None, None, None, None));
     }
 
     #[test]
     fn onset_counts_only_links_in_sight_now() {
-        let tally = tally(&[(true, true, 0.9), (true, false, 0.9), (false, true, 0.9), (false, true, 0.1)]);
-        assert_eq!(tally.all.total(), 4);
-        assert_eq!((tally.onset.true_positive, tally.onset.false_negative, tally.onset.total()), (1, 1, 2));
-        assert!(close(tally.onset.f1(), 2.0 / 3.0));
+        let counts = counts(&[(true, true, 0.9), (true, false, 0.9), (false, true, 0.9), (false, true, 0.1)]);
+        assert_eq!(counts.all.total(), 4);
+        assert_eq!(
+            (counts.onset.true_positive, counts.onset.false_negative, counts.onset.total()),
+            (1, 1, 2)
+        );
+        assert!(close(counts.onset.f1(), 2.0 / 3.0));
     }
 
     #[test]
     fn average_precision_is_that_of_scikit_learns_example() {
         // sklearn.metrics.average_precision_score([0, 0, 1, 1], [0.1, 0.4, 0.35, 0.8]) == 0.8333...
-        let tally =
-            tally(&[(false, false, 0.1), (false, false, 0.4), (false, true, 0.35), (false, true, 0.8)]);
-        assert!(close(tally.auprc(), 5.0 / 6.0));
+        let counts =
+            counts(&[(false, false, 0.1), (false, false, 0.4), (false, true, 0.35), (false, true, 0.8)]);
+        assert!(close(counts.auprc(), 5.0 / 6.0));
     }
 
     #[test]
     fn equal_probabilities_are_one_threshold() {
         // One threshold for all: precision 1/4 at recall 1, whatever the order.
-        let tally =
-            tally(&[(false, true, 0.3), (false, false, 0.3), (false, false, 0.3), (false, false, 0.3)]);
-        assert!(close(tally.auprc(), 0.25));
+        let counts =
+            counts(&[(false, true, 0.3), (false, false, 0.3), (false, false, 0.3), (false, false, 0.3)]);
+        assert!(close(counts.auprc(), 0.25));
     }
 
     #[test]
     fn brier_and_calibration_by_hand() {
-        let tally =
-            tally(&[(false, true, 0.8), (false, false, 0.8), (false, false, 0.1), (false, true, 1.0)]);
-        assert!(close(tally.brier(), (0.04 + 0.64 + 0.01 + 0.0) / 4.0));
+        let counts =
+            counts(&[(false, true, 0.8), (false, false, 0.8), (false, false, 0.1), (false, true, 1.0)]);
+        assert!(close(counts.brier(), (0.04 + 0.64 + 0.01 + 0.0) / 4.0));
         // Bins: two at 0.8, half of them blocked; one at 0.1, none; one at 1.0, blocked.
-        assert!(close(tally.ece(), (2.0 * 0.3 + 0.1 + 0.0) / 4.0));
+        assert!(close(counts.ece(), (2.0 * 0.3 + 0.1 + 0.0) / 4.0));
     }
 
     #[test]
     fn a_calibrated_predictor_has_no_calibration_error() {
         let cases: Vec<_> = (0..4).map(|i| (false, i == 0, 0.25)).collect();
-        assert!(close(tally(&cases).ece(), 0.0));
+        assert!(close(counts(&cases).ece(), 0.0));
     }
 
     #[test]
     fn pooled_scenes_equal_one_scene_of_all() {
         let (a, b) = ([(false, true, 0.7), (true, false, 0.2)], [(false, false, 0.7), (false, true, 0.4)]);
-        let pooled = Tally::pooled([&tally(&a), &tally(&b)]);
-        let whole = tally(&[a, b].concat());
+        let pooled = WindowCounts::pooled([&counts(&a), &counts(&b)]);
+        let whole = counts(&[a, b].concat());
         assert_eq!(pooled.all, whole.all);
         assert_eq!((pooled.auprc(), pooled.ece()), (whole.auprc(), whole.ece()));
     }

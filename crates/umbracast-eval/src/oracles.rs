@@ -1,4 +1,4 @@
-//! Casts that no run makes, from the rows of truth and run: the constant-velocity baseline, and the error budget,
+//! What oracles would cast and no run does, from the rows of truth and run: the constant-velocity baseline, and the error budget,
 //! in which each stage in turn is replaced by the truth and the rest stays as in the mode.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -9,7 +9,7 @@ use umbracast::forecast::{Coupling, Forecast, Gaussian2, Weights, constant_veloc
 use umbracast::forecast::constant_velocity::ACCELERATION_PSD_M2PS3;
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use umbracast::gait::{GaitPhase, WALKS_FROM_MPS};
-use umbracast::track::{OBSERVED, Observed, Track};
+use umbracast::track::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
 use umbracast::{Config, Error, STEP_S, STEPS};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
@@ -144,12 +144,21 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow) -> Track
     let walks = track.velocity_mps.length() > WALKS_FROM_MPS;
     let (heading_rad, heading_sigma_rad) =
         if walks { (track.velocity_mps.to_angle(), 0.0) } else { (own.heading_rad, own.heading_sigma_rad) };
-    let Track { height_m, height_sigma_m, gait, .. } = track_of(own);
-    Track { heading_rad, heading_sigma_rad, height_m, height_sigma_m, gait, ..track }
+    let Track { height_m, height_sigma_m, width_scale, width_scale_sigma, gait, .. } = track_of(own);
+    Track {
+        heading_rad,
+        heading_sigma_rad,
+        height_m,
+        height_sigma_m,
+        width_scale,
+        width_scale_sigma,
+        gait,
+        ..track
+    }
 }
 
 /// A track at the true positions of its person, now and at every step. The present is moved as well: a body
-/// turns as its way does, and a way from an estimate to the truth would turn it by the estimate's error.
+/// turns as its trajectory does, and one from an estimate to the truth would turn it by the estimate's error.
 fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow) -> (Track, Forecast) {
     let (aabb, obb) = box_moved_to(own, now);
     let position_m = DVec2::new(now.x_m, now.y_m);
@@ -193,6 +202,8 @@ pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb))
         heading_sigma_rad: 0.0,
         height_m: row.height_m,
         height_sigma_m: 0.0,
+        width_scale: 1.0,
+        width_scale_sigma: WIDTH_SCALE_SIGMA,
         gait: GaitPhase::UNKNOWN,
         points: row.returns,
         confirmed: true,
@@ -247,6 +258,8 @@ fn track_of(row: &TrackRow) -> Track {
         heading_sigma_rad: row.heading_sigma_rad,
         height_m: row.height_m,
         height_sigma_m: row.height_sigma_m,
+        width_scale: row.width_scale,
+        width_scale_sigma: row.width_scale_sigma,
         gait: GaitPhase { phase_rad: row.gait_phase_rad, concentration: row.gait_concentration },
         points: row.points,
         confirmed: row.confirmed,
@@ -372,10 +385,11 @@ mod tests {
         let (truth, _) = crossing();
         let index = TruthIndex::new(&truth);
         let (row, own) = track_beside(&index);
-        let track = with_true_state(&index, &own, &row, 0.3);
+        let track = with_true_state(&index, &own, &row);
         assert_eq!((track.position_m, track.height_m), (DVec2::new(row.x_m, row.y_m), 1.9));
         assert_eq!(track.heading_rad, std::f64::consts::FRAC_PI_2);
-        assert_eq!(with_true_state(&index, &own, &row, 1.1).heading_rad, 0.3);
+        let slow = PeopleRow { vx_mps: 0.1, vy_mps: 0.0, ..row };
+        assert_eq!(with_true_state(&index, &own, &slow).heading_rad, own.heading_rad);
     }
 
     #[test]
