@@ -197,7 +197,7 @@ mod tests {
             (|s| s.sensors[0].range_noise_m = -0.1, "site.sensors.lidar_east.range_noise_m: expected 0 to 1"),
             (|s| s.simulation.dropout = 2.0, "site.simulation.dropout: expected 0 to 1, found 2"),
             (
-                |s| drop(s.simulation.lost_after_s.insert("door".into(), 3.0)),
+                |s| s.simulation.lost_after_s = [("door".to_owned(), 3.0)].into(),
                 "site.simulation.lost_after_s.door: expected one of lidar_east, lidar_west, found door",
             ),
             (|s| s.access_points[1].position_m[2] = 12.0, "site.access_points.centre.position_m, z"),
