@@ -314,10 +314,10 @@ fn reliability(group: &Group, access_point: &str) -> Result<Option<Figure>, Erro
     let Some(links) = group.link(Some(mode), Predictor::Run, access_point) else { return Ok(None) };
     let bins = links.windows[0].bins.len() as f64;
     let most = links.windows.iter().flat_map(|w| &w.bins).map(|bin| bin.count).max().unwrap_or(1);
-    let mut shares = axes("share blocked", "predicted probability", (0.0, 1.0));
-    (shares.x, shares.x_step) = ((0.0, 1.0), Some(0.2));
+    let mut shares = axes("share blocked", "predicted probability", (0.0, 1.05));
+    (shares.x, shares.x_step, shares.y_step) = ((0.0, 1.05), Some(0.2), Some(0.2));
     let mut counts = axes("predictions in the bin", "predicted probability", (0.8, most as f64 * 2.0));
-    (counts.x, counts.x_step, counts.y_step, counts.y_log) = ((0.0, 1.0), Some(0.2), None, true);
+    (counts.x, counts.x_step, counts.y_step, counts.y_log) = ((0.0, 1.05), Some(0.2), None, true);
     for (w, color, radius) in [(1, GREEN, 5.5), (3, BLUE, 4.0), (9, PURPLE, 3.0)] {
         let filled = || links.windows[w - 1].bins.iter().zip(0..).filter(|(bin, _)| bin.count > 0);
         let share =
@@ -338,8 +338,8 @@ fn reliability(group: &Group, access_point: &str) -> Result<Option<Figure>, Erro
     let title = format!("Are the probabilities honest? Mode {}, access point {access_point}", mode.name());
     let caption = format!(
         "Predictions sorted by their probability into {bins} bins of equal width; each mark is a bin. On the \
-         diagonal, of the links predicted to be blocked with 30 % indeed 30 % are. Right: how many predictions a bin \
-         holds; where they are few, the mark on the left may lie far off by chance. Expected calibration error at \
+         diagonal, of the links predicted to be blocked with 30 % indeed 30 % are. Second chart: how many predictions a bin \
+         holds; where they are few, the mark in the first may lie far off by chance. Expected calibration error at \
          100, 300 and 900 ms: {:.3}, {:.3} and {:.3}.",
         ece(1),
         ece(3),

@@ -179,7 +179,7 @@ fn modes(group: &Group) -> String {
 /// The animation, small enough to be seen whole.
 fn animated(svg: &str, context: &Context) -> String {
     let of = context.kept.map_or(String::new(), |kept| format!(": {}", escaped(kept.label)));
-    let title = format!("A few seconds of it{of}");
+    let title = format!("A few seconds{of}");
     format!(
         "<div><h2 id=\"animation\">{title}</h2>\n<figure>\n{svg}<figcaption>People where they truly are. Red is \
          truth, amber is prediction. The same picture lies beside this page as animation.svg.</figcaption>\n\

@@ -73,7 +73,7 @@ pub fn plan(kept: &Kept) -> Result<Option<Figure>, Error> {
     let shape = height_m / (panel.x.1 - panel.x.0);
     let size = |width: f64, below: f64| (width, (width * shape).clamp(0.4 * width, 1.2 * width) + below);
     let time_s = kept.truth.people.iter().find(|p| p.frame == frame).map_or(0.0, |p| p.time_ns as f64 / 1e9);
-    let title = format!("One instant from above: {}, {time_s:.1} s", kept.label);
+    let title = format!("From above at {time_s:.1} s: {}", kept.label);
     let caption = format!(
         "Every link of every person who is followed, coloured by what mode {} says of it at this instant.",
         kept.mode.name()
@@ -126,7 +126,8 @@ pub fn link(kept: &Kept) -> Result<Option<Figure>, Error> {
         .filter_map(|&frame| Some((frame, index.person(frame, person)?.time_ns as f64 / 1e9)))
         .collect();
     let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(None) };
-    (panel.x, panel.x_step, panel.y) = ((first.1.floor(), last.1.ceil()), Some(2.0), (0.0, 1.1));
+    let step_s = if last.1 - first.1 > 16.0 { 5.0 } else { 2.0 };
+    (panel.x, panel.x_step, panel.y) = ((first.1.floor(), last.1.ceil()), Some(step_s), (0.0, 1.1));
     panel.y_step = Some(0.25);
     panel.y_digits = 2;
     for &(frame, time_s) in &times {
@@ -147,7 +148,7 @@ pub fn link(kept: &Kept) -> Result<Option<Figure>, Error> {
         .filter(|&&(frame, _)| said(frame).is_some_and(|link| link.blocked[2]))
         .map(|&(_, time_s)| (time_s, 1.06))
         .collect();
-    panel.series.push(series("predicted: blocked within 300 ms", BLACK, Mark::Squares(2.0), warned));
+    panel.series.push(series("predicted: blocked within 300 ms", BLACK, Mark::Squares(2.6), warned));
     let access_point = kept.site.access_points.first().map_or("", |ap| &ap.name);
     let title = format!("One link over time: {access_point} to person {person}, {}", kept.label);
     let caption = format!(

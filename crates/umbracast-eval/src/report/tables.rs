@@ -86,7 +86,7 @@ pub fn headline(group: &Group, published: bool) -> Table {
     let mut note = brackets(&table).to_owned();
     if published {
         table.rows.extend(published_rows());
-        note += " The published F1 follows from the other two.";
+        note += " The published F1 follows from its precision and recall.";
     }
     table.noted(note.trim_start())
 }
