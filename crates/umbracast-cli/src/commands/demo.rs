@@ -3,10 +3,10 @@
 use umbracast::{Config, Error, Mode};
 use umbracast_eval::chain;
 
-use crate::Ending;
 use crate::args::{Common, Demo};
 use crate::commands::evaluate;
 use crate::setup::{self, TEST_SEED};
+use crate::{Ending, say};
 
 /// Simulates one test scene in memory and reports on it.
 pub fn run(args: &Demo, common: &Common) -> Result<Ending, Error> {
@@ -15,6 +15,14 @@ pub fn run(args: &Demo, common: &Common) -> Result<Ending, Error> {
         .map(|mode| setup::config(mode, args.site.site.as_deref()))
         .collect::<Result<Vec<Config>, _>>()?;
     let seed = args.crowd.seed.unwrap_or(TEST_SEED);
+    if !common.json {
+        let (preset, people) = (args.crowd.preset.name(), args.crowd.people);
+        let sensors = configs[0].site.sensors.len();
+        say::line(format_args!(
+            "One scene ({preset}, seed {seed}): {people} people walk, {sensors} LiDAR(s) see them, every mode predicts which \
+             links they block.\n"
+        ));
+    }
     let scenes = chain::drawn_scenes(&[args.crowd.preset], 1, args.crowd.people, seed);
     evaluate::in_memory(configs, setup::weights(None)?, (scenes, Vec::new()), Some(&args.out), common)
 }

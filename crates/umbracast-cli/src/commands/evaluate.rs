@@ -21,10 +21,6 @@ use crate::run_json::Frames;
 use crate::setup::{self, TEST_SEED};
 use crate::{Ending, crowds, matches, say};
 
-/// Why rungs of the ladder lie below the reference, found by switching one trait of the bodies off at a time.
-const HARSHER_BODIES: &str = "the walking bodies sway over their stance foot, swing their arms and differ in \
-    stature, the reference's do not sway; where rays come down steeply a few centimetres decide";
-
 /// Scores what the arguments name.
 pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
     match (&args.dir, &args.truth, &args.labels) {
@@ -275,26 +271,18 @@ fn show(
     match common.json {
         true => say::text(&report::to_json(scores)),
         false => {
-            say::text(&report::to_text(scores));
+            say::text(&report::to_text(scores, &configs[0].site));
             told.iter().for_each(say::line);
         }
     }
     if let Some(folder) = out {
         let arguments: Vec<String> = std::env::args().skip(1).collect();
         let command = format!("umbracast {}", arguments.join(" "));
-        let explanations = explanations(scores);
-        let context =
-            Context { configs, command: command.trim_end(), kept, notes: told, explanations: &explanations };
+        let context = Context { configs, command: command.trim_end(), kept, notes: told };
         report::write(folder, scores, &context)?;
         if !common.json {
             say::line(format_args!("\nreport: {}", folder.join("report.html").display()));
         }
     }
     Ok(Ending::Done)
-}
-
-/// What is known of why our ladder lies below its reference: (oracle, reason).
-pub fn explanations(scores: &Scores) -> Vec<(String, String)> {
-    let rungs = scores.groups.iter().flat_map(|group| &group.ladder);
-    rungs.map(|row| (row.oracle.to_owned(), HARSHER_BODIES.to_owned())).collect()
 }

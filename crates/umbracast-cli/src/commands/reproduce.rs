@@ -12,7 +12,6 @@ use umbracast_eval::pooled;
 use umbracast_eval::report::{self, Context};
 
 use crate::args::{Common, Replay, Reproduce};
-use crate::commands::evaluate::explanations;
 use crate::progress::SceneClock;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
@@ -53,20 +52,14 @@ pub fn run(args: &Reproduce, common: &Common) -> Result<Ending, Error> {
     let scores = pooled::score(&experiment.results()?, &spec.configs[0].site);
     let notes = [notes(&spec, &network), told].concat();
     let command = command(args, spec.scenes.len());
-    let explanations = explanations(&scores);
-    let context = Context {
-        configs: &spec.configs,
-        command: &command,
-        kept: None,
-        notes: &notes,
-        explanations: &explanations,
-    };
+    let context = Context { configs: &spec.configs, command: &command, kept: None, notes: &notes };
     report::write(&args.out, &scores, &context)?;
     summary.write(&args.out)?;
     if common.json {
         say::text(&report::to_json(&scores));
     } else {
-        let text = [report::to_text(&scores), report::boxes_to_text(&scores)].join("\n");
+        let site = &spec.configs[0].site;
+        let text = [report::to_text(&scores, site), report::boxes_to_text(&scores, site)].join("\n");
         say::text(&format!("{}\n\n{text}", notes.join("\n")));
         say::line(format_args!("\nreport: {}", args.out.join("report.html").display()));
     }

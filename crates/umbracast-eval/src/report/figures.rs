@@ -2,7 +2,7 @@
 
 use umbracast::{Error, Mode, STEPS};
 
-use super::plot::{Drawing, Mark, Panel, Series, draw, draw_grid};
+use super::plot::{Drawing, Mark, Panel, Series, draw, draw_grid, svg};
 use super::{Kept, one_scene, published};
 use crate::pooled::{Estimate, Group, Scores, WindowScores};
 use crate::score::Predictor;
@@ -16,9 +16,66 @@ pub struct Figure {
     pub title: String,
     /// What is drawn and how to read it.
     pub caption: String,
-    /// The picture.
+    /// The picture by itself, its legend below.
     pub drawing: Drawing,
+    /// For the page: its panels (SVG) without a legend, which stand side by side or below each other.
+    pub panels: Vec<String>,
+    /// The same for a narrow page, where they differ.
+    pub narrow: Vec<String>,
+    /// For the page: name, colour and how it is drawn.
+    pub legend: Vec<(String, &'static str, Mark)>,
+    /// It takes the whole width of the page, not half of it.
+    pub whole_width: bool,
 }
+
+/// How large panels are drawn, pixels.
+#[derive(Debug, Clone, Copy)]
+pub struct Sizes {
+    /// In the picture by itself.
+    pub alone: (f64, f64),
+    /// On the page.
+    pub page: (f64, f64),
+    /// On a narrow page, where that is not the same.
+    pub narrow: Option<(f64, f64)>,
+}
+
+impl Figure {
+    /// Draws its panels, the legend of all being the first one's.
+    ///
+    /// # Errors
+    /// A picture that could not be coded.
+    pub fn of(
+        name: &'static str,
+        (title, caption): (String, String),
+        panels: &[Panel],
+        sizes: Sizes,
+    ) -> Result<Self, Error> {
+        let drawing = match panels {
+            [panel] => draw(name, panel, sizes.alone)?,
+            _ => draw_grid(name, panels, 2, sizes.alone)?,
+        };
+        let drawn = |kind: &str, size: (f64, f64)| -> Vec<String> {
+            (0..).zip(panels).map(|(i, panel)| svg(&format!("{name}-{kind}{i}"), panel, size)).collect()
+        };
+        let entries = panels.first().map_or(&[][..], |panel| &panel.series);
+        let named = entries.iter().filter(|series| !series.name.is_empty());
+        Ok(Self {
+            name,
+            title,
+            caption,
+            drawing,
+            panels: drawn("page", sizes.page),
+            narrow: sizes.narrow.map(|size| drawn("narrow", size)).unwrap_or_default(),
+            legend: named.map(|series| (series.name.clone(), series.color, series.mark)).collect(),
+            whole_width: panels.len() > 1,
+        })
+    }
+}
+
+/// Of a chart that takes half of the page.
+const HALF: Sizes = Sizes { alone: (860.0, 430.0), page: (460.0, 320.0), narrow: None };
+/// Of four panels in a row.
+const QUARTERS: Sizes = Sizes { alone: (430.0, 280.0), page: (300.0, 250.0), narrow: None };
 
 pub const BLUE: &str = "#0072b2";
 pub const ORANGE: &str = "#d55e00";
@@ -31,21 +88,28 @@ pub const LIGHT: &str = "#cccccc";
 pub const BLACK: &str = "#222222";
 pub const RED: &str = "#cc3311";
 
-/// Every figure that these scores allow.
+/// Every figure that these scores allow, beginning with the scene that was kept. `published` says whether what the
+/// paper prints stands beside.
 ///
 /// # Errors
 /// A picture that could not be coded.
-pub fn all(scores: &Scores, kept: Option<&Kept>, access_point: &str) -> Result<Vec<Figure>, Error> {
+pub fn all(
+    scores: &Scores,
+    kept: Option<&Kept>,
+    access_point: &str,
+    published: bool,
+) -> Result<Vec<Figure>, Error> {
     let Some(group) = scores.headline() else { return Ok(Vec::new()) };
-    let mut figures = vec![metrics(group, access_point)?];
-    figures.extend(boxes(group, access_point)?);
-    figures.push(displacement(group)?);
-    figures.extend(reliability(group, access_point)?);
-    figures.extend(ladder(group, access_point)?);
+    let mut figures = Vec::new();
     if let Some(kept) = kept {
         figures.extend(one_scene::plan(kept)?);
         figures.extend(one_scene::link(kept)?);
     }
+    figures.push(metrics(group, access_point, published)?);
+    figures.extend(boxes(group, access_point, published)?);
+    figures.push(displacement(group, published)?);
+    figures.extend(ladder(group, access_point)?);
+    figures.extend(reliability(group, access_point)?);
     Ok(figures)
 }
 
@@ -87,6 +151,7 @@ pub fn axes(title: &str, x_label: &str, y: (f64, f64)) -> Panel {
         y_step: Some(if y.1 - y.0 < 0.55 { 0.1 } else { 0.2 }),
         y_digits: 1,
         y_names: Vec::new(),
+        y_log: false,
         equal_axes: false,
         series: Vec::new(),
         shaded: Vec::new(),
@@ -116,16 +181,24 @@ fn published_scores() -> [(&'static str, Score, Marks); 4] {
 }
 
 /// The four figures over the windows, one panel each; `lines` are those of a score.
-fn four_panels(name: &str, lines: impl Fn(Score) -> Vec<Series>) -> Result<Drawing, Error> {
+fn four_panels(published: bool, lines: impl Fn(Score) -> Vec<Series>) -> [Panel; 4] {
     let shown = published_scores().map(|(title, score, marks)| (title, lines(score), marks));
     let everything = shown.iter().flat_map(|(_, lines, _)| lines).flat_map(|line| &line.points);
     let lowest = everything.map(|(_, y)| *y).fold(0.7, f64::min);
     let from = (lowest * 10.0).floor() / 10.0;
-    let panel = |(title, lines, marks): (&str, Vec<Series>, Marks)| {
-        let published = series("published", BLACK, Mark::Diamonds(5.0), marks);
-        Panel { series: [lines, vec![published]].concat(), ..axes(title, "window, ms", (from, 1.0)) }
-    };
-    draw_grid(name, &shown.map(panel), 2, (430.0, 280.0))
+    shown.map(|(title, lines, marks)| {
+        let marks = published.then(|| series("published", BLACK, Mark::Diamonds(5.0), marks));
+        let series = lines.into_iter().chain(marks).collect();
+        Panel { series, ..axes(title, "window, ms", (from, 1.0)) }
+    })
+}
+
+/// What a reader is told of the shades, where there are any.
+fn shades<'a>(mut panels: impl Iterator<Item = &'a Panel>) -> &'static str {
+    match panels.any(|panel| panel.series.iter().any(|series| !series.band.is_empty())) {
+        true => " Shaded: 95 % intervals over recordings.",
+        false => "",
+    }
 }
 
 /// One predictor's score over the windows, with its interval.
@@ -141,7 +214,7 @@ fn score_line(
 }
 
 /// Algorithm 1 with either box on every mode's tracks and forecasts: the paper's figure.
-fn boxes(group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
+fn boxes(group: &Group, access_point: &str, published: bool) -> Result<Option<Figure>, Error> {
     let lines = |score: Score| -> Vec<Series> {
         let of_mode = |mode: Mode| {
             let boxes = [(Predictor::Aabb, Mark::Line(1.8)), (Predictor::Obb, Mark::Dashed(1.8))];
@@ -155,22 +228,26 @@ fn boxes(group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
     if lines(|s| s.f1).is_empty() {
         return Ok(None);
     }
-    Ok(Some(Figure {
-        name: "boxes",
-        title: format!("The paper's figure again: AABB and OBB, access point {access_point}"),
-        caption: format!(
-            "Algorithm 1 with axis-aligned (line) and oriented boxes (dashed) on the tracks and forecasts of every \
-             mode; shaded: 95 % intervals over scenes. The paper finds more recall and the higher F1 with OBB, more \
-             precision with AABB, and precision and recall crossing near 300 ms. Blocked at 300 ms: {} here, {:.2} \
-             in the paper.",
-            base_rate(group, access_point),
-            published::BASE_RATE_AT_300_MS
-        ),
-        drawing: four_panels("boxes", lines)?,
-    }))
+    let panels = four_panels(published, lines);
+    let mut caption =
+        "People as boxes: axis-aligned (AABB, line) and oriented (OBB, dashed), on the tracks and \
+                       forecasts of "
+            .to_owned();
+    caption += if group.modes.len() == 1 { "the run." } else { "each mode." };
+    caption += shades(panels.iter());
+    if published {
+        caption += " The paper (its Algorithm 1) finds more recall and the higher F1 with OBB, more precision with \
+                    AABB, and precision and recall crossing near 300 ms.";
+        caption += &base_rates(group, access_point);
+    }
+    let title = match published {
+        true => format!("The paper's figure again: AABB and OBB, access point {access_point}"),
+        false => format!("With boxes for bodies, access point {access_point}"),
+    };
+    Figure::of("boxes", (title, caption), &panels, QUARTERS).map(Some)
 }
 
-fn metrics(group: &Group, access_point: &str) -> Result<Figure, Error> {
+fn metrics(group: &Group, access_point: &str, published: bool) -> Result<Figure, Error> {
     let lines = |score: Score| -> Vec<Series> {
         let of_mode = |mode: Mode| {
             let named = (mode.name().to_owned(), color_of(mode), Mark::Line(2.2));
@@ -178,34 +255,40 @@ fn metrics(group: &Group, access_point: &str) -> Result<Figure, Error> {
         };
         modes(group).into_iter().filter_map(of_mode).collect()
     };
-    Ok(Figure {
-        name: "metrics",
-        title: format!("Blockage within the window, access point {access_point}"),
-        caption: format!(
-            "Accuracy, precision, recall and F1 of every mode over the prediction window, with what the paper \
-             prints for 300 ms and the level at which its F1 settles; shaded: 95 % intervals over scenes. The \
-             share of blocked windows differs: {} here at 300 ms, {:.2} in the paper.",
-            base_rate(group, access_point),
-            published::BASE_RATE_AT_300_MS
-        ),
-        drawing: four_panels("metrics", lines)?,
-    })
+    let panels = four_panels(published, lines);
+    let mut caption = "Accuracy, precision, recall and F1 over the prediction window.".to_owned();
+    if published {
+        caption += " Diamonds: what the paper prints for 300 ms, and the level at which its F1 settles.";
+        caption += &base_rates(group, access_point);
+    }
+    caption += shades(panels.iter());
+    let title = format!("Blockage within the window, access point {access_point}");
+    Figure::of("metrics", (title, caption), &panels, QUARTERS)
 }
 
-fn base_rate(group: &Group, access_point: &str) -> String {
+/// Scores of crowds that block each other more or less often do not compare as they stand.
+fn base_rates(group: &Group, access_point: &str) -> String {
     let links = group.link(None, Predictor::Never, access_point);
     let rate = links.and_then(|links| links.windows[2].base_rate.value);
-    rate.map_or("unknown".into(), |rate| format!("{rate:.2}"))
+    let here = rate.map_or("unknown".into(), |rate| format!("{rate:.2}"));
+    let paper = published::BASE_RATE_AT_300_MS;
+    format!(" The share of windows blocked at 300 ms is {here} here and {paper:.2} in the paper.")
 }
 
-fn displacement(group: &Group) -> Result<Figure, Error> {
+fn displacement(group: &Group, published: bool) -> Result<Figure, Error> {
     let by_step = |values: &[Option<f64>]| -> Vec<(f64, f64)> {
         (1..).zip(values).filter_map(|(h, value)| Some((f64::from(h) * 100.0, (*value)?))).collect()
     };
-    let published = published::DISPLACEMENT_M.map(Some);
-    let highest = group.modes.iter().filter_map(|m| m.displacement_m[STEPS - 1].value).fold(1.0, f64::max);
-    let mut panel = axes("mean displacement, m", "ahead, ms", (0.0, (highest * 5.0).ceil() / 5.0));
-    panel.series.push(series("published (Table I)", BLACK, Mark::Diamonds(5.0), by_step(&published)));
+    let printed = published::DISPLACEMENT_M.map(Some);
+    let least = if published { 1.0 } else { 0.05 };
+    let highest = group.modes.iter().filter_map(|m| m.displacement_m[STEPS - 1].value).fold(least, f64::max);
+    let (tick_m, digits) = if highest > 0.5 { (0.2, 1) } else { (0.05, 2) };
+    let mut panel = axes("mean displacement, m", "ahead, ms", (0.0, (highest / tick_m).ceil() * tick_m));
+    (panel.y_step, panel.y_digits) = (Some(tick_m), digits);
+    if published {
+        let marks = series("published (Table I)", BLACK, Mark::Diamonds(5.0), by_step(&printed));
+        panel.series.push(marks);
+    }
     for mode in &group.modes {
         let values: Vec<_> = mode.displacement_m.iter().map(|step| step.value).collect();
         let line = series(mode.mode.name(), color_of(mode.mode), Mark::Line(2.2), by_step(&values));
@@ -213,15 +296,11 @@ fn displacement(group: &Group) -> Result<Figure, Error> {
     }
     let carried_on = by_step(&group.constant_velocity_m);
     panel.series.push(series("constant velocity of the true state", GREY, Mark::Dashed(1.6), carried_on));
-    Ok(Figure {
-        name: "displacement",
-        title: "Displacement error of the forecast".into(),
-        caption: "Mean distance between forecast and true position at each step, over people with a track who \
-                  have not arrived. The dashed line starts from the true state: what is left of it is the future \
-                  alone."
-            .into(),
-        drawing: draw("displacement", &panel, (860.0, 400.0))?,
-    })
+    let caption = "Mean distance between forecast and true position at each step, over people with a track who have \
+                   not arrived. Dashed: true position and velocity carried on, so that only the future is unknown."
+        .to_owned();
+    let caption = caption + shades(std::iter::once(&panel));
+    Figure::of("displacement", ("Displacement error of the forecast".into(), caption), &[panel], HALF)
 }
 
 fn reliability(group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
@@ -233,29 +312,41 @@ fn reliability(group: &Group, access_point: &str) -> Result<Option<Figure>, Erro
     };
     let Some(mode) = modes(group).into_iter().rev().find(graded) else { return Ok(None) };
     let Some(links) = group.link(Some(mode), Predictor::Run, access_point) else { return Ok(None) };
-    let mut panel = axes("share blocked", "probability said", (0.0, 1.0));
-    (panel.x, panel.x_step, panel.equal_axes) = ((0.0, 1.0), Some(0.2), true);
-    panel.series.push(series("perfect", LIGHT, Mark::Line(1.5), vec![(0.0, 0.0), (1.0, 1.0)]));
-    for (w, color) in [(1, GREEN), (3, BLUE), (9, PURPLE)] {
-        let filled = links.windows[w - 1].bins.iter().filter(|bin| bin.count > 0);
-        let points =
-            filled.map(|bin| (bin.p_sum / bin.count as f64, bin.blocked as f64 / bin.count as f64)).collect();
-        panel.series.push(series(format!("{} ms", w * 100), color, Mark::Discs(4.0), points));
+    let bins = links.windows[0].bins.len() as f64;
+    let most = links.windows.iter().flat_map(|w| &w.bins).map(|bin| bin.count).max().unwrap_or(1);
+    let mut shares = axes("share blocked", "predicted probability", (0.0, 1.05));
+    (shares.x, shares.x_step, shares.y_step) = ((0.0, 1.05), Some(0.2), Some(0.2));
+    let mut counts = axes("predictions in the bin", "predicted probability", (0.8, most as f64 * 2.0));
+    (counts.x, counts.x_step, counts.y_step, counts.y_log) = ((0.0, 1.05), Some(0.2), None, true);
+    for (w, color, radius) in [(1, GREEN, 5.5), (3, BLUE, 4.0), (9, PURPLE, 3.0)] {
+        let filled = || links.windows[w - 1].bins.iter().zip(0..).filter(|(bin, _)| bin.count > 0);
+        let share =
+            |p_sum: f64, blocked: u64, count: u64| (p_sum / count as f64, blocked as f64 / count as f64);
+        let points = filled().map(|(bin, _)| share(bin.p_sum, bin.blocked, bin.count)).collect();
+        let mark = match w {
+            1 => Mark::Squares(radius),
+            3 => Mark::Discs(radius),
+            _ => Mark::Diamonds(radius + 1.5),
+        };
+        shares.series.push(series(format!("within {} ms", w * 100), color, mark, points));
+        let middle = |i: i32| (f64::from(i) + 0.5) / bins;
+        let points = filled().map(|(bin, i)| (middle(i), bin.count as f64)).collect();
+        counts.series.push(series("", color, mark, points));
     }
+    shares.series.push(series("perfect", GREY, Mark::Dashed(1.5), vec![(0.0, 0.0), (1.0, 1.0)]));
     let ece = |w: usize| links.windows[w - 1].ece.unwrap_or(f64::NAN);
-    Ok(Some(Figure {
-        name: "reliability",
-        title: format!("Are the probabilities honest? Mode {}, access point {access_point}", mode.name()),
-        caption: format!(
-            "Windows sorted by the probability said into 15 bins of equal width; each point is a bin. On the \
-             diagonal, of the windows said to be blocked with 30 % indeed 30 % are. Expected calibration error \
-             at 100, 300 and 900 ms: {:.3}, {:.3} and {:.3}.",
-            ece(1),
-            ece(3),
-            ece(9)
-        ),
-        drawing: draw("reliability", &panel, (560.0, 560.0))?,
-    }))
+    let title = format!("Are the probabilities honest? Mode {}, access point {access_point}", mode.name());
+    let caption = format!(
+        "Predictions sorted by their probability into {bins} bins of equal width; each mark is a bin. On the \
+         diagonal, of the links predicted to be blocked with 30 % indeed 30 % are. Second chart: how many predictions a bin \
+         holds; where they are few, the mark in the first may lie far off by chance. Expected calibration error at \
+         100, 300 and 900 ms: {:.3}, {:.3} and {:.3}.",
+        ece(1),
+        ece(3),
+        ece(9)
+    );
+    let sizes = Sizes { alone: (480.0, 400.0), page: (460.0, 360.0), narrow: None };
+    Figure::of("reliability", (title, caption), &[shares, counts], sizes).map(Some)
 }
 
 fn ladder(group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
@@ -288,12 +379,10 @@ fn ladder(group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
             ));
         }
     }
-    Ok(Some(Figure {
-        name: "ladder",
-        title: format!("What limits the result, access point {access_point}"),
-        caption: "F1 if the future were known and people had the body named (dashed), beside what the modes \
-                  reach. The upright body is the ceiling: nobody can pass it without knowing the gait."
-            .into(),
-        drawing: draw("ladder", &panel, (860.0, 460.0))?,
-    }))
+    let title = format!("What limits the result, access point {access_point}");
+    let caption =
+        "Dashed: F1 of oracles that know where everybody will be and take people for the body named. The \
+                   upright body knows all but the gait; what follows the gait can pass it."
+            .to_owned();
+    Figure::of("ladder", (title, caption), &[panel], HALF).map(Some)
 }

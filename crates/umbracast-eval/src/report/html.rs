@@ -3,48 +3,77 @@
 use std::fmt::Write as _;
 
 use super::figures::Figure;
+use super::plot::Mark;
 use super::tables::Table;
 use super::{Context, published};
 use crate::pooled::{Group, Scores};
 use crate::score::Predictor;
+use umbracast::Mode;
 
+/// A table with more rows is folded.
+const ROWS_MAX: usize = 12;
+
+/// Charts are drawn for a light page; a dark one turns their lightness round and keeps their hues.
 const STYLE: &str = "
-:root { color-scheme: light; }
+:root { color-scheme: light dark; --ink: #222; --soft: #555; --line: #ddd; --rule: #999; --page: #fff; --well: #f6f6f6; }
+@media (prefers-color-scheme: dark) {
+:root { --ink: #e6e6e6; --soft: #aaa; --line: #3a3a3a; --rule: #777; --page: #141414; --well: #1f1f1f; }
+.chart, .swatch { filter: invert(0.92) hue-rotate(180deg); }
+}
 * { box-sizing: border-box; }
-body { font: 16px/1.55 system-ui, sans-serif; color: #222; background: #fff; margin: 0 auto; padding: 1.5rem 1rem 4rem;
-  max-width: 74rem; }
+body { font: 16px/1.55 system-ui, sans-serif; color: var(--ink); background: var(--page); margin: 0 auto;
+  padding: 1.5rem 1rem 4rem; max-width: 78rem; }
+a { color: inherit; }
 h1 { font-size: 1.7rem; line-height: 1.2; margin: 0.5rem 0; }
-h2 { font-size: 1.25rem; margin: 2.8rem 0 0.4rem; }
-p { max-width: 44rem; }
+h2 { font-size: 1.2rem; line-height: 1.3; margin: 2.4rem 0 0.5rem; }
+p { max-width: 52rem; }
 .lead { font-size: 1.1rem; }
-.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(11rem, 1fr)); gap: 0.8rem; margin: 1.2rem 0; }
-.card { border: 1px solid #ddd; border-radius: 8px; padding: 0.7rem 0.9rem; }
+.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(10rem, 1fr)); gap: 0.8rem; margin: 1.2rem 0; }
+.card { border: 1px solid var(--line); border-radius: 8px; padding: 0.7rem 0.9rem; }
 .card b { display: block; font-size: 1.6rem; font-weight: 600; line-height: 1.3; }
-.card span { color: #555; font-size: 0.85rem; display: block; }
-figure { margin: 0.8rem 0 0; }
-figure svg { display: block; min-width: 34rem; }
-figcaption, .note { color: #555; font-size: 0.9rem; max-width: 44rem; margin: 0.3rem 0 0; }
+.card span { color: var(--soft); font-size: 0.85rem; display: block; }
+.figures { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 0 2rem; }
+.whole { grid-column: 1 / -1; }
+figure { margin: 0; }
+.panels { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 15rem), 1fr)); gap: 0.5rem; }
+figure svg { display: block; max-width: none !important; }
+.narrow { display: none; }
+.legend { display: flex; flex-wrap: wrap; gap: 0.1rem 1.2rem; padding: 0; margin: 0.4rem 0; list-style: none;
+  font-size: 0.9rem; }
+.legend li { display: flex; align-items: center; gap: 0.4rem; }
+.legend svg { width: 30px; height: 14px; flex: none; }
+figcaption, .note { color: var(--soft); font-size: 0.9rem; max-width: 52rem; margin: 0.3rem 0 0; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: 0.8rem; font-variant-numeric: tabular-nums; white-space: nowrap; }
-th, td { padding: 0.25rem 0.4rem; text-align: right; border-bottom: 1px solid #e6e6e6; }
-th { border-bottom: 2px solid #999; font-weight: 600; }
+th, td { padding: 0.25rem 0.4rem; text-align: right; border-bottom: 1px solid var(--line); }
+th { border-bottom: 2px solid var(--rule); font-weight: 600; }
 .w { text-align: left; }
-tr.new td { border-top: 2px solid #bbb; }
-pre { background: #f6f6f6; border-radius: 6px; padding: 0.8rem; overflow-x: auto; font-size: 0.8rem; line-height: 1.4; }
-summary { cursor: pointer; margin: 0.4rem 0; }
+tr.new td { border-top: 2px solid var(--rule); }
+pre { background: var(--well); border-radius: 6px; padding: 0.8rem; overflow-x: auto; font-size: 0.8rem; line-height: 1.4; }
+details { border-top: 1px solid var(--line); padding: 0.5rem 0; }
+summary { cursor: pointer; }
+summary h2 { display: inline; font-size: 1rem; }
 nav a { margin-right: 1rem; white-space: nowrap; }
+@media (max-width: 760px) {
+.figures { grid-template-columns: minmax(0, 1fr); }
+.narrowed { display: none; }
+.narrow { display: grid; }
+}
 @media print { body { max-width: none; } h2, figure, tr { break-inside: avoid; } }
 ";
 
-const MODES: &str = "<p>Three modes stand side by side. <b>hdl</b>: stage 1 (detect, track) as the code that the paper's
-authors adapted ships it, with the paper's forecast and cast. <b>paper</b>: the method as its authors describe it.
-<b>default</b>: the best of this software. A window counts as blocked when the link is cut at any step of it; F1 is the
-harmonic mean of precision and recall, and onset F1 the same over links that are in sight when the prediction is made,
-where saying &quot;as now&quot; earns nothing.</p>
-";
+/// What was drawn and tabulated, in the order of the page.
+pub struct Drawn<'a> {
+    /// Stands first.
+    pub animation: Option<&'a str>,
+    /// Then these.
+    pub figures: &'a [Figure],
+    /// Then these.
+    pub tables: &'a [Table],
+}
 
-/// The whole page.
-pub fn page(scores: &Scores, context: &Context, figures: &[Figure], tables: &[Table]) -> String {
+/// The whole page. `published` says whether what the paper prints stands beside.
+pub fn page(scores: &Scores, context: &Context, drawn: &Drawn, published: bool) -> String {
     let mut page = String::from("<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
     // Writing to a String cannot fail.
     let _ = write!(
@@ -54,16 +83,19 @@ pub fn page(scores: &Scores, context: &Context, figures: &[Figure], tables: &[Ta
          <h1>Which links will people block?</h1>\n"
     );
     if let Some(group) = scores.headline() {
-        page += &opening(group);
+        page += &opening(group, published);
     }
     for note in context.notes {
         let _ = writeln!(page, "<p>{}</p>", escaped(note));
     }
     page += "<nav><a href=\"#figures\">Figures</a><a href=\"#tables\">Tables</a>\
-             <a href=\"#again\">Run it again</a></nav>\n<section id=\"figures\">\n";
-    figures.iter().for_each(|figure| page += &drawn(figure));
-    page += "</section>\n<section id=\"tables\">\n";
-    tables.iter().for_each(|table| page += &tabulated(table));
+             <a href=\"#again\">Run it again</a></nav>\n<section id=\"figures\" class=\"figures\">\n";
+    if let Some(svg) = drawn.animation {
+        page += &animated(svg, context);
+    }
+    drawn.figures.iter().for_each(|figure| page += &charted(figure));
+    page += "</section>\n<section id=\"tables\">\n<h2>Tables</h2>\n";
+    drawn.tables.iter().enumerate().for_each(|(i, table)| page += &tabulated(table, i == 0));
     page += "</section>\n<section id=\"again\">\n<h2>Run it again</h2>\n";
     let _ = writeln!(page, "<pre>{}</pre>", escaped(context.command));
     for config in context.configs {
@@ -77,52 +109,145 @@ pub fn page(scores: &Scores, context: &Context, figures: &[Figure], tables: &[Ta
 }
 
 /// What was done, in two sentences, and the figures that matter.
-fn opening(group: &Group) -> String {
+fn opening(group: &Group, published: bool) -> String {
     let Some(mode) = group.modes.last() else { return String::new() };
     let access_points = group.access_points();
     let first = access_points.first().copied().unwrap_or_default();
     let scenes = if group.scenes == 1 { "one scene".to_owned() } else { format!("{} scenes", group.scenes) };
+    let of_first = match (group.modes.len(), access_points.len()) {
+        (1, 1) => String::new(),
+        (1, _) => format!(" First figures: access point {}.", escaped(first)),
+        _ => format!(" First figures: mode {} at access point {}.", mode.mode.name(), escaped(first)),
+    };
     let mut text = format!(
-        "<p class=\"lead\">LiDARs see people walk, each walker's way is foreseen for 0.9 s, and a ray from every \
-         access point to every person tells which radio links a body is about to block. This report holds \
-         {scenes} ({} frames) against the truth. First figures: mode {} at access point {}.</p>\n\
-         <div class=\"cards\">\n",
+        "<p class=\"lead\">LiDARs see people walk. Umbracast predicts where each will be in the next 0.9 s, and which \
+         radio links between access points and people a body is about to block. This report holds {scenes} \
+         ({} frames) against the truth.{of_first}</p>\n<div class=\"cards\">\n",
         group.frames,
-        mode.mode.name(),
-        escaped(first)
     );
-    let mut card = |value: Option<f64>, digits: usize, unit: &str, what: &str| {
+    let mut card = |value: Option<f64>, digits: usize, unit: &str, what: &str, printed: String| {
         let value = value.map_or("-".to_owned(), |value| format!("{value:.digits$}{unit}"));
-        let _ = writeln!(text, "<div class=\"card\"><b>{value}</b><span>{what}</span></div>");
+        let printed = if published { format!("; published {printed}") } else { String::new() };
+        let _ = writeln!(text, "<div class=\"card\"><b>{value}</b><span>{what}{printed}</span></div>");
     };
     if let Some(links) = group.link(Some(mode.mode), Predictor::Run, first) {
         let at = &links.windows[2];
-        card(at.f1.value, 3, "", &format!("F1 at 300 ms; published {:.3}", published::F1_AT_300_MS));
-        card(at.onset_f1.value, 3, "", "onset F1: links in sight now");
+        card(at.f1.value, 3, "", "F1 at 300 ms", format!("{:.3}", published::F1_AT_300_MS));
         card(
             at.base_rate.value,
             2,
             "",
-            &format!("of windows are blocked; published {:.2}", published::BASE_RATE_AT_300_MS),
+            "of windows are blocked",
+            format!("{:.2}", published::BASE_RATE_AT_300_MS),
         );
     }
     let ahead = mode.displacement_m.last().and_then(|step| step.value);
-    let published = published::DISPLACEMENT_M[published::DISPLACEMENT_M.len() - 1];
-    card(ahead, 2, " m", &format!("off after 900 ms; published {published:.2} m"));
-    card(mode.tracked_share.value.map(|share| share * 100.0), 1, " %", "of people are followed");
-    text + "</div>\n" + MODES
+    let printed = published::DISPLACEMENT_M[published::DISPLACEMENT_M.len() - 1];
+    card(ahead, 2, " m", "off after 900 ms", format!("{printed:.2} m"));
+    let mut plain = |value: Option<f64>, digits: usize, unit: &str, what: &str| {
+        let value = value.map_or("-".to_owned(), |value| format!("{value:.digits$}{unit}"));
+        let _ = writeln!(text, "<div class=\"card\"><b>{value}</b><span>{what}</span></div>");
+    };
+    if let Some(links) = group.link(None, Predictor::PersistenceOfTruth, first) {
+        plain(links.windows[2].f1.value, 3, "", "F1 at 300 ms of a guess: blocked stays blocked");
+    }
+    if let Some(links) = group.link(Some(mode.mode), Predictor::Run, first) {
+        plain(links.windows[2].onset_f1.value, 3, "", "onset F1: links in sight when predicted");
+    }
+    plain(mode.tracked_share.value.map(|share| share * 100.0), 1, " %", "of people are followed");
+    text + "</div>\n" + &modes(group)
 }
 
-fn drawn(figure: &Figure) -> String {
-    let (title, caption, name) = (escaped(&figure.title), escaped(&figure.caption), figure.name);
-    let svg = figure.drawing.svg.replacen("<svg ", &format!("<svg aria-label=\"{title}\" "), 1);
+/// Which method each mode is, and what the scores mean.
+fn modes(group: &Group) -> String {
+    let told = |mode: Mode| match mode {
+        Mode::Hdl => {
+            "detection and tracking as the code that the paper's authors adapted ships them, with the paper's forecast"
+        }
+        Mode::Paper => "the method as the paper describes it",
+        Mode::Default => "this software's own method",
+    };
+    let mut text = String::from("<p>");
+    for mode in group.modes.iter().map(|scores| scores.mode) {
+        let _ = write!(text, "Mode <b>{}</b>: {}. ", mode.name(), told(mode));
+    }
+    text + "A window counts as blocked when the link is cut at any step of it. F1 is the harmonic mean of precision and \
+            recall; onset F1 is the same over links that are in sight when the prediction is made, where saying \
+            &quot;as now&quot; earns nothing.</p>\n"
+}
+
+/// The animation, small enough to be seen whole.
+fn animated(svg: &str, context: &Context) -> String {
+    let of = context.kept.map_or(String::new(), |kept| format!(": {}", escaped(kept.label)));
+    let title = format!("A few seconds{of}");
     format!(
-        "<h2 id=\"{name}\">{title}</h2>\n<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>\n"
+        "<div><h2 id=\"animation\">{title}</h2>\n<figure>\n{svg}<figcaption>People where they truly are. Red is \
+         truth, amber is prediction. The same picture lies beside this page as animation.svg.</figcaption>\n\
+         </figure></div>\n"
     )
 }
 
-fn tabulated(table: &Table) -> String {
-    let mut text = format!("<h2>{}</h2>\n<div class=\"wide\"><table>\n<tr>", escaped(&table.title));
+fn charted(figure: &Figure) -> String {
+    let (title, caption, name) = (escaped(&figure.title), escaped(&figure.caption), figure.name);
+    let class = if figure.whole_width { " class=\"whole\"" } else { "" };
+    let mut text = format!("<div{class}><h2 id=\"{name}\">{title}</h2>\n<figure>\n");
+    let mut panels = |class: &str, svgs: &[String]| {
+        let _ = writeln!(text, "<div class=\"{class}\">");
+        for svg in svgs {
+            let named = format!("<svg class=\"chart\" aria-label=\"{title}\" ");
+            let _ = writeln!(text, "{}", svg.replacen("<svg ", &named, 1));
+        }
+        text += "</div>\n";
+    };
+    if figure.narrow.is_empty() {
+        panels("panels", &figure.panels);
+    } else {
+        panels("panels narrowed", &figure.panels);
+        panels("panels narrow", &figure.narrow);
+    }
+    text += "<ul class=\"legend\">";
+    for (words, color, mark) in &figure.legend {
+        let _ = write!(text, "<li>{}{}</li>", swatch(color, *mark), escaped(words));
+    }
+    let _ = write!(text, "</ul>\n<figcaption>{caption}</figcaption>\n</figure></div>\n");
+    text
+}
+
+/// How a series looks in its chart.
+fn swatch(color: &str, mark: Mark) -> String {
+    let line = |width: f64, dashes: &str| {
+        format!(
+            "<path d=\"M1 7h28\" stroke=\"{color}\" stroke-width=\"{width}\" stroke-dasharray=\"{dashes}\"/>"
+        )
+    };
+    let shape = match mark {
+        Mark::Line(width) => line(width, "none"),
+        Mark::Dashed(width) => line(width, "6 4"),
+        Mark::Discs(radius) => format!("<circle cx=\"15\" cy=\"7\" r=\"{radius}\" fill=\"{color}\"/>"),
+        Mark::Diamonds(radius) => {
+            let r = radius.min(7.0);
+            format!("<path d=\"M15 {}l{r} {r}l-{r} {r}l-{r} -{r}z\" fill=\"{color}\"/>", 7.0 - r)
+        }
+        Mark::Squares(radius) => format!(
+            "<rect x=\"{}\" y=\"{}\" width=\"{side}\" height=\"{side}\" fill=\"{color}\"/>",
+            15.0 - radius,
+            7.0 - radius,
+            side = 2.0 * radius
+        ),
+        Mark::Patch => {
+            format!("<rect x=\"1\" y=\"1\" width=\"28\" height=\"12\" fill=\"{color}\" opacity=\"0.3\"/>")
+        }
+    };
+    format!("<svg class=\"swatch\" viewBox=\"0 0 30 14\" aria-hidden=\"true\">{shape}</svg>")
+}
+
+/// Folded where it is long, but for the one that stands `first`.
+fn tabulated(table: &Table, first: bool) -> String {
+    let fold = if first || table.rows.len() <= ROWS_MAX { " open" } else { "" };
+    let mut text = format!(
+        "<details{fold}><summary><h2>{}</h2></summary>\n<div class=\"wide\"><table>\n<tr>",
+        escaped(&table.title)
+    );
     let class = |column: usize| if column < table.words { " class=\"w\"" } else { "" };
     for (column, name) in table.header.iter().enumerate() {
         let _ = write!(text, "<th{}>{}</th>", class(column), escaped(name));
@@ -141,7 +266,7 @@ fn tabulated(table: &Table) -> String {
     if !table.note.is_empty() {
         let _ = writeln!(text, "<p class=\"note\">{}</p>", escaped(&table.note));
     }
-    text
+    text + "</details>\n"
 }
 
 pub(crate) fn escaped(text: &str) -> String {

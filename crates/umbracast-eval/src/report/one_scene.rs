@@ -7,8 +7,9 @@ use umbracast::{Error, STEPS, Site};
 use umbracast_io::rows::{LinkRow, TrackRow};
 
 use super::Kept;
-use super::figures::{BLACK, BLUE, Figure, GOLD, GREY, LIGHT, PURPLE, RED, axes, series};
-use super::plot::{Mark, Panel, draw};
+use super::figures::{BLACK, BLUE, Figure, GOLD, GREEN, GREY, LIGHT, PURPLE, RED, Sizes, axes, series};
+use super::floor::{self, Window};
+use super::plot::{Mark, Panel};
 use crate::instances::instances;
 use crate::matching::match_scene;
 use crate::scene::TruthIndex;
@@ -28,104 +29,77 @@ fn busiest_frame(kept: &Kept) -> Option<u64> {
     about_to.into_iter().max_by_key(|&(frame, count)| (count, Reverse(frame))).map(|(frame, _)| frame)
 }
 
-/// Everybody from above, with forecasts and rays.
+/// The hall from above with everybody in it, forecasts and links.
 pub fn plan(kept: &Kept) -> Result<Option<Figure>, Error> {
     let Some(frame) = busiest_frame(kept) else { return Ok(None) };
     let site = kept.site;
-    let Some(access_point) = site.access_points.first() else { return Ok(None) };
-    let at = (access_point.position_m[0], access_point.position_m[1]);
+    let hung = floor::access_points(site);
     let tracks: Vec<&TrackRow> = kept.run.tracks.iter().filter(|t| t.frame == frame && t.confirmed).collect();
-    let links: Vec<&LinkRow> =
-        kept.run.links.iter().filter(|link| link.frame == frame && link.access_point == 0).collect();
+    let links: Vec<&LinkRow> = kept.run.links.iter().filter(|link| link.frame == frame).collect();
     let people: Vec<(f64, f64)> =
         kept.truth.people.iter().filter(|p| p.frame == frame).map(|p| (p.x_m, p.y_m)).collect();
-    let mut panel = hall(site, around(&people, at));
-    for track in &tracks {
-        let link = links.iter().find(|link| link.track == track.track);
-        let color = match link {
-            Some(link) if link.blocked_now => RED,
-            Some(link) if link.blocked[STEPS - 1] => GOLD,
-            _ => LIGHT,
-        };
-        panel.series.push(series("", color, Mark::Line(1.4), vec![at, (track.x_m, track.y_m)]));
+    let mut panel = hall(site, floor::window(site, people.iter().copied()));
+    // What matters most is drawn last.
+    let kinds = [
+        ("in sight", GREY, Mark::Line(0.7)),
+        ("predicted blocked within 0.9 s", GOLD, Mark::Dashed(2.2)),
+        ("blocked now", RED, Mark::Line(2.8)),
+    ];
+    for (kind, (_, color, mark)) in kinds.iter().enumerate() {
+        for link in links.iter().filter(|link| kind_of(link) == kind) {
+            let track = tracks.iter().find(|track| track.track == link.track);
+            let ends = track.zip(hung.get(link.access_point as usize));
+            panel.series.extend(ends.map(|(t, &at)| series("", color, *mark, vec![at, (t.x_m, t.y_m)])));
+        }
     }
     for track in &tracks {
         let mut path = vec![(track.x_m, track.y_m)];
         path.extend(track.steps.iter().map(|step| (step[0], step[1])));
-        panel.series.push(series("", BLUE, Mark::Line(2.0), path));
+        panel.series.push(series("", BLUE, Mark::Line(2.4), path));
     }
-    panel.series.push(series("person (truth)", GREY, Mark::Discs(5.5), people));
+    // For the legend alone: each link and each forecast is a series of its own.
+    for (name, color, mark) in kinds.into_iter().chain([("forecast of 0.9 s", BLUE, Mark::Line(2.4))]) {
+        panel.series.push(series(name, color, mark, Vec::new()));
+    }
     let seen = tracks.iter().map(|t| (t.x_m, t.y_m)).collect();
-    panel.series.push(series("track, line: the next 0.9 s", BLUE, Mark::Discs(2.8), seen));
-    panel.series.push(series(
-        format!("access point {}", access_point.name),
-        RED,
-        Mark::Diamonds(6.0),
-        vec![at],
-    ));
-    // For the legend alone: each ray is a series of its own.
-    for (name, color) in [("blocked now", RED), ("blocked within 0.9 s", GOLD), ("in sight", LIGHT)] {
-        panel.series.push(series(name, color, Mark::Line(1.4), vec![at, at]));
+    panel.series.push(series("person (truth)", LIGHT, Mark::Discs(5.5), people));
+    panel.series.push(series("track", BLUE, Mark::Discs(2.6), seen));
+    panel.series.push(series("LiDAR", BLACK, Mark::Squares(5.0), floor::sensors(site)));
+    panel.series.push(series("access point", GREEN, Mark::Diamonds(7.0), hung.clone()));
+    let height_m = panel.y.1 - panel.y.0;
+    for (access_point, (x, y)) in site.access_points.iter().zip(hung) {
+        panel.notes.push((x, y - 0.05 * height_m, access_point.name.clone()));
     }
-    let (width_m, height_m) = (panel.x.1 - panel.x.0, panel.y.1 - panel.y.0);
-    let height = (WIDTH * height_m / width_m).clamp(260.0, 860.0) + LEGEND;
+    let shape = height_m / (panel.x.1 - panel.x.0);
+    let size = |width: f64, below: f64| (width, (width * shape).clamp(0.4 * width, 1.2 * width) + below);
     let time_s = kept.truth.people.iter().find(|p| p.frame == frame).map_or(0.0, |p| p.time_ns as f64 / 1e9);
-    Ok(Some(Figure {
-        name: "plan",
-        title: format!("One instant from above: {}, {time_s:.1} s", kept.label),
-        caption: format!(
-            "Mode {}. Rays run from the access point to every person who is followed and are coloured by what is \
-             said of the link.",
-            kept.mode.name()
-        ),
-        drawing: draw("plan", &panel, (WIDTH, height))?,
-    }))
+    let title = format!("From above at {time_s:.1} s: {}", kept.label);
+    let caption = format!(
+        "Every link of every person who is followed, coloured by what mode {} says of it at this instant.",
+        kept.mode.name()
+    );
+    let sizes =
+        Sizes { alone: size(WIDTH, LEGEND), page: size(560.0, 60.0), narrow: Some(size(400.0, 60.0)) };
+    Figure::of("plan", (title, caption), &[panel], sizes).map(Some)
 }
 
-/// From, to, along x and along y.
-type Window = ((f64, f64), (f64, f64));
-
-/// A window that holds everybody and the access point, in whole metres with some room.
-fn around(people: &[(f64, f64)], at: (f64, f64)) -> Window {
-    let all = || people.iter().copied().chain([at]);
-    let range = |values: &mut dyn Iterator<Item = f64>| {
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-        ((low - 1.0).floor(), (high + 1.0).ceil())
-    };
-    (range(&mut all().map(|p| p.0)), range(&mut all().map(|p| p.1)))
+/// Which of the plan's three kinds a link is.
+fn kind_of(link: &LinkRow) -> usize {
+    if link.blocked_now { 2 } else { usize::from(link.blocked[STEPS - 1]) }
 }
 
-/// Walls, pillars, furniture and sensors from above, those that lie in the window.
+/// Walls, pillars, furniture and a bar for the scale.
 fn hall(site: &Site, (x, y): Window) -> Panel {
     let mut panel = axes("y, m", "x, m", y);
     (panel.x, panel.equal_axes, panel.y_digits) = (x, true, 0);
-    (panel.x_step, panel.y_step) = (Some(2.0), Some(2.0));
-    let sides = |corners: [(f64, f64); 4]| vec![corners[0], corners[1], corners[2], corners[3], corners[0]];
-    let (wall_x, wall_y) = (site.hall.length_m / 2.0, site.hall.width_m / 2.0);
-    let walls = sides([(-wall_x, -wall_y), (wall_x, -wall_y), (wall_x, wall_y), (-wall_x, wall_y)]);
-    panel.series.push(series("", GREY, Mark::Line(1.5), walls));
-    for pillar in &site.pillars {
-        let round = (0..=24).map(|i| {
-            let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
-            (pillar.position_m[0] + pillar.radius_m * cos, pillar.position_m[1] + pillar.radius_m * sin)
-        });
-        panel.series.push(series("", GREY, Mark::Line(1.2), round.collect()));
-    }
-    for piece in &site.furniture {
-        let (sin, cos) = piece.yaw_deg.to_radians().sin_cos();
-        let corner = |along: f64, across: f64| {
-            let (u, v) = (along * piece.size_m[0] / 2.0, across * piece.size_m[1] / 2.0);
-            (piece.position_m[0] + u * cos - v * sin, piece.position_m[1] + u * sin + v * cos)
-        };
-        let outline = sides([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
-        panel.series.push(series("", GREY, Mark::Line(1.2), outline));
-    }
-    for sensor in &site.sensors {
-        let place = vec![(sensor.position_m[0], sensor.position_m[1])];
-        panel.series.push(series("LiDAR", BLACK, Mark::Squares(5.0), place));
-    }
-    let inside = |p: &(f64, f64)| (x.0..=x.1).contains(&p.0) && (y.0..=y.1).contains(&p.1);
-    panel.series.retain(|shape| shape.points.iter().all(inside));
+    let step_m = floor::scale_bar_m((x, y));
+    (panel.x_step, panel.y_step) = (Some(step_m), Some(step_m));
+    panel.series.push(series("", BLACK, Mark::Line(1.8), floor::walls(site)));
+    panel.series.extend(floor::standing(site).into_iter().map(|o| series("", GREY, Mark::Line(1.4), o)));
+    let (left, bottom) = (x.0 + 0.05 * (x.1 - x.0), y.0 + 0.05 * (y.1 - y.0));
+    let bar = vec![(left, bottom), (left + step_m, bottom)];
+    panel.series.push(series("", BLACK, Mark::Line(4.0), bar));
+    panel.notes.push((left + 0.5 * step_m, bottom + 0.02 * (y.1 - y.0), format!("{step_m} m")));
     panel
 }
 
@@ -152,7 +126,8 @@ pub fn link(kept: &Kept) -> Result<Option<Figure>, Error> {
         .filter_map(|&frame| Some((frame, index.person(frame, person)?.time_ns as f64 / 1e9)))
         .collect();
     let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(None) };
-    (panel.x, panel.x_step, panel.y) = ((first.1.floor(), last.1.ceil()), Some(2.0), (0.0, 1.1));
+    let step_s = if last.1 - first.1 > 16.0 { 5.0 } else { 2.0 };
+    (panel.x, panel.x_step, panel.y) = ((first.1.floor(), last.1.ceil()), Some(step_s), (0.0, 1.1));
     panel.y_step = Some(0.25);
     panel.y_digits = 2;
     for &(frame, time_s) in &times {
@@ -161,29 +136,30 @@ pub fn link(kept: &Kept) -> Result<Option<Figure>, Error> {
         }
     }
     panel.shaded = joined(&panel.shaded);
-    // For the legend alone: the stretches stand behind the axes.
-    panel.series.push(series("truly blocked", RED, Mark::Line(6.0), vec![(first.1, -1.0); 2]));
-    for (w, color) in [(3, BLUE), (9, PURPLE)] {
+    panel.series.push(series("blocked (truth)", RED, Mark::Patch, Vec::new()));
+    for (w, color, width) in [(3, BLUE, 2.2), (9, PURPLE, 1.4)] {
         let points: Vec<(f64, f64)> =
             times.iter().filter_map(|&(frame, time_s)| Some((time_s, said(frame)?.p[w - 1]))).collect();
-        panel.series.push(series(format!("blocked within {} ms", w * 100), color, Mark::Line(1.8), points));
+        let name = format!("probability: blocked within {} ms", w * 100);
+        panel.series.push(series(name, color, Mark::Line(width), points));
     }
     let warned = times
         .iter()
         .filter(|&&(frame, _)| said(frame).is_some_and(|link| link.blocked[2]))
         .map(|&(_, time_s)| (time_s, 1.06))
         .collect();
-    panel.series.push(series("warning (300 ms)", BLUE, Mark::Squares(1.8), warned));
+    panel.series.push(series("predicted: blocked within 300 ms", BLACK, Mark::Squares(2.6), warned));
     let access_point = kept.site.access_points.first().map_or("", |ap| &ap.name);
-    Ok(Some(Figure {
-        name: "link",
-        title: format!("One link over time: {access_point} to person {person}, {}", kept.label),
-        caption: format!(
-            "Mode {}. Red: the link is truly blocked. A warning is right when red follows within its window.",
-            kept.mode.name()
-        ),
-        drawing: draw("link", &panel, (WIDTH, 360.0))?,
-    }))
+    let title = format!("One link over time: {access_point} to person {person}, {}", kept.label);
+    let caption = format!(
+        "Mode {}. Shaded: another body truly blocks the link. A prediction (marks on top) is right when that follows \
+         within its window.",
+        kept.mode.name()
+    );
+    let sizes = Sizes { alone: (WIDTH, 360.0), page: (1100.0, 300.0), narrow: Some((400.0, 260.0)) };
+    let mut figure = Figure::of("link", (title, caption), &[panel], sizes)?;
+    figure.whole_width = true;
+    Ok(Some(figure))
 }
 
 /// Neighbouring stretches as one.

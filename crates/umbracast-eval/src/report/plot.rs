@@ -28,6 +28,8 @@ pub enum Mark {
     Diamonds(f64),
     /// Squares of this radius.
     Squares(f64),
+    /// For the legend alone: what a shaded stretch means.
+    Patch,
 }
 
 /// Points of one kind.
@@ -64,6 +66,8 @@ pub struct Panel {
     pub y_digits: usize,
     /// Names along the y axis instead of figures: the first at 1.
     pub y_names: Vec<String>,
+    /// The y axis counts in powers of ten.
+    pub y_log: bool,
     /// One metre is as long on both axes.
     pub equal_axes: bool,
     /// Drawn in this order.
@@ -90,6 +94,13 @@ pub struct Drawing {
 pub fn draw(name: &str, panel: &Panel, size: (f64, f64)) -> Result<Drawing, Error> {
     let (plots, layout) = parts(panel, true);
     finished(name, &render_multiple(plots, layout.with_width(size.0).with_height(size.1)))
+}
+
+/// Draws one panel of this size for a page that has a legend of its own.
+pub fn svg(name: &str, panel: &Panel, size: (f64, f64)) -> String {
+    let (plots, layout) = parts(panel, false);
+    let scene = render_multiple(plots, layout.with_width(size.0).with_height(size.1));
+    page_svg(name, &scene)
 }
 
 /// Draws panels in rows of `columns`, each of this size in pixels, with one legend below: the first panel's.
@@ -128,6 +139,9 @@ fn parts(panel: &Panel, legend: bool) -> (Vec<Plot>, Layout) {
     }
     if !panel.y_names.is_empty() {
         layout = layout.with_y_categories(panel.y_names.clone());
+    }
+    if panel.y_log {
+        layout = layout.with_log_y().with_y_tick_format(TickFormat::Auto);
     }
     if panel.equal_axes {
         layout = layout.with_equal_aspect();
@@ -177,6 +191,7 @@ fn plot(series: &Series) -> Plot {
         Mark::Discs(radius) => marks(MarkerShape::Circle, radius),
         Mark::Diamonds(radius) => marks(MarkerShape::Diamond, radius),
         Mark::Squares(radius) => marks(MarkerShape::Square, radius),
+        Mark::Patch => Plot::Line(line(0.0)),
     }
 }
 
@@ -187,6 +202,7 @@ fn entry(series: &Series) -> LegendEntry {
         Mark::Discs(_) => (LegendShape::Circle, None),
         Mark::Diamonds(_) => (LegendShape::Marker(MarkerShape::Diamond), None),
         Mark::Squares(_) => (LegendShape::Marker(MarkerShape::Square), None),
+        Mark::Patch => (LegendShape::Rect, None),
     };
     LegendEntry { label: series.name.clone(), color: series.color.into(), shape, dasharray }
 }
@@ -208,12 +224,16 @@ fn fixed(digits: usize) -> TickFormat {
 }
 
 fn finished(name: &str, scene: &Scene) -> Result<Drawing, Error> {
-    let svg = SvgBackend::new().render_scene(scene);
     let png = PngBackend::new()
         .with_scale(2.0)
         .render_scene(scene)
         .map_err(|e| Error::new(format!("figure: cannot be drawn as PNG: {e}")))?;
-    Ok(Drawing { svg: renamed(&scalable(&svg, scene.width, scene.height), name), png })
+    Ok(Drawing { svg: page_svg(name, scene), png })
+}
+
+fn page_svg(name: &str, scene: &Scene) -> String {
+    let svg = SvgBackend::new().render_scene(scene);
+    renamed(&scalable(&svg, scene.width, scene.height), name)
 }
 
 /// The crate writes a fixed size; a page needs one that shrinks with it.

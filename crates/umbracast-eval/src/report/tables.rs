@@ -67,9 +67,10 @@ impl Table {
     }
 }
 
-/// The short table of stage 3: every mode and access point at four windows, with what the paper prints. Persistence
-/// stands beside them: of two kinds the one that knows the true present, which is harder to beat.
-pub fn headline(group: &Group) -> Table {
+/// The short table of stage 3: every mode and access point at four windows, with what the paper prints where that is
+/// `published` beside. Persistence stands beside every mode: of two kinds the one that knows the true present, which is
+/// harder to beat.
+pub fn headline(group: &Group, published: bool) -> Table {
     let header =
         ["access point", "window", "mode", "base rate", "accuracy", "precision", "recall", "F1", "onset F1"];
     let mut table = Table::new(format!("Blockage: {}", scenes(group)), 3, &header);
@@ -90,13 +91,24 @@ pub fn headline(group: &Group) -> Table {
             table.rows.extend(persistence(group, access_point, w, &start));
         }
     }
-    table.rows.extend(published_rows());
-    table.noted(
-        "Bound once: what a device hears that is bound to its person's track at the first match and keeps it \
-         through identity swaps, until the track dies; the other rows match anew in every frame. Persistence of \
-         truth: as now, the true present. In brackets: 95 % interval by bootstrap over recordings. The published \
-         F1 follows from the other two.",
-    )
+    let mut note = "Bound once: what a device hears that is bound to its person's track at the first match and keeps it \
+                    through identity swaps, until the track dies; the other rows match anew in every frame. \
+                    Persistence of truth: as now, the true present. "
+        .to_owned();
+    note += brackets(&table);
+    if published {
+        table.rows.extend(published_rows());
+        note += " The published F1 follows from its precision and recall.";
+    }
+    table.noted(note.trim_start())
+}
+
+/// What a reader is told of brackets, where there are any.
+fn brackets(table: &Table) -> &'static str {
+    match table.rows.iter().flatten().any(|cell| cell.contains('[')) {
+        true => "In brackets: 95 % interval by bootstrap over recordings.",
+        false => "",
+    }
 }
 
 /// A row a preset, mode and access point, at 300 ms.
@@ -128,7 +140,7 @@ fn persistence(group: &Group, access_point: &str, w: usize, start: &[String; 2])
 
 /// Algorithm 1 with AABB and with OBB on every mode's tracks and forecasts, and the modes' own stage 3 where it is
 /// neither, at one access point and these windows.
-pub fn boxes(group: &Group, access_point: &str, windows: &[usize]) -> Table {
+pub fn boxes(group: &Group, access_point: &str, windows: &[usize], published: bool) -> Table {
     let header =
         ["window", "mode", "stage 3", "base rate", "accuracy", "precision", "recall", "F1", "onset F1"];
     let title = format!("Boxes, access point {access_point}: {}", scenes(group));
@@ -147,16 +159,15 @@ pub fn boxes(group: &Group, access_point: &str, windows: &[usize]) -> Table {
             }
         }
         table.rows.extend(persistence(group, access_point, w, &[window(w), String::new()]));
-        let published = published_rows().into_iter().filter(|row| row[1] == window(w));
-        table.rows.extend(published.map(|mut row| {
+        let printed = published_rows().into_iter().filter(|row| published && row[1] == window(w));
+        table.rows.extend(printed.map(|mut row| {
             row[..3].clone_from_slice(&[window(w), "published".to_owned(), String::new()]);
             row
         }));
     }
-    table.noted(
-        "Everything before stage 3 is the mode's own and the same in all its rows. In brackets: 95 % interval by \
-         bootstrap over recordings.",
-    )
+    let same = "Everything before stage 3 is the mode's own and the same in all its rows.";
+    let note = format!("{same} {}", brackets(&table));
+    table.noted(note.trim_end())
 }
 
 fn published_rows() -> [Vec<String>; 2] {
@@ -220,8 +231,8 @@ pub fn tracking(group: &Group) -> Table {
     )
 }
 
-/// Stage 2 of every mode beside Table I.
-pub fn displacement(group: &Group) -> Table {
+/// Stage 2 of every mode, beside Table I where that is `published` beside.
+pub fn displacement(group: &Group, published: bool) -> Table {
     let mut header = vec!["mode".to_owned()];
     header.extend((1..=STEPS).map(|h| format!("{} ms", h * 100)));
     header.extend(["scored", "NLL", "in 50 %", "in 90 %"].map(str::to_owned));
@@ -240,8 +251,10 @@ pub fn displacement(group: &Group) -> Table {
     let reference = |name: &str, values: Vec<String>| [vec![name.to_owned()], values, four()].concat();
     let carried_on = group.constant_velocity_m.iter().map(|&m| number(m, 3)).collect();
     table.rows.push(reference("true state carried on", carried_on));
-    let published = published::DISPLACEMENT_M.iter().map(|m| format!("{m:.2}")).collect();
-    table.rows.push(reference("published", published));
+    if published {
+        let printed = published::DISPLACEMENT_M.iter().map(|m| format!("{m:.2}")).collect();
+        table.rows.push(reference("published", printed));
+    }
     table.noted(
         "Scored: share of people at instants that count who are tracked and stay unarrived. NLL in nats and \
          shares within the 50 and 90 % regions are means over the steps.",
@@ -343,8 +356,9 @@ fn compared(group: &Group, access_point: &str, shown: &[Predictor], title: Strin
     table
 }
 
-/// Stages 1 and 2 and the calibration of every preset, with intervals: a row a figure, a column a mode.
-pub fn figures_by_preset(scores: &Scores) -> Table {
+/// Stages 1 and 2 and the calibration of every preset, with intervals: a row a figure, a column a mode, and one for
+/// what is `published`.
+pub fn figures_by_preset(scores: &Scores, published: bool) -> Table {
     type Figure = (String, usize, fn(&ModeScores, usize) -> Estimate, usize, &'static str);
     let figure = |name: &str, digits, of| -> Figure { (name.to_owned(), digits, of, 0, "") };
     let mut figures = vec![
@@ -356,19 +370,19 @@ pub fn figures_by_preset(scores: &Scores) -> Table {
         figure("NEES of positions (honest: 2)", 2, |m, _| m.position_nees),
         figure("NEES of velocities (honest: 2)", 2, |m, _| m.velocity_nees),
     ];
-    for (h, published) in [(1, "0.22"), (3, "0.34"), (9, "0.96")] {
+    for (h, printed) in [(1, "0.22"), (3, "0.34"), (9, "0.96")] {
         let name = format!("displacement at {}, m", window(h));
-        figures.push((name, 3, |m, h| m.displacement_m[h - 1], h, published));
+        figures.push((name, 3, |m, h| m.displacement_m[h - 1], h, printed));
     }
     let mut table = Table::new("Tracking, forecast and calibration, by preset", 2, &["preset", "figure"]);
     let modes: Vec<Mode> = scores.headline().iter().flat_map(|g| &g.modes).map(|m| m.mode).collect();
     table.header.extend(modes.iter().map(|mode| mode.name().to_owned()));
-    table.header.push("published".to_owned());
+    table.header.extend(published.then(|| "published".to_owned()));
     for group in &scores.groups {
-        for (name, digits, of, step, published) in &figures {
+        for (name, digits, of, step, printed) in &figures {
             let mut row = vec![group.name.clone(), name.clone()];
             row.extend(group.modes.iter().map(|mode| with_interval(&of(mode, *step), *digits)));
-            row.push((*published).to_owned());
+            row.extend(published.then(|| (*printed).to_owned()));
             table.rows.push(row);
         }
         for access_point in group.access_points() {
@@ -378,11 +392,12 @@ pub fn figures_by_preset(scores: &Scores) -> Table {
                 let ece = links.map(|l| l.windows.iter().map(|w| w.ece).collect::<Vec<_>>());
                 number(ece.and_then(|ece| mean(&ece)), 4)
             }));
-            row.push(String::new());
+            row.extend(published.then(String::new));
             table.rows.push(row);
         }
     }
-    table.noted("In brackets: 95 % interval by bootstrap over recordings.")
+    let note = brackets(&table);
+    table.noted(note)
 }
 
 /// What was counted and skipped, by mode.
