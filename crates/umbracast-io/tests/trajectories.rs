@@ -152,7 +152,7 @@ fn what_is_wrong_is_told_with_file_line_expected_and_found() {
 
 #[test]
 fn real_files_hold_the_people_their_readmes_count() {
-    let Some(root) = real_data("") else { return };
+    let Some(root) = real_data("trajnetpp").map(|folder| folder.join("..")) else { return };
     let fps = |fps| Options { fps: Some(fps), unit: None };
     let without = Options::default();
     let centimetres = Options { fps: Some(25.0), unit: Some(Unit::Centimetre) };
