@@ -2,13 +2,18 @@
 //!
 //! The data is not part of the repository: `UMBRACAST_DATA` says where it lies.
 
-use std::path::{Path, PathBuf};
+#[path = "real_data/mod.rs"]
+mod real_data;
+
+use std::path::Path;
 
 use umbracast::config::{Config, Mode};
 use umbracast::detect::{Background, Clusterer, Detection, Measurer};
 use umbracast::geometry::{DVec2, Pose};
 use umbracast::lidar::{Cloud, Scan, SensorPoint};
 use umbracast::{Frame, Health};
+
+use real_data::real_data;
 
 /// The sensor stands this high above the ground.
 const SITE: &str = r#"
@@ -32,11 +37,6 @@ range_max_m = 100.0
 range_noise_m = 0.02
 dropout = 0.0
 "#;
-
-fn folder() -> Option<PathBuf> {
-    let data = std::env::var_os("UMBRACAST_DATA")?;
-    Some(Path::new(&data).join("logictronix_vlp16")).filter(|folder| folder.is_dir())
-}
 
 fn cloud(file: &Path, time_ns: i64) -> Vec<SensorPoint> {
     let bytes = std::fs::read(file).unwrap();
@@ -66,10 +66,7 @@ fn labels(folder: &Path, frame: u64) -> Vec<DVec2> {
 
 #[test]
 fn people_are_found_without_an_empty_scan() {
-    let Some(folder) = folder() else {
-        eprintln!("skipped: UMBRACAST_DATA holds no logictronix_vlp16");
-        return;
-    };
+    let Some(folder) = real_data("logictronix_vlp16") else { return };
     let config = Config::with_overlay(Mode::Default, SITE, "site").unwrap();
     let (mut found, mut people, mut detected) = (0, 0, 0);
     for run in [70..=95_u64, 117..=140] {

@@ -1,7 +1,8 @@
 //! A rosbag2 recording of a VLP-16 against the points that another decoder (tier4/nebula) made of it: beam,
 //! azimuth and distance, point by point. The data lie where UMBRACAST_DATA points.
 
-use std::path::PathBuf;
+#[path = "../../../tests/real_data/mod.rs"]
+mod real_data;
 
 use umbracast::Health;
 use umbracast::lidar::packet::decode;
@@ -9,16 +10,14 @@ use umbracast::lidar::{Model, RangeImage};
 use umbracast_io::messages::read_scan;
 use umbracast_io::pcd::read_pcd;
 
+use real_data::real_data;
+
 /// Return types: both returns are one, the first is the strongest, the last is. The others are weaker returns.
 const STRONGEST: [f64; 3] = [6.0, 9.0, 10.0];
 
 #[test]
 fn vlp_16_point_by_point() {
-    let Some(root) = std::env::var_os("UMBRACAST_DATA") else {
-        eprintln!("skipped: UMBRACAST_DATA is not set");
-        return;
-    };
-    let folder = PathBuf::from(root).join("nebula/vlp16");
+    let Some(folder) = real_data("nebula/vlp16") else { return };
     let bag = std::fs::read(folder.join("1673400471837873222/1673400471837873222_0.db3")).unwrap();
     let model = Model::vlp_16();
     let mut image = RangeImage {

@@ -1,6 +1,9 @@
 //! Real captures through the codec and the assembler, against other decoders. The data lie outside the
 //! repository, where UMBRACAST_DATA points; without it these tests say that they were skipped.
 
+#[path = "../../../tests/real_data/mod.rs"]
+mod real_data;
+
 use std::path::PathBuf;
 
 use umbracast::geometry::DVec3;
@@ -10,13 +13,7 @@ use umbracast::{Config, Health};
 use umbracast_io::pcap::{DATA_PORT, Datagram, PcapReader};
 use umbracast_io::pcd::read_pcd;
 
-fn data(path: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("UMBRACAST_DATA");
-    if root.is_none() {
-        eprintln!("skipped: UMBRACAST_DATA is not set");
-    }
-    root.map(|root| PathBuf::from(root).join(path))
-}
+use real_data::real_data;
 
 fn datagrams(path: &PathBuf) -> Vec<Datagram> {
     let bytes = std::fs::read(path).unwrap();
@@ -69,7 +66,7 @@ fn revolutions(image: &RangeImage) -> f64 {
 
 #[test]
 fn hdl_32e_ring_by_ring_as_another_decoder() {
-    let Some(path) = data("hdl32e/hdl32_example.pcap") else { return };
+    let Some(path) = real_data("hdl32e/hdl32_example.pcap") else { return };
     let datagrams = datagrams(&path);
     let packets = packets(&datagrams);
     assert_eq!((packets.len(), datagrams.iter().filter(|d| d.port == 8308).count()), (876, 100));
@@ -104,7 +101,7 @@ fn hdl_32e_ring_by_ring_as_another_decoder() {
 
 #[test]
 fn hdl_32e_with_a_dead_beam() {
-    let Some(path) = data("hdl32e/sample_velodyne_hdl32.pcap") else { return };
+    let Some(path) = real_data("hdl32e/sample_velodyne_hdl32.pcap") else { return };
     let packets = packets(&datagrams(&path));
     let image = decoded(&Model::hdl_32e(), &packets);
     assert_eq!((packets.len(), returns(&image).count()), (500, 146_705));
@@ -115,7 +112,7 @@ fn hdl_32e_with_a_dead_beam() {
 
 #[test]
 fn vlp_16_captures() {
-    let Some(path) = data("vlp16/sample_velodyne_vlp16_gps.pcap") else { return };
+    let Some(path) = real_data("vlp16/sample_velodyne_vlp16_gps.pcap") else { return };
     let datagrams = datagrams(&path);
     let packets = packets(&datagrams);
     assert_eq!((packets.len(), datagrams.iter().filter(|d| d.port == 8308).count()), (293, 57));
@@ -123,7 +120,8 @@ fn vlp_16_captures() {
     assert!((revolutions(&image) - 3.88).abs() < 0.01, "{}", revolutions(&image));
     assert_eq!(returns(&image).count(), 73_486, "velodyne-decoder 3.1.0 gives as many");
 
-    let bytes = std::fs::read(data("vlp16/recording.bin").unwrap()).unwrap();
+    let Some(path) = real_data("vlp16/recording.bin") else { return };
+    let bytes = std::fs::read(path).unwrap();
     let payloads = bytes.chunks(1206).map(|payload| Packet { time_ns: 0, payload: payload.to_vec() });
     let packets: Vec<_> = payloads.collect();
     let image = decoded(&Model::vlp_16(), &packets);
@@ -142,7 +140,7 @@ fn captures_pass_the_assembler_without_loss() {
         ("hdl-32e", "hdl32e/sample_velodyne_hdl32.pcap", 500 * 12),
         ("vlp-16", "vlp16/sample_velodyne_vlp16_gps.pcap", 293 * 24),
     ] {
-        let Some(path) = data(path) else { return };
+        let Some(path) = real_data(path) else { return };
         let mut site = Config::default().site;
         site.sensors.truncate(1);
         site.sensors[0].model = model.to_owned();
@@ -174,7 +172,7 @@ fn beam_tables_are_the_calibration_files() {
         (Model::hdl_32e(), "hdl32e/velodyne_default_calib_HDL-32.xml", 1),
         (Model::vlp_16(), "vlp16/velodyne_default_calib_VLP-16.xml", 2),
     ] {
-        let Some(path) = data(path) else { return };
+        let Some(path) = real_data(path) else { return };
         let xml = std::fs::read_to_string(path).unwrap();
         let found = xml.split("<vertCorrection_>").skip(1).map(|rest| {
             let (degrees, _) = rest.split_once('<').unwrap();
@@ -190,7 +188,7 @@ fn beam_tables_are_the_calibration_files() {
 
 #[test]
 fn all_logictronix_clouds_are_read() {
-    let Some(folder) = data("logictronix_vlp16/pcd") else { return };
+    let Some(folder) = real_data("logictronix_vlp16/pcd") else { return };
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     assert_eq!(files.len(), 50);

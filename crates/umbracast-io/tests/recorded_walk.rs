@@ -1,6 +1,8 @@
 //! A real motion capture drives a simulated body, where `UMBRACAST_DATA` tells where it is.
 
-use std::path::PathBuf;
+#[path = "../../../tests/real_data/mod.rs"]
+mod real_data;
+
 use std::sync::Arc;
 
 use umbracast::geometry::DVec2;
@@ -8,13 +10,12 @@ use umbracast_io::bvh;
 use umbracast_sim::body::{Gait, Walker};
 use umbracast_sim::crowd::Trajectory;
 
+use real_data::real_data;
+
 #[test]
 fn a_captured_walk_carries_a_body_over_the_floor() {
-    let Some(root) = std::env::var_os("UMBRACAST_DATA") else {
-        println!("skipped: UMBRACAST_DATA is not set, cmu_walk not read");
-        return;
-    };
-    let motion = bvh::read(&PathBuf::from(root).join("cmu_walk/scaled_131_01.bvh")).unwrap();
+    let Some(file) = real_data("cmu_walk/scaled_131_01.bvh") else { return };
+    let motion = bvh::read(&file).unwrap();
     assert_eq!((motion.joints.len(), motion.positions.len()), (31, 995));
     let heights = || motion.positions.iter().map(|frame| frame[0][1]);
     assert!((heights().fold(f64::MAX, f64::min) - 0.50).abs() < 0.01, "the hips sink to half a metre");

@@ -1,21 +1,15 @@
 //! Files of recorded people: small samples of each format, and the real ones where `UMBRACAST_DATA` tells where
 //! they are.
 
-use std::path::PathBuf;
+#[path = "../../../tests/real_data/mod.rs"]
+mod real_data;
 
 use umbracast_io::trajectories::{
     Options, RecordedPerson, Unit, keep_middle, middle_m, parse, read, shift, without_effect,
 };
 use umbracast_sim::crowd::{Recorded, replay};
 
-/// A folder or file of the real data; prints that the test skips where there is none.
-fn data(path: &str) -> Option<PathBuf> {
-    let found = std::env::var_os("UMBRACAST_DATA").map(|root| PathBuf::from(root).join(path));
-    if found.is_none() {
-        println!("skipped: UMBRACAST_DATA is not set, {path} not read");
-    }
-    found
-}
+use real_data::real_data;
 
 fn parse_plain(text: &str) -> Result<Vec<RecordedPerson>, String> {
     parse(text, Options::default(), "file").map_err(|e| e.to_string())
@@ -193,7 +187,7 @@ fn what_is_wrong_is_told_with_file_line_expected_and_found() {
 
 #[test]
 fn real_files_hold_the_people_their_readmes_count() {
-    let Some(root) = data("") else { return };
+    let Some(root) = real_data("trajnetpp").map(|folder| folder.join("..")) else { return };
     let fps = |fps| Options { fps: Some(fps), unit: None };
     let without = Options::default();
     let centimetres = Options { fps: Some(25.0), unit: Some(Unit::Centimetre) };
@@ -220,7 +214,7 @@ fn real_files_hold_the_people_their_readmes_count() {
 
 #[test]
 fn real_people_walk_again() {
-    let Some(file) = data("circle_antipode/circle-10m-16-1.txt") else { return };
+    let Some(file) = real_data("circle_antipode/circle-10m-16-1.txt") else { return };
     let people = read(&file, Options::default()).unwrap();
     let recorded: Vec<Recorded> =
         people.iter().map(|p| Recorded { samples: &p.samples, height_m: p.height_m }).collect();

@@ -1,0 +1,166 @@
+//! What the benchmarks work on: frames of a simulated hall, and the stages in the middle of following people.
+
+use umbracast::blockage::{Blockage, Caster};
+use umbracast::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point, Prior};
+use umbracast::forecast::{Forecast, Forecaster};
+use umbracast::lidar::{Assembler, Packet};
+use umbracast::track::{Track, Tracker};
+use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
+use umbracast_sim::crowd::{Preset, circle_crossing};
+use umbracast_sim::scene::Scene;
+
+const SEED: u64 = 100_000;
+const EMPTY_FRAMES: u64 = 20;
+
+/// The hall without people, and with people who cross a circle.
+pub struct Recording {
+    /// Without.
+    pub empty: Vec<Frame>,
+    /// With.
+    pub frames: Vec<Frame>,
+}
+
+impl Recording {
+    /// So many people and frames.
+    ///
+    /// # Errors
+    /// A sensor that cannot be simulated.
+    pub fn new(site: &Site, people: usize, frames: usize) -> Result<Self, Error> {
+        let mut scene = Scene::new(circle_crossing(Preset::Orca03, people, 12.5, SEED), site, SEED)?;
+        let packets = std::iter::from_fn(|| scene.next_frame()).take(frames).map(|frame| frame.packets);
+        let frames = assembled(site, packets)?;
+        Ok(Self { empty: assembled(site, Scene::empty(site, SEED, EMPTY_FRAMES)?)?, frames })
+    }
+}
+
+fn assembled(site: &Site, frames: impl IntoIterator<Item = Vec<Vec<Packet>>>) -> Result<Vec<Frame>, Error> {
+    let (mut assembler, mut health) = (Assembler::new(site)?, Health::default());
+    for of_sensors in frames {
+        let sensors = of_sensors.into_iter().enumerate();
+        let mut arriving: Vec<(usize, Packet)> =
+            sensors.flat_map(|(sensor, packets)| packets.into_iter().map(move |p| (sensor, p))).collect();
+        arriving.sort_by_key(|(_, packet)| packet.time_ns);
+        arriving.iter().for_each(|(sensor, packet)| assembler.push(*sensor, packet, &mut health));
+    }
+    assembler.finish();
+    Ok(std::iter::from_fn(|| assembler.pop()).collect())
+}
+
+/// The stages of a pipeline one by one, with what each was given and gave: `Pipeline::step` laid open.
+#[derive(Clone)]
+pub struct Stages {
+    /// Foreground.
+    pub background: Background,
+    /// Clusters.
+    pub clusterer: Clusterer,
+    /// Detections.
+    pub measurer: Measurer,
+    /// Tracks.
+    pub tracker: Tracker,
+    /// Forecasts.
+    pub forecaster: Forecaster,
+    /// Blockages.
+    pub caster: Caster,
+    /// Where people are expected in the frame.
+    pub priors: Vec<Prior>,
+    /// What was skipped.
+    pub health: Health,
+    /// Of the background.
+    pub foreground: Vec<Point>,
+    /// Of the clusterer.
+    pub clusters: Vec<Cluster>,
+    /// Of the measurer.
+    pub detections: Vec<Detection>,
+    /// Of the tracker.
+    pub tracks: Vec<Track>,
+    /// Of the forecaster.
+    pub forecasts: Vec<Forecast>,
+    /// Of the caster.
+    pub blockages: Vec<Blockage>,
+}
+
+impl Stages {
+    /// Before the first frame, with the empty hall learned.
+    ///
+    /// # Errors
+    /// A setting that cannot work.
+    pub fn new(config: &Config, empty: &[Frame]) -> Result<Self, Error> {
+        let mut background = Background::new(&config.detect, &config.site)?;
+        empty.iter().for_each(|frame| background.learn_empty(frame));
+        Ok(Self {
+            background,
+            clusterer: Clusterer::new(&config.detect, &config.site),
+            measurer: Measurer::new(&config.detect, &config.site),
+            tracker: Tracker::new(&config.track, &config.site),
+            forecaster: Forecaster::new(&config.forecast, None)?,
+            caster: Caster::new(&config.blockage, &config.site),
+            priors: Vec::new(),
+            health: Health::default(),
+            foreground: Vec::new(),
+            clusters: Vec::new(),
+            detections: Vec::new(),
+            tracks: Vec::new(),
+            forecasts: Vec::new(),
+            blockages: Vec::new(),
+        })
+    }
+
+    /// Where people are expected.
+    pub fn expect(&mut self, frame: &Frame) {
+        self.priors = self.tracker.priors(frame.time_ns);
+    }
+
+    /// The first stage.
+    pub fn foreground(&mut self, frame: &Frame) {
+        self.background.foreground(frame, &self.priors, &mut self.health, &mut self.foreground);
+    }
+
+    /// The second.
+    pub fn clusters(&mut self) {
+        self.clusterer.clusters(&self.foreground, &self.priors, &mut self.clusters);
+    }
+
+    /// The third.
+    pub fn detections(&mut self) {
+        self.measurer.detections(&self.foreground, &self.clusters, &self.priors, &mut self.detections);
+    }
+
+    /// The fourth.
+    pub fn update(&mut self, frame: &Frame) {
+        self.tracker.update(frame, &self.detections, &mut self.tracks);
+    }
+
+    /// The fifth.
+    pub fn forecast(&mut self) {
+        self.forecaster.forecast(&self.tracks, &mut self.forecasts);
+    }
+
+    /// The last.
+    pub fn cast(&mut self) {
+        self.caster.cast(&self.tracks, &self.forecasts, &mut self.blockages);
+    }
+
+    /// All of them.
+    pub fn step(&mut self, frame: &Frame) {
+        self.expect(frame);
+        self.foreground(frame);
+        self.clusters();
+        self.detections();
+        self.update(frame);
+        self.forecast();
+        self.cast();
+    }
+}
+
+/// The whole pipeline at the same point: the empty hall learned, `before` seen.
+///
+/// # Errors
+/// A setting that cannot work.
+pub fn pipeline(config: &Config, empty: &[Frame], before: &[Frame]) -> Result<Pipeline, Error> {
+    let mut pipeline = Pipeline::new(config, None)?;
+    empty.iter().for_each(|frame| pipeline.learn_empty(frame));
+    for frame in before {
+        pipeline.step(frame);
+    }
+    Ok(pipeline)
+}

@@ -1,0 +1,83 @@
+//! Lower bounds on what the default mode scores in a few short scenes, so that quality cannot fall unnoticed. The
+//! bounds lie a little below what was measured when they were set; raise them when the scores rise. Tuning seeds.
+
+use umbracast::{Config, Mode};
+use umbracast_eval::chain::{People, SceneSpec, Spec, run};
+use umbracast_eval::pooled::{Group, score};
+use umbracast_eval::score::Predictor;
+use umbracast_sim::body::kind::Bodies;
+use umbracast_sim::crowd::{Preset, circle_crossing};
+
+/// Within 300 ms, from the access point at the side.
+const WINDOW: usize = 3;
+const ACCESS_POINT: &str = "side";
+
+/// What a crowd must reach.
+struct Bounds {
+    preset: Preset,
+    site: &'static str,
+    f1: f64,
+    onset_f1: f64,
+    mota: f64,
+    /// Expected calibration error, mean of the windows: at most.
+    ece: f64,
+}
+
+// Measured: F1 0.950, 0.951 and 0.720, onset F1 0.900, 0.895 and 0.605, MOTA 0.993, 0.993 and 0.903, ECE 0.015, 0.035 and
+// 0.123. Pairs 0.5 m apart below sensors at 6 m are hard, and their scores move more.
+const BOUNDS: [Bounds; 3] = [
+    Bounds { preset: Preset::Orca03, site: "", f1: 0.93, onset_f1: 0.87, mota: 0.985, ece: 0.025 },
+    Bounds { preset: Preset::Mixed, site: "", f1: 0.93, onset_f1: 0.86, mota: 0.985, ece: 0.045 },
+    Bounds {
+        preset: Preset::Pairs,
+        site: include_str!("../../../config/sites/height-6.toml"),
+        f1: 0.68,
+        onset_f1: 0.55,
+        mota: 0.87,
+        ece: 0.145,
+    },
+];
+
+#[test]
+fn no_crowd_scores_below_its_bounds() {
+    let mut fallen = Vec::new();
+    for (seed, bounds) in (100_000..).zip(&BOUNDS) {
+        let group = scores(bounds, seed);
+        let links = group.link(Some(Mode::Default), Predictor::Run, ACCESS_POINT).unwrap();
+        let window = &links.windows[WINDOW - 1];
+        let ece = links.windows.iter().filter_map(|w| w.ece).sum::<f64>() / links.windows.len() as f64;
+        let name = bounds.preset.name();
+        for (figure, found, at_least) in [
+            ("F1", window.f1.value.unwrap(), bounds.f1),
+            ("onset F1", window.onset_f1.value.unwrap(), bounds.onset_f1),
+            ("MOTA", group.modes[0].mota.value.unwrap(), bounds.mota),
+            ("calibration, 1 - ECE", 1.0 - ece, 1.0 - bounds.ece),
+        ] {
+            println!("{name}: {figure} {found:.4}, at least {at_least:.4}");
+            if found < at_least {
+                fallen.push(format!("{name}: {figure}: expected {at_least:.4} at least, found {found:.4}"));
+            }
+        }
+    }
+    assert!(fallen.is_empty(), "{fallen:#?}");
+}
+
+/// Ten people cross a small circle, so that they meet after a few seconds; the scene ends when most have crossed.
+fn scores(bounds: &Bounds, seed: u64) -> Group {
+    let mut crowd = circle_crossing(bounds.preset, 10, 7.0, seed);
+    crowd.duration_ns = crowd.duration_ns.min(14_000_000_000);
+    let spec = Spec {
+        configs: vec![Config::with_overlay(Mode::Default, bounds.site, "site").unwrap()],
+        weights: None,
+        scenes: vec![SceneSpec {
+            group: bounds.preset.name().to_owned(),
+            seed,
+            people: People::Replayed(crowd),
+            bodies: Bodies::default(),
+        }],
+        keep: None,
+        ladder: false,
+    };
+    let results = run(&spec, |_| {}).unwrap();
+    score(&results, &spec.configs[0].site).groups.remove(0)
+}

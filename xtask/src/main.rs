@@ -1,0 +1,39 @@
+//! `cargo xtask NAME`: what is done to the house rather than by it. Nothing here is part of the program.
+
+mod tools;
+mod record;
+mod same_tables;
+mod structure;
+
+use std::process::ExitCode;
+
+const USAGE: &str = "\
+cargo xtask record NAME...    make these files of record/ anew; `all` makes all but `locked`
+    --dirty                       from a tree with changes; the record says so
+cargo xtask record            list the names
+cargo xtask same-tables REV   whether a git revision and the working tree write the same tables, byte for byte
+cargo xtask structure         files and imports as a picture, docs/structure.svg, and in words
+    --check                       write nothing; fail where the picture is stale or files of src/ use one another in a circle";
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let result = match words.as_slice() {
+        ["record", names @ ..] => record::run(names),
+        ["same-tables", revision] => same_tables::run(revision),
+        ["structure"] => structure::run(false),
+        ["structure", "--check"] => structure::run(true),
+        [] | ["--help" | "-h" | "help"] => {
+            println!("{USAGE}");
+            Ok(())
+        }
+        other => Err(format!("expected one of these, found {:?}\n{USAGE}", other.join(" "))),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("xtask: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! One table over several halls, crowds and bodies, and recorded people.
+
+use std::ffi::OsString;
+use std::fs;
+
+use super::book::Book;
+use crate::tools::{Result, argument};
+
+/// How recorded walkers of the circle antipode experiment are read.
+const ANTIPODE: [&str; 5] = ["--unit", "cm", "--fps", "25", "--trajectories"];
+
+/// Where sensors hang, how many sensors there are, how many people walk and how.
+pub fn sites(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record sites");
+    let crowd = ["--scenes", "20", "--preset", "orca-03"];
+    book.score("default", crowd)?;
+    for site in ["height-3", "height-5", "height-6", "height-8", "lost-sensor", "out-of-step"] {
+        let file = format!("config/sites/{site}.toml");
+        book.score(site, crowd.into_iter().chain(["--site", &file]))?;
+    }
+    for people in ["20", "40"] {
+        book.score(&format!("people-{people}"), crowd.into_iter().chain(["--people", people]))?;
+    }
+    book.score("pairs", ["--scenes", "20", "--preset", "pairs"])?;
+    book.compare()
+}
+
+/// Other bodies and real people beside the ORCA row.
+pub fn people(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record people");
+    book.score("plain", ["--scenes", "6", "--preset", "orca-03"])?;
+    bodies(book, &["--scenes", "6", "--preset", "orca-03"])?;
+    let walkers =
+        ["08-2", "16-2", "32-2x", "64-2x"].map(|name| format!("circle_antipode/circle-10m-{name}.txt"));
+    recorded(book, "antipode", &ANTIPODE, &walkers)?;
+    // Of the bottlenecks the part in which people wait and push through; the corridor's people trained the residual,
+    // as did other clips of the crowd in the street.
+    let middle = ["--seconds", "20", "--trajectories"];
+    recorded(book, "bottleneck", &middle, &["pedpy/030_c_56_h0.txt", "pedpy/040_c_56_h-.txt"])?;
+    recorded(book, "trained-on", &middle, &["pedpy/traj_UNI_CORR_500_01.txt"])?;
+    let street = ["1A", "1C", "2F"].map(|name| format!("madras/Topview_{name}.csv"));
+    recorded(book, "madras", &["--trajectories"], &street)?;
+    book.compare()
+}
+
+/// Every kind of body but the plain one, each walked by everybody of a crowd.
+pub fn bodies(book: &mut Book, crowd: &[&str]) -> Result<()> {
+    for kind in ["bag", "phone", "pockets", "child", "wheelchair"] {
+        book.score(kind, crowd.iter().copied().chain(["--bodies", kind]))?;
+    }
+    let gait = book.data("cmu_walk/scaled_131_01.bvh")?;
+    let words = crowd.iter().copied().chain(["--bodies", "cmu-walk", "--gait"]).map(OsString::from);
+    book.score("cmu-walk", words.chain([gait]))
+}
+
+/// Recorded people under a name.
+pub fn recorded<S: AsRef<str>>(book: &mut Book, name: &str, how: &[&str], files: &[S]) -> Result<()> {
+    let files: Vec<OsString> = files.iter().map(|file| book.data(file.as_ref())).collect::<Result<_>>()?;
+    book.score(name, how.iter().map(OsString::from).chain(files))
+}
+
+/// What the residual network adds to the filtered state carried on.
+pub fn forecasts(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record forecasts");
+    let plain = book.scratch("constant-velocity.toml");
+    fs::write(&plain, "[forecast]\nmethod = \"constant-velocity\"\n").map_err(|e| e.to_string())?;
+    let walkers =
+        ["08-2", "16-2", "32-2x", "64-2x"].map(|name| format!("circle_antipode/circle-10m-{name}.txt"));
+    for method in ["residual", "constant-velocity"] {
+        let site: Vec<OsString> = match method {
+            "residual" => Vec::new(),
+            _ => vec!["--site".into(), argument(&plain)],
+        };
+        for preset in ["orca-03", "mixed"] {
+            let words = ["--scenes", "20", "--preset", preset].map(OsString::from);
+            book.score(&format!("{preset}-{method}"), words.into_iter().chain(site.clone()))?;
+        }
+        let mut words: Vec<OsString> = ANTIPODE.map(OsString::from).into();
+        for file in &walkers {
+            words.push(book.data(file)?);
+        }
+        book.score(&format!("walkers-{method}"), words.into_iter().chain(site))?;
+    }
+    book.compare()
+}
+
+/// Sixteen real walkers with ten draws of bodies, then where their F1 is lost: error budget and ladder of oracles, access
+/// point `side`, within 300 ms; as they walk, and once more with their hands in their pockets, so that no arm swings.
+pub fn walkers(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record walkers");
+    let file = book.data("circle_antipode/circle-10m-16-2.txt")?;
+    let words = ["evaluate", "--mode", "default"].into_iter().chain(ANTIPODE).map(OsString::from);
+    let ten = std::iter::repeat_n(file.clone(), 10);
+    let said = book.quietly(&words.clone().chain(ten).collect::<Vec<_>>())?;
+    book.line("Ten draws of bodies");
+    let wanted = ["access point", "side", "centre", "position RMSE", "velocity", "displacement"];
+    for line in said.lines() {
+        let line = line.strip_prefix("circle-10m-16-2  ").unwrap_or(line);
+        if wanted.iter().any(|start| line.starts_with(start)) {
+            book.line(line);
+        }
+    }
+    for bodies in ["plain", "pockets"] {
+        let out = book.scratch(bodies);
+        let mut words: Vec<OsString> =
+            words.clone().chain([file.clone(), "--out".into(), argument(&out)]).collect();
+        if bodies != "plain" {
+            words.extend(["--bodies".into(), bodies.into()]);
+        }
+        book.quietly(&words)?;
+        let report = fs::read_to_string(out.join("report.txt")).map_err(|e| format!("report.txt: {e}"))?;
+        let rows = losses(&report);
+        if rows.is_empty() {
+            return Err(
+                "report.txt: expected an error budget and a ladder of oracles, found neither".to_owned()
+            );
+        }
+        book.line(&format!("\n{bodies:<10} within 300 ms                 base rate     F1  onset F1"));
+        for (name, [base_rate, f1, onset_f1]) in rows {
+            book.line(&format!("{name:<42} {base_rate:>9}  {f1} {onset_f1:>9}"));
+        }
+    }
+    Ok(())
+}
+
+/// Of the error budget and the ladder, at `side` within 300 ms: who, then base rate, F1 and onset F1.
+fn losses(report: &str) -> Vec<(String, [String; 3])> {
+    let mut rows = Vec::new();
+    let mut part = "";
+    for line in report.lines() {
+        if line.starts_with("Error budget, access point side") {
+            part = "budget";
+        } else if line.starts_with("Ladder of oracles") {
+            part = "ladder";
+        } else if line.is_empty() {
+            part = "";
+        }
+        let pick = |numbers: &str, which: [usize; 3]| {
+            let numbers: Vec<&str> = numbers.split_whitespace().collect();
+            which.map(|i| numbers.get(i).copied().unwrap_or("-").to_owned())
+        };
+        if part == "budget" && line.starts_with("300 ms  default") {
+            // Base rate, accuracy, precision, recall, F1, onset F1 stand after the predictor's column.
+            let (name, numbers) = line.split_at(line.len().min(48));
+            rows.push((name.get(17..).unwrap_or_default().trim().to_owned(), pick(numbers, [0, 4, 5])));
+        } else if part == "ladder"
+            && let Some((before, numbers)) = line.split_once("300 ms")
+            && let Some(name) = before.trim_end().strip_suffix("  side")
+        {
+            rows.push((name.trim().to_owned(), pick(numbers, [0, 1, 2])));
+        }
+    }
+    rows
+}
+
+/// Real people before a real VLP-16: two stretches of clouds, every mode, against boxes drawn by hand.
+pub fn logictronix(book: &mut Book) -> Result<()> {
+    let labels = book.data("logictronix_vlp16/labels.csv")?;
+    for frames in [70..=95, 117..=140] {
+        let first = *frames.start();
+        let clouds = book.scratch(&format!("clouds-{first}"));
+        fs::create_dir_all(&clouds).map_err(|e| e.to_string())?;
+        for frame in frames {
+            let from = book.data(&format!("logictronix_vlp16/pcd/{frame}.pcd"))?;
+            fs::copy(from, clouds.join(format!("{frame}.pcd"))).map_err(|e| e.to_string())?;
+        }
+        for mode in ["default", "paper", "hdl"] {
+            let out = book.scratch(&format!("lt-{first}-{mode}"));
+            let site =
+                ["--site", "config/sites/logictronix.toml", "--mode", mode, "--out"].map(OsString::from);
+            book.umbracast_says(
+                ["run".into(), argument(&clouds)].into_iter().chain(site).chain([argument(&out)]),
+            )?;
+            book.umbracast_says(["evaluate".into(), argument(&out), "--labels".into(), labels.clone()])?;
+        }
+    }
+    Ok(())
+}

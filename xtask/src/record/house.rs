@@ -1,0 +1,168 @@
+//! What the program promises beside its scores: speed, same bytes, going on after a stop, other machines, fresh clones.
+
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use super::book::Book;
+use super::keep;
+use crate::tools::{Result, argument, files_below, root};
+
+/// What the sensors see of a standing person, and the floor plan.
+pub fn coverage(book: &mut Book) -> Result<()> {
+    let out = book.scratch("coverage");
+    book.umbracast_says(["coverage".into(), "--out".into(), argument(&out)])?;
+    keep(book, &out.join("coverage.svg"), "coverage.svg")
+}
+
+/// One scene of 10 people with two HDL-32E on one core, and a frame through every mode.
+pub fn speed(book: &mut Book) -> Result<()> {
+    let recording = book.scratch("sim");
+    book.umbracast_says(simulate("1", "1", &recording))?;
+    for mode in ["default", "paper", "hdl"] {
+        book.umbracast_says(run(&recording, mode, "1", &book.scratch(mode)))?;
+    }
+    Ok(())
+}
+
+/// The same seed twice, on one thread and on two.
+pub fn same_bytes(book: &mut Book) -> Result<()> {
+    let of_threads = [("one", "1"), ("two", "2")];
+    for (name, threads) in of_threads {
+        book.umbracast_says(simulate("2", threads, &book.scratch(name)))?;
+    }
+    for mode in ["default", "paper", "hdl"] {
+        for (name, threads) in of_threads {
+            let recording = book.scratch(name);
+            book.umbracast_says(run(&recording, mode, threads, &recording.join(mode)))?;
+        }
+    }
+    compare_folders(book, "one", "two")
+}
+
+/// The paper's experiment in small, killed in its midst and started again, against one that ran through.
+pub fn resume(book: &mut Book) -> Result<()> {
+    let words = |name: &str, book: &Book| -> Vec<OsString> {
+        ["reproduce", "--scenes", "8", "--out"]
+            .map(OsString::from)
+            .into_iter()
+            .chain([argument(book.scratch(name))])
+            .collect()
+    };
+    book.command("umbracast reproduce --scenes 8 --out /tmp/through");
+    book.quietly(&words("through", book))?;
+
+    book.line("$ umbracast reproduce --scenes 8 --out /tmp/killed, killed after its third scene");
+    let mut command = Command::new(book.umbracast());
+    command.args(words("killed", book)).arg("--quiet").stdout(Stdio::null());
+    let mut running = command.spawn().map_err(|e| format!("umbracast: {e}"))?;
+    let killed = book.scratch("killed");
+    while files_below(&killed, ".sums").len() < 3 {
+        if let Some(status) = running.try_wait().map_err(|e| e.to_string())? {
+            return Err(format!(
+                "expected an experiment that could be killed, found one that ended: {status}"
+            ));
+        }
+        sleep(Duration::from_millis(100));
+    }
+    running.kill().and_then(|()| running.wait()).map_err(|e| e.to_string())?;
+    for file in files_below(&killed, "") {
+        book.line(&file.strip_prefix(&killed).unwrap_or(&file).display().to_string());
+    }
+    book.line("$ umbracast reproduce --scenes 8 --out /tmp/killed");
+    book.quietly(&words("killed", book))?;
+    compare_folders(book, "through", "killed")
+}
+
+/// The job files on a Slurm of this one machine.
+pub fn slurm(book: &mut Book) -> Result<()> {
+    script(book, "deploy/slurm/try.sh", "deploy/slurm/try.sh")
+}
+
+/// The job files as a cluster would read them.
+pub fn kubernetes(book: &mut Book) -> Result<()> {
+    script(book, "deploy/kubernetes/try.py umbracast", "deploy/kubernetes/try.py \"$(command -v umbracast)\"")
+}
+
+/// CI on a fresh clone.
+pub fn tests(book: &mut Book) -> Result<()> {
+    let said = in_fresh_clone(book, "time bash .ci/run")?;
+    let kept = |line: &&str| {
+        ["Running ", "Doc-tests ", "test result: ", "skipped: ", "real", "user", "sys"]
+            .iter()
+            .any(|start| line.trim_start().starts_with(start))
+    };
+    for line in said.lines().filter(kept) {
+        book.line(line.trim_start());
+    }
+    all_passed(&said)
+}
+
+/// The first command on a fresh clone.
+pub fn fresh_clone(book: &mut Book) -> Result<()> {
+    let said = in_fresh_clone(book, "time cargo run --release")?;
+    let building = |line: &&str| {
+        ["Compiling ", "Downloading ", "Downloaded ", "Updating ", "Running ", "Locking "]
+            .iter()
+            .any(|start| line.trim_start().starts_with(start))
+    };
+    for line in said.lines().filter(|line| !building(line)) {
+        book.line(line.trim_start_matches(' '));
+    }
+    Ok(())
+}
+
+/// Files, imports and circles in words.
+pub fn structure(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask structure");
+    book.line(&crate::structure::in_words()?);
+    Ok(())
+}
+
+fn simulate(scenes: &str, threads: &str, out: &Path) -> Vec<OsString> {
+    let words = ["simulate", "--scenes", scenes, "--threads", threads, "--out"].map(OsString::from);
+    words.into_iter().chain([argument(out)]).collect()
+}
+
+fn run(recording: &Path, mode: &str, threads: &str, out: &Path) -> Vec<OsString> {
+    let words = ["--mode", mode, "--threads", threads, "--out"].map(OsString::from);
+    ["run".into(), argument(recording)].into_iter().chain(words).chain([argument(out)]).collect()
+}
+
+fn compare_folders(book: &mut Book, one: &str, other: &str) -> Result<()> {
+    let (a, b) = (book.scratch(one), book.scratch(other));
+    let line = format!("diff -rq --exclude run.json {} {} && echo the same", a.display(), b.display());
+    let said = book.bash(&root(), &line)?;
+    book.command(&line);
+    book.line(&said);
+    if said.trim() == "the same" { Ok(()) } else { Err(format!("expected the same bytes, found\n{said}")) }
+}
+
+fn script(book: &mut Book, shown: &str, line: &str) -> Result<()> {
+    book.command(shown);
+    let said = book.bash(&root(), line)?;
+    book.line(&said);
+    Ok(())
+}
+
+/// What a line prints in a clone of the repository; nothing is built there.
+fn in_fresh_clone(book: &mut Book, line: &str) -> Result<String> {
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+    book.command(&format!(
+        "git clone . /tmp/fresh && cd /tmp/fresh && {line}   # {cores} cores, nothing built"
+    ));
+    let clone = book.scratch("fresh");
+    let cloned = book.bash(&root(), &format!("git clone --quiet . {0} && test -d {0}", clone.display()))?;
+    if !clone.is_dir() {
+        return Err(cloned);
+    }
+    book.bash(&clone, &format!("unset CARGO_TARGET_DIR RUSTUP_TOOLCHAIN; {line}"))
+}
+
+fn all_passed(said: &str) -> Result<()> {
+    let failed: Vec<&str> =
+        said.lines().filter(|line| line.contains("FAILED") || line.starts_with("error")).collect();
+    if failed.is_empty() { Ok(()) } else { Err(failed.join("\n")) }
+}

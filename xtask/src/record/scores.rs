@@ -1,0 +1,77 @@
+//! What the modes score, and the paper's experiment.
+
+use std::ffi::OsString;
+
+use super::book::Book;
+use super::keep;
+use crate::tools::{Result, argument, built, root, target};
+
+/// The default mode on 100 test scenes.
+pub fn headline(book: &mut Book) -> Result<()> {
+    let out = book.scratch("headline");
+    evaluate(book, &["--scenes", "100", "--preset", "orca-03", "--mode", "default"], out.into())
+}
+
+/// Every mode on 40 test scenes. The page holds baselines, error budget and ladder too.
+pub fn modes(book: &mut Book) -> Result<()> {
+    let out = book.scratch("orca");
+    evaluate(book, &["--scenes", "20", "--preset", "orca-03,orca-06"], argument(&out))?;
+    keep(book, &out.join("report.html"), "orca-40-scenes.html")
+}
+
+/// Real walkers, every mode.
+pub fn antipode(book: &mut Book) -> Result<()> {
+    let walkers = ["circle-10m-08-2.txt", "circle-10m-16-2.txt"];
+    let walkers = walkers.map(|name| book.data(&format!("circle_antipode/{name}")));
+    let mut words: Vec<OsString> =
+        ["evaluate", "--unit", "cm", "--fps", "25", "--out"].map(Into::into).into();
+    words.extend([argument(book.scratch("walkers")), "--trajectories".into()]);
+    for walkers in walkers {
+        words.push(walkers?);
+    }
+    book.umbracast_says(words)
+}
+
+/// Why the paper's figures are what they are. Tuning scenes, without data.
+pub fn explain(book: &mut Book) -> Result<()> {
+    let line = "cargo run --release --quiet -p umbracast-eval --example explain -- 2 record/explain.svg";
+    book.command(line);
+    let said = book.bash(&root(), line)?;
+    book.line(&said);
+    Ok(())
+}
+
+/// Each mechanism of the default mode off alone.
+pub fn ablation(book: &mut Book) -> Result<()> {
+    let out = book.scratch("ablation");
+    book.umbracast_says(["ablate".into(), "--out".into(), argument(&out)])?;
+    keep(book, &out.join("ablation.svg"), "ablation.svg")
+}
+
+/// The paper's experiment in 40 scenes, with the LSTM that ships.
+pub fn reproduce_quick(book: &mut Book) -> Result<()> {
+    let out = book.scratch("reproduce");
+    let line = format!("time umbracast reproduce --quick --out {} --quiet", out.display());
+    book.command(&line);
+    let said = book.bash(&root(), &line)?;
+    book.line(&said);
+    Ok(())
+}
+
+/// The paper's experiment whole, training first: an hour on two cores. `REPRODUCE` names a folder in which an earlier
+/// try is gone on with.
+pub fn reproduce(book: &mut Book) -> Result<()> {
+    let out = std::env::var_os("REPRODUCE").map_or_else(|| book.scratch("reproduce"), Into::into);
+    built(&root(), &target(), &["--features", "train"])?;
+    let place = out.display().to_string();
+    book.command("date; time umbracast reproduce --train --out /tmp/reproduce");
+    let said =
+        book.bash(&root(), &format!("date; time umbracast reproduce --train --out {place} --quiet"))?;
+    book.line(&said.replace(&place, "/tmp/reproduce"));
+    keep(book, &out.join("boxes.svg"), "reproduce-boxes.svg")
+}
+
+fn evaluate(book: &mut Book, words: &[&str], out: OsString) -> Result<()> {
+    let words = [&["evaluate"], words, &["--out"]].concat().into_iter().map(OsString::from);
+    book.umbracast_says(words.chain([out]))
+}
