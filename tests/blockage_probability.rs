@@ -3,8 +3,8 @@
 use umbracast::blockage::body_model::{Arms, BodyModel, Slice};
 use umbracast::blockage::{Blockage, Caster, Numbers};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
-use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
 use umbracast::gait::GaitPhase;
+use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
 use umbracast::track::{Observed, Track};
 use umbracast::{Config, STEP_S, STEPS};
 

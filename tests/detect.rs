@@ -222,11 +222,8 @@ fn more_points_than_the_limit_are_counted_and_dropped() {
     let mut chain = Chain::new(&config);
     chain.background.learn_empty(&frame(&config, 0, &[]));
     let mut crowded = frame(&config, 1, &[]);
-    let near = |i: usize| SensorPoint {
-        position_m: [1.0, 1e-5 * i as f32, 0.0],
-        time_ns: 0,
-        reflectivity: 0.0,
-    };
+    let near =
+        |i: usize| SensorPoint { position_m: [1.0, 1e-5 * i as f32, 0.0], time_ns: 0, reflectivity: 0.0 };
     // Level with a sensor that hangs no higher than people are tall.
     crowded.scans.truncate(1);
     crowded.scans[0].site_from_sensor.translation_m.z = 1.5;

@@ -105,24 +105,21 @@ pub fn reach_m(body: &BodyModel, height_m: f64, width_scale: f64, speed_mps: f64
     let out = arms.hand_out.max(arms.elbow_out).max(arms.shoulder_out);
     let radius = arms.upper_radius.max(arms.fore_radius) * width_scale;
     let arms_reach = (hand_ahead * hand_ahead + out * out).sqrt() + radius + body.sway_left + body.sway_ahead;
-    height_m * body.slices.iter().fold(arms_reach, |far, slice| far.max(slice_reach(body, slice, width_scale)))
+    height_m
+        * body.slices.iter().fold(arms_reach, |far, slice| far.max(slice_reach(body, slice, width_scale)))
 }
 
 /// The same of a slice, as a share of the height.
 fn slice_reach(body: &BodyModel, slice: &Slice, width_scale: f64) -> f64 {
-    slice.half_depth.max(slice.half_width) * width_scale + slice.ahead.abs() + body.sway_left + body.sway_ahead
+    slice.half_depth.max(slice.half_width) * width_scale
+        + slice.ahead.abs()
+        + body.sway_left
+        + body.sway_ahead
 }
 
 /// An arm of two rods; `side` is 1 on the left. It swings against the leg of its side, and farther ahead than back
 /// because the elbow bends.
-fn arm_blocks(
-    arms: &Arms,
-    posture: &Posture,
-    speed_hz: f64,
-    side: f64,
-    start: DVec3,
-    end: DVec3,
-) -> bool {
+fn arm_blocks(arms: &Arms, posture: &Posture, speed_hz: f64, side: f64, start: DVec3, end: DVec3) -> bool {
     let h = posture.height_m;
     let wave = side * posture.phase_rad.cos();
     let swing = posture.arm_swing * speed_hz;

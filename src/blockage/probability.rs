@@ -190,7 +190,8 @@ impl Trajectories {
         let samples = numbers.samples;
         let state_root = root(&forecast.coupling.state);
         // Process noise: a constant acceleration over each step with the step's share of the white one.
-        let noise_root_mps2 = root(&forecast.coupling.acceleration_psd_m2ps3.map(|row| row.map(|psd| psd / STEP_S)));
+        let noise_root_mps2 =
+            root(&forecast.coupling.acceleration_psd_m2ps3.map(|row| row.map(|psd| psd / STEP_S)));
         self.positions_m.resize((STEPS + 1) * samples, DVec2::ZERO);
         self.traits.clear();
         let means: [DVec2; STEPS + 1] = std::array::from_fn(|s| position_at(track, forecast, s));

@@ -26,9 +26,8 @@ pub(super) fn parse<T: DeserializeOwned>(layers: &[(&str, &str)]) -> Result<T, E
     let (file, text) = layers.last().copied().unwrap_or_default();
     merged.try_into().map_err(|e: toml::de::Error| {
         let lacking = e.message().strip_prefix("missing field `").and_then(|rest| rest.strip_suffix('`'));
-        let place = lacking.and_then(|field| {
-            missing::place(DeTable::parse(text).ok()?.get_ref(), known.as_ref()?, field)
-        });
+        let place = lacking
+            .and_then(|field| missing::place(DeTable::parse(text).ok()?.get_ref(), known.as_ref()?, field));
         match place {
             Some((offset, path)) => at(file, text, offset, format!("{path}: {}", e.message())),
             None => Error::new(e.message().to_owned()).within(file),

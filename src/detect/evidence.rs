@@ -52,12 +52,7 @@ impl Part {
 
 /// Splits a cluster as long as one person more is likelier; parts go to `parts`. `moved_m` are all points, each
 /// moved behind the surface that its sensor saw.
-pub fn split(
-    moved_m: &[DVec3],
-    priors: &[Prior],
-    cluster: Cluster,
-    parts: &mut Vec<Part>,
-) {
+pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut Vec<Part>) {
     if cluster.len() < 2 * POINTS_MIN {
         parts.push(Part::new(moved_m, cluster));
         return;
@@ -138,9 +133,7 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
 pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
     let people: Vec<&Prior> = priors.iter().filter(|prior| prior.confirmed).collect();
     let off_m = |part: &Part, k: usize| people[k].position_m.distance(part.mean_m());
-    let is_near = |part: &Part, k: usize| {
-        off_m(part, k) < LIMB_M + people[k].position_sigma_m.min(LIMB_M)
-    };
+    let is_near = |part: &Part, k: usize| off_m(part, k) < LIMB_M + people[k].position_sigma_m.min(LIMB_M);
     let (bodies, pieces): (Vec<Part>, Vec<Part>) = parts.drain(..).partition(|part| !is_piece(part));
     let mut has_body = vec![false; people.len()];
     for body in &bodies {

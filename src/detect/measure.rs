@@ -34,8 +34,7 @@ struct Size {
 }
 
 /// A stride with swinging arms is longer than 1 m.
-const OURS: Size =
-    Size { points: 5..=8192, diagonal_m: [0.1, 1.3], extent_m: [0.0, 2.4], top_m: [0.5, 2.3] };
+const OURS: Size = Size { points: 5..=8192, diagonal_m: [0.1, 1.3], extent_m: [0.0, 2.4], top_m: [0.5, 2.3] };
 /// As hdl_people_tracking has it: more than 10 points.
 const ADAPTED: Size = Size {
     points: 11..=8191,

@@ -17,9 +17,9 @@ pub mod limbs;
 pub mod measure;
 
 pub use background::Background;
+pub use limbs::LimbCovariance;
 pub use measure::Measurer;
 pub use split_merge::Clusterer;
-pub use limbs::LimbCovariance;
 
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 

@@ -1,7 +1,7 @@
 //! One cluster, one person: Haselich's split-merge, or evidence for one person more or fewer.
 
-use super::dp_means::MergeMean;
 use super::cluster::PlanGrid;
+use super::dp_means::MergeMean;
 use super::evidence::Part;
 use super::features::away;
 use super::{Cluster, Point, Prior, dp_means, evidence};
@@ -112,8 +112,7 @@ impl Clusterer {
             let range_m =
                 self.sensors_m.iter().map(|s| s.distance(point.position_m)).fold(f64::INFINITY, f64::min);
             let range_m = if range_m.is_finite() { range_m } else { 0.0 };
-            let moved_m =
-                point.position_m + (away(&self.sensors_m, point) * self.radius.shift_m).extend(0.0);
+            let moved_m = point.position_m + (away(&self.sensors_m, point) * self.radius.shift_m).extend(0.0);
             self.moved_m.push(moved_m);
             self.plan_m.push(moved_m.truncate());
             self.radius_m.push(self.radius.radius_m + self.radius.per_range * range_m);

@@ -13,7 +13,8 @@ pub const ACCELERATION_PSD_M2PS3: f64 = 0.01;
 
 /// Carries a track's state on.
 pub fn forecast(track: &Track) -> Forecast {
-    let coupling = Coupling { state: track.covariance, acceleration_psd_m2ps3: alike(ACCELERATION_PSD_M2PS3) };
+    let coupling =
+        Coupling { state: track.covariance, acceleration_psd_m2ps3: alike(ACCELERATION_PSD_M2PS3) };
     let steps = std::array::from_fn(|i| {
         let ahead_s = (i + 1) as f64 * STEP_S;
         position_at(track.position_m, track.velocity_mps, &coupling, ahead_s)
@@ -82,7 +83,8 @@ mod tests {
             let state: [f64; 4] = std::array::from_fn(|i| (0..4).map(|k| l[i][k] * z[k]).sum());
             let (mut p, mut v) = (DVec2::new(state[0], state[1]), DVec2::new(state[2], state[3]));
             for _ in 0..(ahead_s / SLICE_S) as usize {
-                let push = DVec2::new(draw(), draw()) * (coupling.acceleration_psd_m2ps3[0][0] * SLICE_S).sqrt();
+                let push =
+                    DVec2::new(draw(), draw()) * (coupling.acceleration_psd_m2ps3[0][0] * SLICE_S).sqrt();
                 p += (v + push * 0.5) * SLICE_S;
                 v += push;
             }

@@ -160,7 +160,8 @@ fn coupling(outputs: &[f64; OUTPUTS], seen: &Seen, axes: [DVec2; 2]) -> Coupling
         let position_m = seen.sigmas[axis] * factor(spread[0]);
         let velocity_mps = seen.sigmas[2 + axis] * factor(spread[1]);
         let both = RHO_LIMIT * spread[2].tanh() * position_m * velocity_mps;
-        let density = ACCELERATION_PSD_M2PS3 * (2.0 * spread[3]).clamp(-LOG_DENSITY_LIMIT, LOG_DENSITY_LIMIT).exp();
+        let density =
+            ACCELERATION_PSD_M2PS3 * (2.0 * spread[3]).clamp(-LOG_DENSITY_LIMIT, LOG_DENSITY_LIMIT).exp();
         let d = direction.to_array();
         for i in 0..2 {
             for j in 0..2 {

@@ -55,13 +55,7 @@ impl MixtureTracker {
 
     /// The same with numbers of one's own.
     pub fn with_numbers(numbers: Numbers, site: &Site) -> Self {
-        Self {
-            numbers,
-            visibility: Visibility::new(site),
-            people: Vec::new(),
-            next_id: 0,
-            time_ns: None,
-        }
+        Self { numbers, visibility: Visibility::new(site), people: Vec::new(), next_id: 0, time_ns: None }
     }
 
     /// Last step's tracks predicted to `time_ns`.
@@ -162,8 +156,7 @@ impl MixtureTracker {
         let rank = |p: &Person| (std::cmp::Reverse(p.confirmed), std::cmp::Reverse(p.matches), p.id);
         let at: Vec<_> = self.people.iter().map(|p| (rank(p), p.filter.state().position_m())).collect();
         for (i, person) in self.people.iter_mut().enumerate() {
-            let doubled =
-                at.iter().any(|other| other.0 < at[i].0 && other.1.distance(at[i].1) < DUPLICATE_M);
+            let doubled = at.iter().any(|other| other.0 < at[i].0 && other.1.distance(at[i].1) < DUPLICATE_M);
             person.doubled_s = if doubled { person.doubled_s + step_s } else { 0.0 };
         }
     }

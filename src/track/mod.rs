@@ -15,8 +15,8 @@ mod person;
 pub mod mixture;
 pub mod paper;
 
-pub use numbers::Numbers;
 pub use mixture::MixtureTracker;
+pub use numbers::Numbers;
 pub use paper::{PaperTracker, Variant};
 
 use std::collections::VecDeque;

@@ -268,7 +268,8 @@ mod tests {
             aabb,
             obb: Obb::from_aabb(&aabb),
         };
-        noise(&numbers, &detection, &BodyView { returns_alone: 40.0, beams_known, ..BodyView::default() })[0][0]
+        noise(&numbers, &detection, &BodyView { returns_alone: 40.0, beams_known, ..BodyView::default() })[0]
+            [0]
     }
 
     #[test]

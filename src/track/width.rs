@@ -86,8 +86,13 @@ mod tests {
         width.scale()
     }
 
-    const FREE: BodyView =
-        BodyView { returns: 30.0, returns_alone: 30.0, beams_per_m_at_top: 5.0, top_m: 1.8, beams_known: true };
+    const FREE: BodyView = BodyView {
+        returns: 30.0,
+        returns_alone: 30.0,
+        beams_per_m_at_top: 5.0,
+        top_m: 1.8,
+        beams_known: true,
+    };
 
     #[test]
     fn wide_returns_seen_long_enough_are_of_a_stout_person() {

@@ -1,7 +1,7 @@
 //! What each mechanism of the default mode is worth: the same scenes with all of them and with each left out alone.
 //!
 //! A variant's score is set beside the whole's on the same scenes, so the intervals are of the difference, by
-//! bootstrap over scenes.
+//! bootstrap over recordings.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,16 +13,16 @@ use umbracast_io::rows::{PeopleRow, TrackRow};
 
 use crate::bootstrap::{Bootstrap, Pooled, interval, quantile};
 use crate::chain::{Chain, Lane, SceneSpec, Spec};
+use crate::counts::Counts;
 use crate::displacement::Displacement;
 use crate::instances::instances;
 use crate::labels;
+use crate::link_counts::{ECE_BINS, LinkCounts, WindowCounts};
 use crate::links::Said;
 use crate::matching::match_scene;
 use crate::oracles;
 use crate::scene::{Matching, SceneRun, SceneTruth, TruthIndex};
 use crate::stage1::Stage1;
-use crate::counts::Counts;
-use crate::link_counts::{ECE_BINS, LinkCounts, WindowCounts};
 
 mod table;
 
@@ -118,7 +118,7 @@ pub struct Compared {
     pub value: Option<f64>,
     /// How much more it is than with everything.
     pub more: Option<f64>,
-    /// 95 % interval of that; `None` with fewer than five scenes.
+    /// 95 % interval of that; `None` with fewer than five recordings.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -147,6 +147,7 @@ pub struct Ablated {
 /// Sums of one variant over one scene.
 #[derive(Debug, Clone, Default)]
 struct Sums {
+    recording: u64,
     all: Counts,
     onset: Counts,
     /// Of each bin of the calibration error: instances, probabilities added, blocked.
@@ -164,6 +165,7 @@ impl Sums {
         let first = LinkCounts::each(&instances, &predictions, access_points).into_iter().next();
         let WindowCounts { all, onset, bins, .. } = first.unwrap_or_default().windows[WINDOW - 1].clone();
         Self {
+            recording: index.recording(),
             all,
             onset,
             bins: bins.map(|bin| (bin.count, bin.p_sum, bin.blocked)),
@@ -194,6 +196,7 @@ impl Pooled for Sums {
             (a.0 + times * b.0, a.1 + times as f64 * b.1, a.2 + times * b.2)
         };
         Self {
+            recording: other.recording,
             all: self.all.plus(&other.all, times),
             onset: self.onset.plus(&other.onset, times),
             bins: std::array::from_fn(bin),
@@ -236,7 +239,8 @@ pub fn ablate(
         Source::Scenes(scenes) => simulated(configs, scenes, &clock, &progress)?,
         Source::Labelled { frames, labels } => labelled(&configs, frames, labels, &clock)?,
     };
-    let bootstrap = Bootstrap::new(sums.len());
+    let recordings: Vec<u64> = sums.iter().map(|scene| scene[0].recording).collect();
+    let bootstrap = Bootstrap::new(&recordings);
     let row = |variant: usize| {
         let pairs: Vec<Pair> = sums
             .iter()

@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, VecDeque};
 
 use umbracast::blockage::Caster;
 use umbracast::config::{BlockageConfig, BlockageMethod, BoxKind};
-use umbracast::forecast::{Coupling, Forecast, Gaussian2, Weights, constant_velocity};
 use umbracast::forecast::constant_velocity::ACCELERATION_PSD_M2PS3;
-use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+use umbracast::forecast::{Coupling, Forecast, Gaussian2, Weights, constant_velocity};
 use umbracast::gait::{GaitPhase, WALKS_FROM_MPS};
+use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use umbracast::track::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
 use umbracast::{Config, Error, STEP_S, STEPS};
 use umbracast_io::rows::{PeopleRow, TrackRow};
@@ -28,10 +28,7 @@ pub fn constant_velocity_of_truth(truth: &TruthIndex, config: &Config) -> Said {
     for &frame in &truth.frames {
         let tracks: Vec<Track> =
             truth.people_of(frame).map(|row| true_track(truth, row, person_box(row))).collect();
-        let forecasts: Vec<Forecast> = tracks
-            .iter()
-            .map(constant_velocity::forecast)
-            .collect();
+        let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
         caster.cast(&tracks, &forecasts, &mut blockages);
         said.add(frame, &blockages);
     }
@@ -377,7 +374,10 @@ mod tests {
         let said = true_future(&index, &run, &matching, &config).of_tracks(&instances, &matching);
         assert!(said[0].p[0] > 0.0 && said[0].p[0] < 0.5, "{:?}", said[0].p);
         let (_, forecast) = with_own_future(&run.tracks[1]);
-        assert_eq!((forecast.coupling.state[1][1], forecast.coupling.acceleration_psd_m2ps3[1][1]), (4.0, 0.01));
+        assert_eq!(
+            (forecast.coupling.state[1][1], forecast.coupling.acceleration_psd_m2ps3[1][1]),
+            (4.0, 0.01)
+        );
     }
 
     #[test]

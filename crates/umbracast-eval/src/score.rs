@@ -185,8 +185,7 @@ pub fn score_scene(
             health: *health,
         });
     }
-    let carried_on =
-        |frame, person| index.person(frame, person).map(oracles::constant_velocity_steps);
+    let carried_on = |frame, person| index.person(frame, person).map(oracles::constant_velocity_steps);
     Ok(SceneScore {
         scene,
         group: group.to_owned(),
