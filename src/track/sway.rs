@@ -8,7 +8,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::gait::stride_hz;
+use crate::gait::{relative_speed_hz, stride_hz, sway_share};
 use crate::geometry::DVec2;
 
 /// Where the state holds the mediolateral sway, to the left, with its quadrature after it.
@@ -17,8 +17,6 @@ pub(super) const LEFT: usize = 4;
 pub(super) const AHEAD: usize = 6;
 /// Time after which size and phase of an oscillation are forgotten, seconds.
 pub(super) const LASTS_S: f64 = 3.0;
-/// From standing up to this speed the sway of positions grows to its full size.
-const FULL_SWAY_MPS: f64 = 0.45;
 
 /// Unit vectors along which the sway is measured.
 pub(super) struct Axes {
@@ -52,7 +50,7 @@ impl Sway {
     /// Of somebody `height_m` tall; `sway_m` is one standard deviation to the left and ahead at full size.
     pub(super) fn after(sway_m: [f64; 2], speed_mps: f64, height_m: f64, dt_s: f64) -> Self {
         let stride_hz = stride_hz(speed_mps, height_m);
-        let size = (speed_mps / FULL_SWAY_MPS).min(1.0);
+        let size = sway_share(relative_speed_hz(speed_mps, height_m));
         let wave = |sway_m: f64, pace_hz: f64| Wave::after((size * sway_m).powi(2), pace_hz, dt_s);
         Self { left: wave(sway_m[0], stride_hz), ahead: wave(sway_m[1], 2.0 * stride_hz) }
     }

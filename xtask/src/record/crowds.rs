@@ -29,7 +29,7 @@ pub fn sites(book: &mut Book) -> Result<()> {
 pub fn people(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record people");
     book.score("plain", ["--scenes", "6", "--preset", "orca-03"])?;
-    bodies(book, &["--scenes", "6", "--preset", "orca-03"])?;
+    bodies(book, &["--scenes", "6", "--preset", "orca-03"], "cmu_walk/scaled_131_01.bvh")?;
     let walkers =
         ["08-2", "16-2", "32-2x", "64-2x"].map(|name| format!("circle_antipode/circle-10m-{name}.txt"));
     recorded(book, "antipode", &ANTIPODE, &walkers)?;
@@ -43,12 +43,12 @@ pub fn people(book: &mut Book) -> Result<()> {
     book.compare()
 }
 
-/// Every kind of body but the plain one, each walked by everybody of a crowd.
-pub fn bodies(book: &mut Book, crowd: &[&str]) -> Result<()> {
+/// Every kind of body but the plain one, each walked by everybody of a crowd; the captured gait is that of a file.
+pub fn bodies(book: &mut Book, crowd: &[&str], gait: &str) -> Result<()> {
     for kind in ["bag", "phone", "pockets", "child", "wheelchair"] {
         book.score(kind, crowd.iter().copied().chain(["--bodies", kind]))?;
     }
-    let gait = book.data("cmu_walk/scaled_131_01.bvh")?;
+    let gait = book.data(gait)?;
     let words = crowd.iter().copied().chain(["--bodies", "cmu-walk", "--gait"]).map(OsString::from);
     book.score("cmu-walk", words.chain([gait]))
 }

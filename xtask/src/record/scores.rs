@@ -44,7 +44,9 @@ pub fn explain(book: &mut Book) -> Result<()> {
 /// Each mechanism of the default mode off alone.
 pub fn ablation(book: &mut Book) -> Result<()> {
     let out = book.scratch("ablation");
-    book.umbracast_says(["ablate".into(), "--out".into(), argument(&out)])?;
+    let words = ["ablate", "--scenes", "5", "--out"].map(OsString::from);
+    book.umbracast_says(words.into_iter().chain([argument(&out)]))?;
+    keep(book, &out.join("ablation.csv"), "ablation.csv")?;
     keep(book, &out.join("ablation.svg"), "ablation.svg")
 }
 

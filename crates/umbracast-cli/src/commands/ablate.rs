@@ -21,6 +21,8 @@ use crate::{Ending, crowds, say, setup};
 const PEOPLE: usize = 10;
 /// The sensors of the paper's tilt at 6 m, where people are seen in part.
 const HEIGHT_6: &str = include_str!("../../../../config/sites/height-6.toml");
+/// One of two sensors falls silent half way.
+const LOST_SENSOR: &str = include_str!("../../../../config/sites/lost-sensor.toml");
 /// A VLP-16 whose clouds were labelled by hand.
 const LOGICTRONIX: &str = include_str!("../../../../config/sites/logictronix.toml");
 
@@ -83,11 +85,13 @@ fn drawn(args: &Ablate) -> Result<Vec<DataSet>, Error> {
     let (count, seed) = (args.scenes as usize, args.seed);
     let crowd = |preset| drawn_scenes(&[preset], count, PEOPLE, seed);
     let low = Config::with_overlay(Mode::Default, HEIGHT_6, "height-6.toml")?;
+    let lost = Config::with_overlay(Mode::Default, LOST_SENSOR, "lost-sensor.toml")?;
     let mut sets = vec![
         set("orca-03", Config::default(), crowd(Preset::Orca03)),
         set("mixed", Config::default(), crowd(Preset::Mixed)),
         set("pairs", Config::default(), crowd(Preset::Pairs)),
         set("height-6", low, crowd(Preset::Orca03)),
+        set("lost-sensor", lost, crowd(Preset::Orca03)),
     ];
     for kind in [Kind::Bag, Kind::Phone, Kind::Pockets, Kind::Child, Kind::Wheelchair] {
         sets.push(set(kind.name(), Config::default(), dressed(crowd(Preset::Orca03), kind, None)?));
