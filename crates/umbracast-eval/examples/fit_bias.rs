@@ -3,7 +3,7 @@
 //! `cargo run --release -p umbracast-eval --example fit_bias -- [models/body_axis]`
 //!
 //! Training scenes have the seeds 50,000 and on, the scenes that the errors are printed for 130,000 and on. Four layouts
-//! of two sensors; people on ORCA's ways, mixed crowds, pairs, and some of them in a hurry. Takes some minutes.
+//! of two sensors; people on ORCA's ways, mixed crowds, pairs, some of them speed-augmented. Takes some minutes.
 
 use std::path::Path;
 use std::process::Command;
@@ -22,7 +22,7 @@ use umbracast::lidar::Assembler;
 use umbracast::track::Tracker;
 use umbracast::{Error, Health};
 use umbracast_eval::chain::{empty_frames, push};
-use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, hurried, pairs};
+use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs, speed_augmented};
 use umbracast_sim::scene::Scene;
 
 /// Height of the sensors, their distance from the middle, how many scenes, the first seed.
@@ -73,8 +73,8 @@ fn main() -> Result<(), Error> {
          From what the sensors saw of one body in one frame to where its axis stands, with the error's covariance: \
          {EVEN} + {ODD} inputs, {HIDDEN} hidden units, {OUTPUTS} outputs (`src/detect/axis.rs`).\n\n\
          Written by `cargo run --release -p umbracast-eval --example fit_bias`, commit {commit}.\n\n\
-         ## Data\n\nSimulated returns of {PEOPLE} people a scene, in turn: orca-03, mixed in a hurry, orca-06, pairs 0.6 m apart, \
-         mixed, orca-03 in a hurry.\n\n\
+         ## Data\n\nSimulated returns of {PEOPLE} people a scene, in turn: orca-03, mixed speed-augmented, orca-06, pairs 0.6 m apart, \
+         mixed, orca-03 speed-augmented.\n\n\
          {layouts}\n{} clusters; {EPOCHS} epochs, Adam, negative log-likelihood, mirrored at random, seed {SEED}.\n\n\
          ## Error of one frame\n\n\
          | | training | {} scenes of their own from seed {} |\n|---|---|---|\n\
@@ -147,11 +147,11 @@ fn crowd_of(scene: u64, seed: u64) -> Crowd {
     let drawn = |preset| circle_crossing(preset, PEOPLE, 12.5, seed);
     match scene % 6 {
         0 => drawn(Preset::Orca03),
-        1 => hurried(&drawn(Preset::Mixed), seed),
+        1 => speed_augmented(&drawn(Preset::Mixed), seed),
         2 => drawn(Preset::Orca06),
         3 => pairs(PEOPLE / 2, 0.6, 12.5, seed),
         4 => drawn(Preset::Mixed),
-        _ => hurried(&drawn(Preset::Orca03), seed),
+        _ => speed_augmented(&drawn(Preset::Orca03), seed),
     }
 }
 
