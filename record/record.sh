@@ -96,8 +96,9 @@ record reproduce-quick umbracast reproduce --quick --out "$scratch/quick"
 
 # The paper's experiment whole, training first: an hour on two cores. REPRODUCE names a folder in which an earlier try is gone on with.
 reproduced="${REPRODUCE:-$scratch/reproduce}"
-cargo build --release -p umbracast-cli --features train
-record reproduce umbracast reproduce --train --out "$reproduced"
+weights="$reproduced/training"
+record reproduce cargo run -q --release --manifest-path train/Cargo.toml -- --commit "$(git describe --always --dirty)" --out "$weights"
+more reproduce umbracast reproduce --weights "$weights/paper_lstm.safetensors" --out "$reproduced"
 sed -i "s|$reproduced|/tmp/reproduce|g" record/reproduce.txt
 cp "$reproduced/report.html" record/reproduce.html
 cp "$reproduced/boxes.svg" record/reproduce-boxes.svg

@@ -2,7 +2,7 @@
 //!
 //! One hidden layer of `tanh`. It is asked twice, for the view and for its mirror image, so that mirrored people stand
 //! at mirrored places. It ships as `models/body_axis.toml`; data and scores are in the card beside it. It was
-//! fitted on simulated returns by `cargo run --release -p umbracast-eval --example fit_bias`.
+//! fitted on simulated returns by `umbracast train axis`.
 
 use serde::Deserialize;
 

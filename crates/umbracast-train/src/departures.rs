@@ -9,9 +9,9 @@ use umbracast::geometry::DVec2;
 use umbracast::{Config, Error, Mode, STEPS};
 use umbracast_sim::crowd::{Crowd, Preset};
 
+use crate::SCENE_SEEDS;
 use crate::residual::{FitOptions, fit};
 use crate::samples::{Sample, SampleScene, collect, drawn_scenes, recorded_scene};
-use crate::train::SCENE_SEEDS;
 
 /// Taken in turn, as they are or speed-augmented.
 const DRAWN: [(Preset, bool); 6] = [

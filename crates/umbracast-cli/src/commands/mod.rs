@@ -9,5 +9,4 @@ pub mod inspect;
 pub mod reproduce;
 pub mod run;
 pub mod simulate;
-#[cfg(feature = "train")]
 pub mod train;

@@ -1,12 +1,9 @@
 //! Fits the predictor's body on recorded tuning scenes: which few numbers, put at people's true places and headings
-//! with height and gait as the tracker knows them, make the truth about who is blocked most likely? Prints every
-//! improvement and, at the end, the tables for `config/default.toml`.
-//!
-//! `cargo run --release -p umbracast-eval --example fit_body -- SIMULATED RUN [SIMULATED RUN...]`, directories that
-//! `umbracast simulate` wrote with tuning seeds (docs/CONVENTIONS.md), each with what `umbracast run` made of it.
+//! with height and gait as the tracker knows them, make the truth about who is blocked most likely? One number at a
+//! time is moved as long as it helps.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use umbracast::blockage::body::{self, Posture};
@@ -40,24 +37,24 @@ struct Case {
     blocked: bool,
 }
 
-fn main() -> Result<(), Error> {
+/// Fits the body on recordings, each a folder that `simulate` wrote and one that `run` made of it; returns the tables
+/// for `config/default.toml`. `told` is called with each improvement.
+///
+/// # Errors
+/// A table that cannot be read, or recordings in which nobody comes near a link.
+pub fn fit_body(recordings: &[(PathBuf, PathBuf)], mut told: impl FnMut(&str)) -> Result<String, Error> {
     let config = Config::default();
     let mut cases = Vec::new();
-    let directories: Vec<String> = std::env::args().skip(1).collect();
-    if directories.is_empty() || directories.len() % 2 == 1 {
-        return Err(Error::new("fit_body: expected pairs of directories, SIMULATED and RUN"));
+    for (simulated, run) in recordings {
+        cases.extend(cases_of(simulated, run, &config)?);
     }
-    for pair in directories.chunks_exact(2) {
-        cases.extend(cases_of(Path::new(&pair[0]), Path::new(&pair[1]), &config)?);
+    if cases.is_empty() {
+        return Err(Error::new("training: expected links with somebody near them, found none"));
     }
     let mut best = config.blockage.body.clone();
-    let start = loss(&best, &config.blockage, &cases);
-    println!(
-        "{} links, {start:.5}; F1 by access point {:.4?}",
-        cases.len(),
-        f1(&best, &config.blockage, &cases)
-    );
-    let mut least = start;
+    let mut least = loss(&best, &config.blockage, &cases);
+    let start = f1(&best, &config.blockage, &cases);
+    told(&format!("{} links, {least:.5}; F1 by access point {start:.4?}", cases.len()));
     let count = fields(&mut best).len();
     let mut steps = vec![0.008; count];
     while steps.iter().any(|&step| step > 0.001) {
@@ -70,24 +67,28 @@ fn main() -> Result<(), Error> {
                 if value < least {
                     (best, least, moved) = (trial, value, true);
                     let (name, field) = &fields(&mut best)[i];
-                    println!("{least:.5} {name} = {field:.4}");
+                    told(&format!("{least:.5} {name} = {field:.4}"));
                     break;
                 }
             }
             steps[i] *= if moved { 1.5 } else { 0.5 };
         }
     }
-    println!("F1 by access point {:.4?}", f1(&best, &config.blockage, &cases));
-    for slice in &best.slices {
-        println!(
-            "  {{ top = {:.3}, half_depth = {:.3}, half_width = {:.3}, ahead = {:.3} }},",
+    told(&format!("F1 by access point {:.4?}", f1(&best, &config.blockage, &cases)));
+    Ok(toml(&mut best))
+}
+
+/// The numbers as `config/default.toml` has them.
+fn toml(body: &mut BodyConfig) -> String {
+    let slices = body.slices.iter().map(|slice| {
+        format!(
+            "  {{ top = {:.3}, half_depth = {:.3}, half_width = {:.3}, ahead = {:.3} }},\n",
             slice.top, slice.half_depth, slice.half_width, slice.ahead
-        );
-    }
-    for (name, value) in fields(&mut best).into_iter().filter(|(name, _)| !name.starts_with("slice")) {
-        println!("{name} = {value:.4}");
-    }
-    Ok(())
+        )
+    });
+    let slices: String = slices.collect();
+    let others = fields(body).into_iter().filter(|(name, _)| !name.starts_with("slice"));
+    slices + &others.map(|(name, value)| format!("{name} = {value:.4}\n")).collect::<String>()
 }
 
 /// What may be turned.
