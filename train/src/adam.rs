@@ -52,8 +52,7 @@ impl Moments {
         let mut states = self.0.take().map(<[_; TENSORS]>::into_iter);
         let stepped = network.tensors.map(|weight| {
             let gradient = gradients.next().expect("as many tensors") * shortened;
-            let (weight, state) =
-                adam.step(rate, weight, gradient, states.as_mut().and_then(Iterator::next));
+            let (weight, state) = adam.step(rate, weight, gradient, states.as_mut().and_then(Iterator::next));
             (weight, state.expect("Adam keeps a state"))
         });
         self.0 = Some(stepped.each_ref().map(|(_, state)| state.clone()));

@@ -7,9 +7,9 @@
 
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
-use umbracast::geometry::DVec2;
 use rayon::prelude::*;
 use umbracast::STEPS;
+use umbracast::geometry::DVec2;
 use umbracast_train::windows::Window;
 
 use crate::adam::gradients;

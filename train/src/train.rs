@@ -9,10 +9,10 @@ use burn::tensor::Device;
 use umbracast::Error;
 use umbracast::STEPS;
 use umbracast_sim::crowd::Preset;
+use umbracast_train::SCENE_SEEDS;
 use umbracast_train::score::{Scores, score};
 use umbracast_train::weights::state;
 use umbracast_train::windows::{Noise, Ways, Window};
-use umbracast_train::SCENE_SEEDS;
 
 use crate::adam::Moments;
 use crate::card;

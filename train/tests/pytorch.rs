@@ -1,11 +1,11 @@
 //! The same numbers as PyTorch on the same weights (`fixtures/pytorch.py`), and as the runtime.
 
 use burn::tensor::{Device, Tensor, TensorData};
-use umbracast::geometry::DVec2;
 use safetensors::SafeTensors;
 use umbracast::STEPS;
 use umbracast::forecast::Weights;
 use umbracast::forecast::lstm::{OBSERVED_DISPLACEMENTS, RHO_LIMIT, SIGMA_FLOOR_M, SIGMA_SCALE_M};
+use umbracast::geometry::DVec2;
 use umbracast_train_lstm::adam::{Moments, gradients};
 use umbracast_train_lstm::network::{NAMES, Network, Size, loss};
 use umbracast_train_lstm::weights::{from_safetensors, to_safetensors};
@@ -80,8 +80,7 @@ fn the_runtime_rolls_out_as_the_trainer_does() {
     for (size, seed) in [(SIZE, 3), (Size { embedded: 64, units: 512 }, 4)] {
         let network = Network::fresh(size, seed, &device);
         let outputs = network.roll_out(&frames(&device)[..OBSERVED_DISPLACEMENTS], STEPS);
-        let weights =
-            Weights::from_safetensors(&to_safetensors(&[("", &network)], None).unwrap()).unwrap();
+        let weights = Weights::from_safetensors(&to_safetensors(&[("", &network)], None).unwrap()).unwrap();
         let all = numbers("displacements");
         let observed: Vec<[DVec2; OBSERVED_DISPLACEMENTS]> = (0..WINDOWS)
             .map(|window| {
