@@ -10,7 +10,7 @@ pub mod kalman;
 mod limb_phase;
 pub mod visibility;
 mod height;
-mod width;
+pub mod width;
 mod person;
 pub mod mixture;
 pub mod paper;

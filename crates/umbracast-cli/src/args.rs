@@ -58,8 +58,8 @@ pub enum Command {
     Inspect(Inspect),
     /// Print the commented default configuration, or check a file.
     Config(Config),
-    /// Fit the networks: the paper's LSTM, or the default forecast's residual.
-    #[cfg(feature = "train")]
+    /// Fit what the program learned from data: networks, body and thresholds.
+    #[command(subcommand)]
     Train(Train),
 }
 
@@ -317,14 +317,9 @@ pub struct Reproduce {
     pub replay: Replay,
     #[command(flatten)]
     pub site: SiteArgs,
-    /// Weights of the LSTM in place of the embedded ones.
+    /// Weights of the LSTM in place of the embedded ones; `train lstm` says how to fit them as the paper does.
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
-    /// Train the LSTM as the paper does (30 epochs) before anything else, and use it; weights, card and checkpoint
-    /// go to DIR/training.
-    #[cfg(feature = "train")]
-    #[arg(long, conflicts_with_all = ["weights", "shard", "merge"])]
-    pub train: bool,
     /// Run every n-th scene only, from the i-th on (i from 0), and write no report.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
@@ -356,55 +351,84 @@ pub struct Config {
 }
 
 /// What `train` fits.
-#[cfg(feature = "train")]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum What {
-    /// The paper's LSTM, on generated trajectories.
-    Lstm,
+#[derive(Debug, Subcommand)]
+pub enum Train {
+    /// The model of the body axis, on simulated returns. Takes some minutes.
+    Axis(TrainAxis),
     /// The default forecast's residual network, on tracks of simulated and replayed people.
-    Residual,
+    Residual(TrainResidual),
+    /// What extents of detections tell of how wide a body is, on tuning scenes; prints constants of the source.
+    Width(TrainScenes),
+    /// The body that stage 3 puts into the links' way, on recorded tuning scenes.
+    Body(TrainBody),
+    /// The probability from which on a link is called blocked, on tuning scenes.
+    Thresholds(TrainScenes),
+    /// The paper's LSTM: a program of its own, `train/`; this prints the command that builds and runs it.
+    Lstm(TrainLstm),
 }
 
-/// `train`
-#[cfg(feature = "train")]
+/// Where weights come from and go to.
 #[derive(Debug, Args)]
-pub struct Train {
-    /// What to fit.
-    #[arg(default_value = "lstm")]
-    pub what: What,
-    /// Passes over the data: 30 for the LSTM, 15 for the residual.
+pub struct Fitted {
+    /// The source's commit, for the card.
     #[arg(long)]
-    pub epochs: Option<usize>,
-    /// LSTM: windows drawn in an epoch.
-    #[arg(long, default_value_t = 16_384)]
-    pub windows: usize,
-    /// LSTM: windows in a batch; a whole number of batches makes an epoch.
-    #[arg(long, default_value_t = 128)]
-    pub batch: usize,
-    /// Scenes to train and validate on: 500 for the LSTM, 36 for the residual.
-    #[arg(long)]
-    pub scenes: Option<u64>,
+    pub commit: Option<String>,
+    /// Where the fitted file and its card go.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// `train axis`
+#[derive(Debug, Args)]
+pub struct TrainAxis {
+    #[command(flatten)]
+    pub fitted: Fitted,
+}
+
+/// `train residual`
+#[derive(Debug, Args)]
+pub struct TrainResidual {
+    /// Passes over the data.
+    #[arg(long, default_value_t = 15, value_name = "N")]
+    pub epochs: usize,
+    /// Drawn scenes to train on.
+    #[arg(long, default_value_t = 36, value_name = "N")]
+    pub scenes: u64,
     /// Seed of the first scene; 1 to 99999.
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     pub first_scene: u64,
-    /// LSTM: the crowds, taken in turn: orca-03, orca-06, mixed, pairs.
-    #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
-    pub preset: Vec<Preset>,
-    /// Residual: recorded people to learn from beside the drawn crowds.
+    /// Recorded people to learn from beside the drawn crowds.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub trajectories: Vec<PathBuf>,
     #[command(flatten)]
     pub replay: Replay,
-    /// Seed of the first weights and of the windows.
+    /// Seed of the first weights and of the samples' order.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// The source's commit, for the card.
-    #[arg(long)]
-    pub commit: Option<String>,
-    /// LSTM: noise as a tracker makes it, in place of clean positions.
-    #[arg(long)]
-    pub noise: bool,
-    /// Where weights, card and checkpoints go; a checkpoint found there is continued.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
+    #[command(flatten)]
+    pub fitted: Fitted,
+}
+
+/// `train body`
+#[derive(Debug, Args)]
+pub struct TrainBody {
+    /// Folders in pairs: what `simulate` wrote with tuning seeds (100000 to 199999), and what `run` made of it.
+    #[arg(required = true, value_names = ["SIMULATED", "RUN"], num_args = 2..)]
+    pub recordings: Vec<PathBuf>,
+}
+
+/// `train width`, `train thresholds`
+#[derive(Debug, Args)]
+pub struct TrainScenes {
+    /// How many scenes, of several crowds in turn.
+    #[arg(long, default_value_t = 12, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub scenes: u32,
+}
+
+/// `train lstm`
+#[derive(Debug, Args)]
+pub struct TrainLstm {
+    /// What that program understands.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENT")]
+    pub arguments: Vec<String>,
 }

@@ -45,7 +45,6 @@ fn main() -> ExitCode {
         Command::Reproduce(args) => commands::reproduce::run(&args, &cli.common),
         Command::Inspect(args) => commands::inspect::run(&args, &cli.common),
         Command::Config(args) => commands::config::run(&args),
-        #[cfg(feature = "train")]
         Command::Train(args) => commands::train::run(&args, &cli.common),
     };
     match result {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Mode};
 
-/// The paper's LSTM as `umbracast train` made it; its card lies beside the file.
+/// The paper's LSTM as `umbracast-train-lstm` made it; its card lies beside the file.
 const PAPER_LSTM: &[u8] = include_bytes!("../../../models/paper_lstm.safetensors");
 /// Where it comes from.
 pub const PAPER_LSTM_CARD: &str = include_str!("../../../models/paper_lstm.md");

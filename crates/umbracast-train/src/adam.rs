@@ -1,8 +1,5 @@
-//! Adam (Kingma and Ba, 2015, Algorithm 1), with gradients clipped by their common length.
-
-use burn::tensor::Gradients;
-
-use crate::network::{Network, TENSORS};
+//! Adam (Kingma and Ba, 2015, Algorithm 1) by hand: a dozen lines, where the framework that has it brings five
+//! hundred packages.
 
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
@@ -10,57 +7,58 @@ const EPSILON: f64 = 1e-8;
 
 /// Running moments of every weight.
 #[derive(Debug, Clone)]
-pub struct Adam<const N: usize = TENSORS> {
+pub struct Adam {
     /// Of the gradients.
-    pub first: Network<N>,
+    first: Vec<f64>,
     /// Of their squares.
-    pub second: Network<N>,
+    second: Vec<f64>,
     /// Updates so far.
-    pub updates: u64,
+    updates: i32,
 }
 
-impl<const N: usize> Adam<N> {
-    /// Before the first update.
-    pub fn new(network: &Network<N>) -> Self {
-        let zero = Network { tensors: network.tensors.each_ref().map(|t| t.zeros_like()) };
-        Self { first: zero.clone(), second: zero, updates: 0 }
+impl Adam {
+    /// Before the first update of so many weights.
+    pub fn new(weights: usize) -> Self {
+        Self { first: vec![0.0; weights], second: vec![0.0; weights], updates: 0 }
     }
 
-    /// The network after one step against its gradients, which are shortened to `longest` where they are longer.
-    pub fn update(
+    /// Updates so far.
+    pub fn updates(&self) -> i32 {
+        self.updates
+    }
+
+    /// One step of the weights against their gradient, both in one order.
+    pub fn update<'a>(
         &mut self,
-        network: Network<N>,
-        gradients: Network<N>,
+        weights: impl Iterator<Item = &'a mut f64>,
+        gradient: impl Iterator<Item = f64>,
         rate: f64,
-        longest: f64,
-    ) -> Network<N> {
+    ) {
         self.updates += 1;
-        let squares = gradients.tensors.iter().map(|g| g.clone().square().sum().into_scalar::<f32>());
-        let length = squares.map(f64::from).sum::<f64>().sqrt();
-        let shortened = if length > longest { longest / length } else { 1.0 };
-        let corrected = |beta: f64| 1.0 - beta.powf(self.updates as f64);
-        let step = rate / corrected(BETA_1);
-        let root = corrected(BETA_2).sqrt();
-        let Network { tensors } = gradients;
-        let mut moments = self.first.tensors.iter_mut().zip(&mut self.second.tensors);
-        let mut tensors = tensors.into_iter();
-        Network {
-            tensors: network.tensors.map(|weight| {
-                let ((first, second), gradient) = (moments.next().unwrap(), tensors.next().unwrap());
-                let gradient = gradient * shortened;
-                *first = first.clone() * BETA_1 + gradient.clone() * (1.0 - BETA_1);
-                *second = second.clone() * BETA_2 + gradient.square() * (1.0 - BETA_2);
-                weight - first.clone() / (second.clone().sqrt() / root + EPSILON) * step
-            }),
+        let (early_1, early_2) = (1.0 - BETA_1.powi(self.updates), 1.0 - BETA_2.powi(self.updates));
+        let moments = self.first.iter_mut().zip(&mut self.second);
+        for ((weight, slope), (first, second)) in weights.zip(gradient).zip(moments) {
+            *first += (1.0 - BETA_1) * (slope - *first);
+            *second += (1.0 - BETA_2) * (slope * slope - *second);
+            *weight -= rate * (*first / early_1) / ((*second / early_2).sqrt() + EPSILON);
         }
     }
 }
 
-/// The gradient of every weight of a tracked network.
-pub fn gradients<const N: usize>(network: &Network<N>, mut gradients: Gradients) -> Network<N> {
-    Network {
-        tensors: network.tensors.each_ref().map(|weight| {
-            weight.grad_remove(&mut gradients).unwrap_or_else(|| weight.clone().inner().zeros_like())
-        }),
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_updates_are_those_worked_out_by_hand() {
+        // Slopes 1, -2 and 0.5: m = 0.1, -0.11, -0.049 and v = 0.001, 0.004999, 0.005244001.
+        let (mut adam, mut weight, mut expected) = (Adam::new(1), [1.0], 1.0);
+        let moments = [(1.0, 0.1, 0.001), (-2.0, -0.11, 0.004_999), (0.5, -0.049, 0.005_244_001)];
+        for (update, (slope, m, v)) in (1..).zip(moments) {
+            adam.update(weight.iter_mut(), [slope].into_iter(), 0.1);
+            let early = |beta: f64| 1.0 - beta.powi(update);
+            expected -= 0.1 * (m / early(0.9)) / ((v / early(0.999)).sqrt() + 1e-8);
+            assert!((weight[0] - expected).abs() < 1e-12, "update {update}: {weight:?}, expected {expected}");
+        }
     }
 }

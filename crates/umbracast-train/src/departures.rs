@@ -9,11 +9,11 @@ use umbracast::geometry::DVec2;
 use umbracast::{Config, Error, Mode, STEPS};
 use umbracast_sim::crowd::{Crowd, Preset};
 
+use crate::SCENE_SEEDS;
 use crate::residual::{FitOptions, fit};
 use crate::samples::{Sample, SampleScene, collect, drawn_scenes, recorded_scene};
-use crate::train::SCENE_SEEDS;
 
-/// Taken in turn, as they are or in a hurry.
+/// Taken in turn, as they are or speed-augmented.
 const DRAWN: [(Preset, bool); 6] = [
     (Preset::Mixed, false),
     (Preset::Orca03, false),
@@ -32,7 +32,7 @@ const PEOPLE: usize = 10;
 pub struct ResidualOptions {
     /// Seeds of the drawn scenes, within [`SCENE_SEEDS`].
     pub scenes: Range<u64>,
-    /// Recorded people, each file by its name: walked as they did and once in a hurry.
+    /// Recorded people, each file by its name: walked as they did and once speed-augmented.
     pub recorded: Vec<(String, Crowd)>,
     /// How long the network is fitted.
     pub fit: FitOptions,
@@ -144,11 +144,11 @@ fn card(options: &ResidualOptions, samples: usize, losses: &[f64], scores: &[(&s
          numbers) and give the way's departure from a constant velocity and the spread of its errors.\n\n\
          - Tensors: `first`, `second`, `head`, PyTorch's layout, f32.\n\
          - Data: tracks that the default mode made of simulated returns, with the true ways of their people. Drawn \
-         crowds of {people} people on the default circle, scene seeds {first} to {last}, in turn: {drawn}. In a hurry: the \
+         crowds of {people} people on the default circle, scene seeds {first} to {last}, in turn: {drawn}. Speed-augmented: the \
          same ways on a clock that stands, runs up to 1.9 times as fast and slows down, and they wander off their \
-         line (`hurry.rs`). Every third scene has its sensors up to 3 m lower or 1 m higher. The crowds are this \
+         line (`speed_augmentation.rs`). Every third scene has its sensors up to 3 m lower or 1 m higher. The crowds are this \
          project's own.\n\
-         - Recorded people replayed with the same sensors, as they walked and in a hurry: {recorded}. PedPy's \
+         - Recorded people replayed with the same sensors, as they walked and speed-augmented: {recorded}. PedPy's \
          files (traj_UNI_CORR_500_01) and Madras' (Topview) are under the MIT licences of their repositories \
          (PedestrianDynamics/PedPy, PedestrianDynamics/madras-data-app). \
          The circle-antipode and LogicTronix people are never learned from.\n\
@@ -164,7 +164,11 @@ fn card(options: &ResidualOptions, samples: usize, losses: &[f64], scores: &[(&s
         first = options.scenes.start,
         last = options.scenes.end - 1,
         drawn = DRAWN
-            .map(|(preset, hurry)| format!("{}{}", preset.name(), if hurry { " in a hurry" } else { "" }))
+            .map(|(preset, augmented)| format!(
+                "{}{}",
+                preset.name(),
+                if augmented { " speed-augmented" } else { "" }
+            ))
             .join(", "),
         recorded = if recorded.is_empty() { "none".to_owned() } else { recorded.join(", ") },
         seed = options.fit.seed,

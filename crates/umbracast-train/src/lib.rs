@@ -1,21 +1,24 @@
-//! Fits the forecasters.
+//! Fits what the program learned from data: each fit gives a file, or lines for a file, and a card that says where
+//! they come from.
 //!
-//! The paper's LSTM: windows are cut from ORCA ways, the network is rolled out on them, and Adam follows the
-//! gradient of the paper's loss. The default's residual network: scenes are run through stage 1, and it learns where
-//! people went from what was seen of them. What comes out is a weights file that the runtime reads, and a card that
-//! says where it comes from.
+//! Small networks have their gradients written out here: the body axis (stage 1), the default forecast's residual
+//! (stage 2). The predictor's body and the thresholds (stage 3) are searched for. The paper's LSTM takes a framework
+//! and is fitted in `train/`, a workspace of its own; what it learns from and how it is scored needs none and is
+//! here, so that every test run scores the weights that ship.
 
-pub mod windows;
-pub mod network;
 pub mod adam;
-pub mod gradient;
 pub mod weights;
-pub mod score;
-pub mod card;
-pub mod train;
+pub mod axis;
 pub mod samples;
 pub mod residual;
 pub mod departures;
+pub mod width;
+pub mod body;
+pub mod thresholds;
+pub mod windows;
+pub mod score;
 
-pub use train::{Processor, Progress, TrainOptions, TrainedModel, train};
 pub use windows::Noise;
+
+/// Seeds that training may draw scenes from (docs/CONVENTIONS.md).
+pub const SCENE_SEEDS: std::ops::Range<u64> = 1..100_000;

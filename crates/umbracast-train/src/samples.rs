@@ -15,7 +15,7 @@ use umbracast_eval::chain::{empty_frames, note_truth, push};
 use umbracast_eval::matching::match_scene;
 use umbracast_eval::scene::{SceneTruth, TruthIndex};
 use umbracast_io::rows;
-use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, hurried, mixed};
+use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, mixed, speed_augmented};
 use umbracast_sim::scene::Scene;
 
 /// A track at a frame, and its person's way from there.
@@ -39,7 +39,7 @@ pub struct SampleScene {
     pub raised_m: f64,
 }
 
-/// Scenes of a crowd: presets as they are, and the ways of some in a hurry. Seed i of `seeds` is scene i.
+/// Scenes of a crowd: presets as they are, and some of them speed-augmented. Seed i of `seeds` is scene i.
 pub fn drawn_scenes(
     presets: &[(Preset, bool)],
     people: usize,
@@ -47,19 +47,19 @@ pub fn drawn_scenes(
 ) -> Vec<SampleScene> {
     const CIRCLE_M: f64 = umbracast_eval::chain::CIRCLE_M;
     let scene = |seed: u64| {
-        let (preset, hurry) = presets[seed as usize % presets.len()];
+        let (preset, augmented) = presets[seed as usize % presets.len()];
         let crowd = match preset {
             Preset::Mixed => mixed::crowd(people, CIRCLE_M, seed),
             _ => circle_crossing(preset, people, CIRCLE_M, seed),
         };
-        recorded_scene(crowd, seed, hurry)
+        recorded_scene(crowd, seed, augmented)
     };
     seeds.map(scene).collect()
 }
 
-/// A scene of given ways, as they are or in a hurry. Every third scene has its sensors lower or higher.
-pub fn recorded_scene(crowd: Crowd, seed: u64, hurry: bool) -> SampleScene {
-    let crowd = if hurry { hurried(&crowd, seed) } else { crowd };
+/// A scene of given ways, as they are or speed-augmented. Every third scene has its sensors lower or higher.
+pub fn recorded_scene(crowd: Crowd, seed: u64, augmented: bool) -> SampleScene {
+    let crowd = if augmented { speed_augmented(&crowd, seed) } else { crowd };
     let mut rng = Pcg64::seed_from_u64(seed);
     let raised_m = if rng.random::<f64>() < 1.0 / 3.0 { rng.random_range(-3.0..1.0) } else { 0.0 };
     SampleScene { crowd, seed, raised_m }

@@ -1,8 +1,8 @@
 //! How far off the forecasts of a network are, run as the pipeline runs it.
 
-use glam::DVec2;
 use umbracast::STEPS;
 use umbracast::forecast::Weights;
+use umbracast::geometry::DVec2;
 
 use crate::windows::Window;
 

@@ -1,10 +1,10 @@
 //! Windows of ten observed and nine coming positions, drawn from simulated crowds without bodies or sensors.
 
-use glam::DVec2;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use umbracast::forecast::lstm::OBSERVED_DISPLACEMENTS;
+use umbracast::geometry::DVec2;
 use umbracast::track::OBSERVED;
 use umbracast::{STEP_NS, STEPS};
 use umbracast_sim::crowd::{Preset, circle_crossing};

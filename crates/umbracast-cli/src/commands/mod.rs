@@ -10,5 +10,4 @@ pub mod inspect;
 pub mod reproduce;
 pub mod run;
 pub mod simulate;
-#[cfg(feature = "train")]
 pub mod train;

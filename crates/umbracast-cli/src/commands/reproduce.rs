@@ -25,7 +25,7 @@ const SCENES: &str = "scenes";
 /// Runs what is missing, and reports unless this is a shard.
 pub fn run(args: &Reproduce, common: &Common) -> Result<Ending, Error> {
     let watch = Stopwatch::start();
-    let network = network(args, common)?;
+    let network = network(args)?;
     let configs = Mode::ALL
         .into_iter()
         .map(|mode| setup::config(mode, args.site.site.as_deref()))
@@ -106,30 +106,12 @@ struct Network {
     card: Option<String>,
 }
 
-fn network(args: &Reproduce, common: &Common) -> Result<Network, Error> {
-    if let Some(trained) = trained(args, common)? {
-        return Ok(trained);
-    }
+fn network(args: &Reproduce) -> Result<Network, Error> {
     let card = match &args.weights {
         None => Some(setup::PAPER_LSTM_CARD.to_owned()),
         Some(file) => setup::read_text(&file.with_extension("md")).ok(),
     };
     Ok(Network { weights: setup::weights_file(args.weights.as_deref())?, card })
-}
-
-#[cfg(feature = "train")]
-fn trained(args: &Reproduce, common: &Common) -> Result<Option<Network>, Error> {
-    if !args.train {
-        return Ok(None);
-    }
-    let folder = args.out.join("training");
-    let model = super::train::fit(umbracast_train::TrainOptions::paper(), &folder, common)?;
-    Ok(Some(Network { weights: Cow::Owned(model.safetensors), card: Some(model.card) }))
-}
-
-#[cfg(not(feature = "train"))]
-fn trained(_: &Reproduce, _: &Common) -> Result<Option<Network>, Error> {
-    Ok(None)
 }
 
 /// What a reader must know beside the figures.
@@ -178,8 +160,6 @@ fn command(args: &Reproduce, scenes: usize) -> String {
     command += &format!(" --seed {seed}");
     args.site.site.iter().for_each(|file| command += &named("--site", file));
     args.weights.iter().for_each(|file| command += &named("--weights", file));
-    #[cfg(feature = "train")]
-    command.push_str(if args.train { " --train" } else { "" });
     command
 }
 

@@ -1,89 +1,125 @@
-//! `train`: fits the paper's LSTM on generated trajectories, or the residual network on the pipeline's tracks.
+//! `train`: fits what the program learned from data.
 
-use std::path::Path;
+use std::path::PathBuf;
 
+use indicatif::ProgressBar;
 use umbracast::Error;
+use umbracast_train::axis::train_axis;
+use umbracast_train::body::fit_body;
 use umbracast_train::departures::{ResidualOptions, train_residual};
 use umbracast_train::residual::FitOptions;
-use umbracast_train::{Noise, Progress, TrainOptions, TrainedModel, train};
+use umbracast_train::thresholds::tune_thresholds;
+use umbracast_train::width::fit_width;
 
-use crate::args::{Common, Train, What};
+use crate::args::{Common, Fitted, Train, TrainBody, TrainLstm, TrainResidual, TrainScenes};
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
-use crate::{Ending, crowds, setup};
+use crate::{Ending, crowds, say, setup};
 
-/// What a tracker adds to positions: up to so much that is new in each frame, and so much that lasts.
-const TRACKER_NOISE: Noise = Noise { white_m: 0.12, lasting_m: 0.05 };
-
-/// Writes weights and card.
+/// Writes a fitted file and its card, or prints lines for the configuration.
 pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {
-    let watch = Stopwatch::start();
-    let card = match args.what {
-        What::Lstm => lstm(args, common)?,
-        What::Residual => setup::with_threads(common.threads, || residual(args, common))??,
-    };
-    let summary = RunJson::new("train", &watch).with("what", format!("{:?}", args.what));
-    summary.write(&args.out)?;
-    summary.print(common, &card);
+    setup::with_threads(common.threads, || match args {
+        Train::Axis(args) => with_card(&args.fitted, common, "axis", || axis(&args.fitted, common)),
+        Train::Residual(args) => with_card(&args.fitted, common, "residual", || residual(args, common)),
+        Train::Body(args) => body(args, common),
+        Train::Width(args) => printed(args, "scenes seen", common, |scenes, done| fit_width(scenes, done)),
+        Train::Thresholds(args) => {
+            printed(args, "scenes run", common, |scenes, done| tune_thresholds(scenes, done))
+        }
+        Train::Lstm(args) => Err(elsewhere(args)),
+    })??;
     Ok(Ending::Done)
 }
 
-fn lstm(args: &Train, common: &Common) -> Result<String, Error> {
-    let mut options = TrainOptions {
-        seed: args.seed,
-        scenes: args.first_scene..args.first_scene + args.scenes.unwrap_or(500),
-        presets: args.preset.clone(),
-        epochs: args.epochs.unwrap_or(30),
-        windows_per_epoch: args.windows,
-        batch: args.batch,
-        commit: args.commit.clone().unwrap_or_default(),
-        ..TrainOptions::paper()
-    };
-    if args.noise {
-        options.noise = TRACKER_NOISE;
-    }
-    Ok(fit(options, &args.out, common)?.card)
+/// Makes the folder, fits, prints the card that the fit returns.
+fn with_card(
+    fitted: &Fitted,
+    common: &Common,
+    what: &str,
+    fit: impl FnOnce() -> Result<String, Error>,
+) -> Result<(), Error> {
+    let watch = Stopwatch::start();
+    setup::make_dir(&fitted.out)?;
+    let card = fit()?;
+    let summary = RunJson::new("train", &watch).with("what", what);
+    summary.write(&fitted.out)?;
+    summary.print(common, &card);
+    Ok(())
 }
 
-fn residual(args: &Train, common: &Common) -> Result<String, Error> {
-    setup::make_dir(&args.out)?;
-    let end = args.first_scene + args.scenes.unwrap_or(36);
+fn axis(fitted: &Fitted, common: &Common) -> Result<String, Error> {
+    let progress = bar(0, "scenes seen", common.quiet);
+    let (model, card) = train_axis(fitted.commit.as_deref().unwrap_or_default(), advance(&progress))?;
+    progress.finish_and_clear();
+    setup::write(&fitted.out.join("body_axis.toml"), model)?;
+    setup::write(&fitted.out.join("body_axis.md"), &card)?;
+    Ok(card)
+}
+
+fn residual(args: &TrainResidual, common: &Common) -> Result<String, Error> {
+    let end = args.first_scene.saturating_add(args.scenes);
     let (recorded, _) = crowds::recorded_scenes(&args.trajectories, &args.replay, end)?;
     let options = ResidualOptions {
         scenes: args.first_scene..end,
         recorded: recorded.into_iter().map(|scene| (scene.group.clone(), scene.crowd())).collect(),
-        fit: FitOptions { seed: args.seed, epochs: args.epochs.unwrap_or(15) },
-        commit: args.commit.clone().unwrap_or_default(),
+        fit: FitOptions { seed: args.seed, epochs: args.epochs },
+        commit: args.fitted.commit.clone().unwrap_or_default(),
     };
     let progress = bar(0, "scenes seen", common.quiet);
-    let scene_done = |done: usize, all: usize| {
-        progress.set_length(all as u64);
-        progress.set_position(done as u64);
-    };
     let epoch_done = |loss| progress.set_message(format!("loss {loss:.3}"));
-    let (weights, card) = train_residual(&options, scene_done, epoch_done)?;
+    let (weights, card) = train_residual(&options, advance(&progress), epoch_done)?;
     progress.finish_and_clear();
-    setup::write(&args.out.join("residual.safetensors"), weights)?;
-    setup::write(&args.out.join("residual.md"), &card)?;
+    setup::write(&args.fitted.out.join("residual.safetensors"), weights)?;
+    setup::write(&args.fitted.out.join("residual.md"), &card)?;
     Ok(card)
 }
 
-/// Trains, or goes on from the checkpoint in `folder`, and writes weights and card there.
-pub fn fit(options: TrainOptions, folder: &Path, common: &Common) -> Result<TrainedModel, Error> {
-    setup::make_dir(folder)?;
-    let options = TrainOptions { checkpoint: Some(folder.join("paper_lstm.checkpoint")), ..options };
-    let batches = options.epochs * (options.windows_per_epoch / options.batch.max(1));
-    let progress = bar(batches as u64, "training", common.quiet);
-    let mut told = |now: &Progress| {
-        progress.set_position((now.epoch * now.batches + now.batch) as u64);
-        progress.set_message(format!("loss {:.3}", now.training_loss));
-        if let Some(loss) = now.validation_loss {
-            progress.println(format!("epoch {} of {}: validation {loss:.4}", now.epoch + 1, now.epochs));
+fn body(args: &TrainBody, common: &Common) -> Result<(), Error> {
+    let recordings: Vec<(PathBuf, PathBuf)> =
+        args.recordings.chunks_exact(2).map(|pair| (pair[0].clone(), pair[1].clone())).collect();
+    if args.recordings.len() != 2 * recordings.len() {
+        let found = args.recordings.len();
+        return Err(Error::new(format!(
+            "train body: expected folders in pairs, SIMULATED and RUN, found {found}"
+        )));
+    }
+    let improved = |story: &str| {
+        if !common.quiet {
+            eprintln!("{story}");
         }
     };
-    let model = setup::with_threads(common.threads, || train(&options, &mut told))??;
+    say::text(&fit_body(&recordings, improved)?);
+    Ok(())
+}
+
+/// A fit on scenes whose result is printed, for the source or the configuration.
+fn printed(
+    args: &TrainScenes,
+    what: &str,
+    common: &Common,
+    fit: impl FnOnce(usize, &(dyn Fn(usize, usize) + Sync)) -> Result<String, Error>,
+) -> Result<(), Error> {
+    let progress = bar(0, what, common.quiet);
+    let text = fit(args.scenes as usize, &advance(&progress))?;
     progress.finish_and_clear();
-    setup::write(&folder.join("paper_lstm.safetensors"), &model.safetensors)?;
-    setup::write(&folder.join("paper_lstm.md"), &model.card)?;
-    Ok(model)
+    say::line(text);
+    Ok(())
+}
+
+/// Scenes done, of all.
+fn advance(progress: &ProgressBar) -> impl Fn(usize, usize) + Sync {
+    |done, all| {
+        progress.set_length(all as u64);
+        progress.set_position(done as u64);
+    }
+}
+
+/// The framework of the LSTM stays out of this program.
+fn elsewhere(args: &TrainLstm) -> Error {
+    let arguments =
+        if args.arguments.is_empty() { "--out weights".to_owned() } else { args.arguments.join(" ") };
+    Error::new(format!(
+        "the paper's LSTM is fitted by a program of its own, for its framework takes minutes to build; in the \
+         sources: cargo run --release --manifest-path train/Cargo.toml -- {arguments}"
+    ))
 }

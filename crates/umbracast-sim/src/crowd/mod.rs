@@ -2,7 +2,7 @@
 
 pub mod orca;
 pub mod circle;
-mod hurry;
+mod speed_augmentation;
 pub mod mixed;
 pub mod replay;
 
@@ -12,9 +12,9 @@ use umbracast::Error;
 use umbracast::geometry::DVec2;
 
 pub use circle::circle_crossing;
-pub use hurry::hurried;
 pub use mixed::pairs;
 pub use replay::{Recorded, replay};
+pub use speed_augmentation::speed_augmented;
 
 /// One person's way, sampled evenly.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,23 +1,23 @@
-//! Fits the numbers of `umbracast::track::girth` on simulated people: what the extents of detections in free sight tell
-//! of how wide a person's trunk is for the height. Prints them in the order of the source.
-//!
-//! `cargo run --release -p umbracast-eval --example fit_girth -- [SCENES]`, tuning seeds from 135,000 on.
+//! Fits the numbers of `umbracast::track::width` on simulated people: what the extents of detections in free sight tell
+//! of how wide a person's trunk is for the height.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use umbracast::config::Config;
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::lidar::Assembler;
 use umbracast::track::Track;
-use umbracast::track::girth::share;
 use umbracast::track::visibility::{Body, Visibility};
+use umbracast::track::width::share;
 use umbracast::{Error, Health, Pipeline};
 use umbracast_eval::chain::{empty_frames, push};
 use umbracast_sim::body::Walker;
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 
+/// Tuning seeds only (docs/CONVENTIONS.md).
 const FIRST_SEED: u64 = 135_000;
 /// A track nearer than this to a person is that person's.
 const OWN_M: f64 = 0.3;
@@ -30,22 +30,32 @@ type Seen = (f64, f64);
 /// Logarithm of the trunk's width over the height, and every frame.
 type Person = (f64, Vec<Seen>);
 
-fn main() -> Result<(), Error> {
-    let scenes: u64 = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(12);
-    let people: Result<Vec<Vec<Person>>, Error> = (0..scenes).into_par_iter().map(watch).collect();
+/// Watches so many scenes and returns the constants in the order of the source. `scene_done` is called after each scene,
+/// from any thread.
+///
+/// # Errors
+/// A sensor that cannot be simulated.
+pub fn fit_width(scenes: usize, scene_done: impl Fn(usize, usize) + Sync) -> Result<String, Error> {
+    let done = AtomicUsize::new(0);
+    let counted = |scene: usize| {
+        let people = watch(scene as u64);
+        scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, scenes);
+        people
+    };
+    let people: Result<Vec<Vec<Person>>, Error> = (0..scenes).into_par_iter().map(counted).collect();
     let people: Vec<Person> = people?.concat().into_iter().filter(|(_, seen)| seen.len() >= 60).collect();
     let all: Vec<Seen> = people.iter().flat_map(|(_, seen)| seen.iter().copied()).collect();
     let (per_mps, standing) = line(all.iter().map(|&(share, speed)| (speed, share)));
     let off = |&(share, speed): &Seen| share - standing - per_mps * speed;
     let mean_off = |seen: &[Seen]| seen.iter().map(off).sum::<f64>() / seen.len() as f64;
-    let mean_girth = people.iter().map(|p| p.0).sum::<f64>() / people.len() as f64;
-    let prior = root_mean(people.iter().map(|p| p.0 - mean_girth));
-    let (per_girth, base) = line(people.iter().map(|(girth, seen)| (girth - mean_girth, mean_off(seen))));
+    let mean_width = people.iter().map(|p| p.0).sum::<f64>() / people.len() as f64;
+    let prior = root_mean(people.iter().map(|p| p.0 - mean_width));
+    let (per_scale, base) = line(people.iter().map(|(width, seen)| (width - mean_width, mean_off(seen))));
     // Errors of means over so many frames at the beginning: a variance that lasts and one that falls.
     let error2 = |frames: usize| {
-        let error = |(girth, seen): &Person| {
+        let error = |(width, seen): &Person| {
             let first = &seen[..frames.min(seen.len())];
-            mean_off(first) - base - per_girth * (girth - mean_girth)
+            mean_off(first) - base - per_scale * (width - mean_width)
         };
         root_mean(people.iter().map(error)).powi(2)
     };
@@ -53,14 +63,14 @@ fn main() -> Result<(), Error> {
     let share = few as f64 / many as f64;
     let lasting2 = ((error2(many) - share * error2(few)) / (1.0 - share)).max(0.0);
     let frame2 = (error2(few) - lasting2) * few as f64;
-    println!("{} people, {} frames", people.len(), all.len());
-    println!("PRIOR_SIGMA {prior:.3}\nSHARE_STANDING {standing:.3}\nSHARE_PER_MPS {per_mps:.3}");
-    println!(
-        "SHARE_PER_GIRTH {per_girth:.3}\nFRAME_SIGMA {:.3}\nLASTING_SIGMA {:.4}",
+    Ok(format!(
+        "{} people, {} frames\nPRIOR_SIGMA {prior:.3}\nSHARE_STANDING {standing:.3}\nSHARE_PER_MPS {per_mps:.3}\n\
+         SHARE_PER_SCALE {per_scale:.3}\nFRAME_SIGMA {:.3}\nLASTING_SIGMA {:.4}",
+        people.len(),
+        all.len(),
         frame2.sqrt(),
         lasting2.sqrt()
-    );
-    Ok(())
+    ))
 }
 
 /// Everybody in a scene.
@@ -87,7 +97,7 @@ fn watch(scene: u64) -> Result<Vec<Person>, Error> {
                 let nearest = outcome
                     .detections
                     .iter()
-                    .filter(|d| d.whole && d.points == track.points)
+                    .filter(|d| d.full_body && d.points == track.points)
                     .min_by(|a, b| away(a.position_m, track).total_cmp(&away(b.position_m, track)));
                 let own = walkers.iter().position(|walker| {
                     walker.state_at(frame.time_ns).is_some_and(|s| away(s.position_m, track) < OWN_M)
@@ -98,7 +108,7 @@ fn watch(scene: u64) -> Result<Vec<Person>, Error> {
             }
         }
     }
-    Ok(seen.into_iter().map(|(own, seen)| (girth(&walkers[own]), seen)).collect())
+    Ok(seen.into_iter().map(|(own, seen)| (trunk_width(&walkers[own]), seen)).collect())
 }
 
 fn away(position_m: DVec2, track: &Track) -> f64 {
@@ -106,7 +116,7 @@ fn away(position_m: DVec2, track: &Track) -> f64 {
 }
 
 /// Logarithm of the width of the trunk, arms included, over the height of a body that stands upright.
-fn girth(walker: &Walker) -> f64 {
+fn trunk_width(walker: &Walker) -> f64 {
     let mut vertices: Vec<DVec3> = Vec::new();
     walker.upright_mesh(DVec2::ZERO, 0.0, &mut vertices);
     let height_m = vertices.iter().fold(0.0, |top: f64, v| top.max(v.z));
@@ -126,4 +136,15 @@ fn line(points: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
 fn root_mean(errors: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = errors.fold((0.0, 0.0), |(sum, n), e| (sum + e * e, n + 1.0));
     (sum / n).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_through_points_on_it_is_that_line() {
+        let (slope, base) = line([0.0, 1.0, 3.0].map(|x| (x, 2.0 * x - 0.5)).into_iter());
+        assert!((slope - 2.0).abs() < 1e-12 && (base + 0.5).abs() < 1e-12, "{slope} {base}");
+    }
 }

@@ -5,8 +5,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use umbracast::forecast::Weights;
-use umbracast_train::network::Size;
-use umbracast_train::{TrainOptions, TrainedModel, train};
+use umbracast_train_lstm::network::Size;
+use umbracast_train_lstm::{TrainOptions, TrainedModel, train};
 
 fn small(checkpoint: Option<PathBuf>) -> TrainOptions {
     TrainOptions {

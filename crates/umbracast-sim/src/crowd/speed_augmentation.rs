@@ -1,6 +1,7 @@
-//! Known ways walked otherwise: the whole crowd's clock runs fast, slows down, stands and sets off again, everybody
-//! sways with the stride and wanders a little off the way. Simulated people never run or brake as people in a hurry
-//! do, and recorded ones are few; of a crowd that keeps apart, whoever walks by the same clock keeps apart too.
+//! Speed augmentation, known ways walked otherwise: the whole crowd's clock runs fast, slows down, stands and sets
+//! off again, everybody sways with the stride and wanders a little off the way. Simulated people never run or brake
+//! as hurried people do, and recorded ones are few; of a crowd that keeps apart, whoever walks by the same clock
+//! keeps apart too.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -33,8 +34,8 @@ const WAVES: usize = 4;
 /// Who stops comes to rest, and who sets off begins to sway and wander, with this time constant.
 const SETTLE_S: f64 = 0.15;
 
-/// The crowd in a hurry. Nobody arrives: who reached the goal stands there.
-pub fn hurried(crowd: &Crowd, seed: u64) -> Crowd {
+/// The crowd on such a clock. Nobody arrives: who reached the goal stands there.
+pub fn speed_augmented(crowd: &Crowd, seed: u64) -> Crowd {
     let mut rng = Pcg64::seed_from_u64(seed);
     let clock_s = clock(crowd.duration_ns as f64 * 1e-9, &mut rng);
     let trajectories = crowd.trajectories.iter().filter_map(|way| walked(way, &clock_s, &mut rng)).collect();
@@ -113,8 +114,8 @@ mod tests {
     use crate::crowd::{Preset, circle_crossing};
 
     #[test]
-    fn who_hurries_runs_and_stands_but_jumps_nowhere() {
-        let crowd = hurried(&circle_crossing(Preset::Orca03, 3, 5.0, 1), 1);
+    fn an_augmented_crowd_runs_and_stands_but_jumps_nowhere() {
+        let crowd = speed_augmented(&circle_crossing(Preset::Orca03, 3, 5.0, 1), 1);
         assert_eq!(crowd.trajectories.len(), 3);
         let (mut fastest_mps, mut slowest_mps) = (0.0_f64, f64::INFINITY);
         for way in &crowd.trajectories {
@@ -135,7 +136,7 @@ mod tests {
         let standing: Vec<usize> =
             (settled..clock_s.len()).filter(|&step| clock_s[step] - clock_s[step - settled] < 1e-3).collect();
         assert!(!standing.is_empty());
-        for way in hurried(&crowd, 1).trajectories {
+        for way in speed_augmented(&crowd, 1).trajectories {
             let first = (way.start_ns / STEP_NS) as usize;
             for step in standing.iter().filter_map(|step| step.checked_sub(first)).filter(|&step| step > 0) {
                 let speed_mps = way.positions_m[step].distance(way.positions_m[step - 1]) / STEP_S;

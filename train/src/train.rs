@@ -9,19 +9,19 @@ use burn::tensor::Device;
 use umbracast::Error;
 use umbracast::STEPS;
 use umbracast_sim::crowd::Preset;
+use umbracast_train::SCENE_SEEDS;
+use umbracast_train::score::{Scores, score};
+use umbracast_train::weights::state;
+use umbracast_train::windows::{Noise, Ways, Window};
 
-use crate::adam::Adam;
+use crate::adam::Moments;
 use crate::card;
 #[cfg(any(feature = "cuda", feature = "wgpu"))]
 use crate::gradient::recorded;
 use crate::gradient::{frames, written_out};
-use crate::network::{NAMES, Network, Size, loss};
-use crate::score::{Scores, score};
-use crate::weights::{from_safetensors, state, to_safetensors};
-use crate::windows::{Noise, Ways, Window};
+use crate::network::{Network, Size, loss};
+use crate::weights::{from_safetensors, to_safetensors};
 
-/// Seeds that training may draw scenes from.
-pub const SCENE_SEEDS: Range<u64> = 1..100_000;
 /// Share of the scenes that is trained on; the others are validated on (paper, section V-A).
 const TRAINED_SHARE: f64 = 0.6;
 /// Windows behind each validation loss.
@@ -200,9 +200,9 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&Progress)) -> Res
         for batch in windows.chunks(options.batch) {
             let (loss, gradient) = options.processor.gradient(&run.network, batch, &device);
             total += loss;
-            let done = run.adam.updates as f64 / (options.epochs * batches) as f64;
+            let done = run.moments.updates() as f64 / (options.epochs * batches) as f64;
             let rate = options.learning_rate * 0.5 * (1.0 + (PI * done).cos());
-            run.network = run.adam.update(run.network, gradient, rate, options.clip);
+            run.network = run.moments.update(run.network, gradient, rate, options.clip);
             report.batch += 1;
             report.training_loss = total / report.batch as f64;
             if report.batch == batches {
@@ -215,7 +215,7 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&Progress)) -> Res
             keep(path, &run, options)?;
         }
     }
-    let safetensors = to_safetensors(&NAMES, &[("", &run.network)], None)?;
+    let safetensors = to_safetensors(&[("", &run.network)], None)?;
     let weights = umbracast::forecast::Weights::from_safetensors(&safetensors)?;
     let exact = Noise { white_m: 0.0, lasting_m: 0.0 };
     let mut scores = Vec::new();
@@ -259,7 +259,7 @@ fn mean_loss(network: &Network, windows: &[Window], batch: usize, device: &Devic
 /// What a training carries from epoch to epoch.
 struct Run {
     network: Network,
-    adam: Adam,
+    moments: Moments,
     /// Training and validation loss of each epoch done.
     losses: Vec<[f64; 2]>,
 }
@@ -268,7 +268,7 @@ fn resumed(options: &TrainOptions, device: &Device) -> Result<Run, Error> {
     let path = options.checkpoint.as_deref().filter(|path| path.exists());
     let Some(path) = path else {
         let network = Network::fresh(options.size, options.seed, device);
-        return Ok(Run { adam: Adam::new(&network), network, losses: Vec::new() });
+        return Ok(Run { network, moments: Moments::default(), losses: Vec::new() });
     };
     let bytes = fs::read(path).map_err(|e| at(path, &e))?;
     let text = state(&bytes).map_err(|e| e.within(path.display()))?.unwrap_or_default();
@@ -286,19 +286,20 @@ fn resumed(options: &TrainOptions, device: &Device) -> Result<Run, Error> {
         return Err(at(path, &"expected the updates and losses so far, found something else"));
     };
     let read = |prefix| from_safetensors(&bytes, prefix, options.size, device);
-    let adam = Adam { first: read("first.")?, second: read("second.")?, updates };
-    Ok(Run { network: read("")?, adam, losses })
+    let moments = Moments::after(updates, read("first.")?, read("second.")?);
+    Ok(Run { network: read("")?, moments, losses })
 }
 
 /// Writes beside the file first, so that a stop at any time leaves a whole one.
 fn keep(path: &Path, run: &Run, options: &TrainOptions) -> Result<(), Error> {
-    let mut text = format!("{}\n{}", fingerprint(options), run.adam.updates);
+    let mut text = format!("{}\n{}", fingerprint(options), run.moments.updates());
     for [training, validation] in &run.losses {
         text += &format!("\n{training} {validation}");
     }
-    let networks = [("", &run.network), ("first.", &run.adam.first), ("second.", &run.adam.second)];
+    let [first, second] = run.moments.networks(&run.network);
+    let networks = [("", &run.network), ("first.", &first), ("second.", &second)];
     let beside = path.with_extension("part");
-    fs::write(&beside, to_safetensors(&NAMES, &networks, Some(text))?).map_err(|e| at(&beside, &e))?;
+    fs::write(&beside, to_safetensors(&networks, Some(text))?).map_err(|e| at(&beside, &e))?;
     fs::rename(&beside, path).map_err(|e| at(path, &e))
 }
 

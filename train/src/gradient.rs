@@ -7,13 +7,13 @@
 
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
-use glam::DVec2;
 use rayon::prelude::*;
 use umbracast::STEPS;
+use umbracast::geometry::DVec2;
+use umbracast_train::windows::Window;
 
 use crate::adam::gradients;
 use crate::network::{Network, loss};
-use crate::windows::Window;
 
 /// Parts of a batch, side by side: a fixed number, summed in order, so that threads do not change the sum.
 const PARTS: usize = 4;
@@ -250,8 +250,8 @@ fn values(tensor: Tensor<2>) -> Vec<f32> {
 mod tests {
     use super::*;
     use crate::network::{NAMES, Size};
-    use crate::windows::{Noise, Ways};
     use umbracast_sim::crowd::Preset;
+    use umbracast_train::windows::{Noise, Ways};
 
     /// Seven windows: parts of two, and one of one.
     fn case() -> (Network, Vec<Window>, Device) {

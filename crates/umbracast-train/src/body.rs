@@ -1,20 +1,17 @@
 //! Fits the predictor's body on recorded tuning scenes: which few numbers, put at people's true places and headings
-//! with height and gait as the tracker knows them, make the truth about who is blocked most likely? Prints every
-//! improvement and, at the end, the tables for `config/default.toml`.
-//!
-//! `cargo run --release -p umbracast-eval --example fit_body -- SIMULATED RUN [SIMULATED RUN...]`, directories that
-//! `umbracast simulate` wrote with tuning seeds (docs/CONVENTIONS.md), each with what `umbracast run` made of it.
+//! with height and gait as the tracker knows them, make the truth about who is blocked most likely? One number at a
+//! time is moved as long as it helps.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use umbracast::blockage::body::{self, Posture};
 use umbracast::blockage::probability::Phases;
-use umbracast::config::{BlockageConfig, BodyConfig};
+use umbracast::blockage::{BodyModel, Numbers};
+use umbracast::gait::GaitPhase;
 use umbracast::geometry::{DVec2, DVec3};
-use umbracast::track::Gait;
-use umbracast::track::girth::PRIOR_SIGMA;
+use umbracast::track::WIDTH_SCALE_SIGMA;
 use umbracast::{Config, Error};
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow, TrackRow};
 use umbracast_io::tables;
@@ -25,7 +22,7 @@ const EVERY: u64 = 3;
 const NEAR_M: f64 = 0.6;
 /// A track nearer than this is the person's.
 const OWN_M: f64 = 0.3;
-/// Postures tried of each body: phases of the gait, girths.
+/// Postures tried of each body: phases of the gait, widths.
 const POSTURES: usize = 12;
 /// Middles of 12 equal shares of a standard normal distribution, mixed against the phases.
 const NORMAL: [f64; POSTURES] =
@@ -40,24 +37,25 @@ struct Case {
     blocked: bool,
 }
 
-fn main() -> Result<(), Error> {
+/// Fits the body on recordings, each a folder that `simulate` wrote and one that `run` made of it; returns the tables
+/// for `models/body.toml`. `told` is called with each improvement.
+///
+/// # Errors
+/// A table that cannot be read, or recordings in which nobody comes near a link.
+pub fn fit_body(recordings: &[(PathBuf, PathBuf)], mut told: impl FnMut(&str)) -> Result<String, Error> {
     let config = Config::default();
     let mut cases = Vec::new();
-    let directories: Vec<String> = std::env::args().skip(1).collect();
-    if directories.is_empty() || directories.len() % 2 == 1 {
-        return Err(Error::new("fit_body: expected pairs of directories, SIMULATED and RUN"));
+    for (simulated, run) in recordings {
+        cases.extend(cases_of(simulated, run, &config)?);
     }
-    for pair in directories.chunks_exact(2) {
-        cases.extend(cases_of(Path::new(&pair[0]), Path::new(&pair[1]), &config)?);
+    if cases.is_empty() {
+        return Err(Error::new("training: expected links with somebody near them, found none"));
     }
-    let mut best = config.blockage.body.clone();
-    let start = loss(&best, &config.blockage, &cases);
-    println!(
-        "{} links, {start:.5}; F1 by access point {:.4?}",
-        cases.len(),
-        f1(&best, &config.blockage, &cases)
-    );
-    let mut least = start;
+    let numbers = Numbers::new(&config.blockage);
+    let mut best = numbers.body.clone();
+    let mut least = loss(&best, &numbers, &cases);
+    let start = f1(&best, &numbers, &cases);
+    told(&format!("{} links, {least:.5}; F1 by access point {start:.4?}", cases.len()));
     let count = fields(&mut best).len();
     let mut steps = vec![0.008; count];
     while steps.iter().any(|&step| step > 0.001) {
@@ -66,32 +64,46 @@ fn main() -> Result<(), Error> {
             for change in [steps[i], -steps[i]] {
                 let mut trial = best.clone();
                 *fields(&mut trial)[i].1 += change;
-                let value = loss(&trial, &config.blockage, &cases);
+                let value = loss(&trial, &numbers, &cases);
                 if value < least {
                     (best, least, moved) = (trial, value, true);
                     let (name, field) = &fields(&mut best)[i];
-                    println!("{least:.5} {name} = {field:.4}");
+                    told(&format!("{least:.5} {name} = {field:.4}"));
                     break;
                 }
             }
             steps[i] *= if moved { 1.5 } else { 0.5 };
         }
     }
-    println!("F1 by access point {:.4?}", f1(&best, &config.blockage, &cases));
-    for slice in &best.slices {
-        println!(
-            "  {{ top = {:.3}, half_depth = {:.3}, half_width = {:.3}, ahead = {:.3} }},",
-            slice.top, slice.half_depth, slice.half_width, slice.ahead
-        );
-    }
-    for (name, value) in fields(&mut best).into_iter().filter(|(name, _)| !name.starts_with("slice")) {
-        println!("{name} = {value:.4}");
-    }
-    Ok(())
+    told(&format!("F1 by access point {:.4?}", f1(&best, &numbers, &cases)));
+    Ok(toml(&mut best))
 }
 
+/// The numbers as `models/body.toml` has them.
+fn toml(body: &mut BodyModel) -> String {
+    let slices = body.slices.iter().map(|slice| {
+        format!(
+            "  {{ top = {:.3}, half_depth = {:.3}, half_width = {:.3}, ahead = {:.3} }},\n",
+            slice.top, slice.half_depth, slice.half_width, slice.ahead
+        )
+    });
+    let slices: String = slices.collect();
+    let still_share = body.arms.still_share;
+    let others = fields(body).into_iter().filter(|(name, _)| !name.starts_with("slice"));
+    let others: Vec<String> = others.map(|(name, value)| format!("{name} = {value:.4}\n")).collect();
+    let (sways, arms) = others.split_at(SWAYS);
+    format!(
+        "slices = [\n{slices}]\n{}\n[arms]\n{}still_share = {still_share:?}\n",
+        sways.concat(),
+        arms.concat()
+    )
+}
+
+/// How many of the fields that are no slice's are the trunk's.
+const SWAYS: usize = 2;
+
 /// What may be turned.
-fn fields(body: &mut BodyConfig) -> Vec<(String, &mut f64)> {
+fn fields(body: &mut BodyModel) -> Vec<(String, &mut f64)> {
     let mut all: Vec<(String, &mut f64)> = Vec::new();
     let last = body.slices.len() - 1;
     for (i, slice) in body.slices.iter_mut().enumerate() {
@@ -104,8 +116,8 @@ fn fields(body: &mut BodyConfig) -> Vec<(String, &mut f64)> {
     }
     let arms = &mut body.arms;
     let named: [(&str, &mut f64); 13] = [
-        ("sway", &mut body.sway),
-        ("surge", &mut body.surge),
+        ("sway_left", &mut body.sway_left),
+        ("sway_ahead", &mut body.sway_ahead),
         ("shoulder_up", &mut arms.shoulder_up),
         ("shoulder_out", &mut arms.shoulder_out),
         ("elbow_up", &mut arms.elbow_up),
@@ -137,7 +149,7 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
         let off_m = |t: &&TrackRow| (t.x_m - p.x_m).hypot(t.y_m - p.y_m);
         let all = tracks.get(&(p.scene, p.frame))?.iter();
         let own = all.filter(|t| t.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
-        let gait = Gait { phase_rad: own.gait_phase_rad, concentration: own.gait_concentration };
+        let gait = GaitPhase { phase_rad: own.gait_phase_rad, concentration: own.gait_concentration };
         (off_m(&own) < OWN_M).then_some((gait, own.height_m))
     };
     let mut cases = Vec::new();
@@ -155,7 +167,7 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
             p.person != own.person && at.distance(from.lerp(to, t)) < NEAR_M
         };
         let with_phase = |p: &PeopleRow| {
-            let (gait, height_m) = known(p).unwrap_or((Gait::UNKNOWN, p.height_m));
+            let (gait, height_m) = known(p).unwrap_or((GaitPhase::UNKNOWN, p.height_m));
             (PeopleRow { height_m, ..*p }, Phases::new(&gait))
         };
         let near: Vec<(PeopleRow, Phases)> = all.iter().filter(near).map(with_phase).collect();
@@ -167,16 +179,16 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
 }
 
 /// Chance that the link is blocked.
-fn probability(body: &BodyConfig, config: &BlockageConfig, case: &Case) -> f64 {
+fn probability(body: &BodyModel, numbers: &Numbers, case: &Case) -> f64 {
     let hits = (0..POSTURES).filter(|&k| {
         case.near.iter().any(|(p, phases)| {
             let share = ((k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person)).fract();
             let posture = Posture {
-                girth: 1.0
-                    + PRIOR_SIGMA.hypot(config.girth_sigma) * NORMAL[(k + p.person as usize) % POSTURES],
+                width_scale: 1.0
+                    + WIDTH_SCALE_SIGMA.hypot(numbers.width_sigma) * NORMAL[(k + p.person as usize) % POSTURES],
                 speed_mps: p.vx_mps.hypot(p.vy_mps),
                 phase_rad: phases.at(share),
-                swing: 1.0,
+                arm_swing: 1.0,
                 ..Posture::standing(DVec2::new(p.x_m, p.y_m), DVec2::from_angle(p.heading_rad), p.height_m)
             };
             body::blocks(body, &posture, case.start_m, case.ue_m)
@@ -186,9 +198,9 @@ fn probability(body: &BodyConfig, config: &BlockageConfig, case: &Case) -> f64 {
 }
 
 /// Mean negative logarithm of what was said of the truth; nothing is said to be certain.
-fn loss(body: &BodyConfig, config: &BlockageConfig, cases: &[Case]) -> f64 {
+fn loss(body: &BodyModel, numbers: &Numbers, cases: &[Case]) -> f64 {
     let of = |case: &Case| {
-        let p = 0.01 + 0.98 * probability(body, config, case);
+        let p = 0.01 + 0.98 * probability(body, numbers, case);
         -(if case.blocked { p } else { 1.0 - p }).ln()
     };
     let losses: Vec<f64> = cases.par_iter().map(of).collect();
@@ -196,15 +208,26 @@ fn loss(body: &BodyConfig, config: &BlockageConfig, cases: &[Case]) -> f64 {
 }
 
 /// At one half, for each access point.
-fn f1(body: &BodyConfig, config: &BlockageConfig, cases: &[Case]) -> Vec<f64> {
+fn f1(body: &BodyModel, numbers: &Numbers, cases: &[Case]) -> Vec<f64> {
     let mut counts: BTreeMap<u32, [u64; 2]> = BTreeMap::new();
     for case in cases {
         let count = counts.entry(case.access_point).or_default();
-        match (probability(body, config, case) >= 0.5, case.blocked) {
+        match (probability(body, numbers, case) >= 0.5, case.blocked) {
             (true, true) => count[0] += 1,
             (false, false) => {}
             _ => count[1] += 1,
         }
     }
     counts.values().map(|[hits, errors]| 2.0 * *hits as f64 / (2 * hits + errors) as f64).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_as_the_same_body() {
+        let mut body = BodyModel::shipped();
+        assert_eq!(BodyModel::parse(&toml(&mut body)).unwrap(), body);
+    }
 }

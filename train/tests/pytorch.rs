@@ -1,14 +1,14 @@
 //! The same numbers as PyTorch on the same weights (`fixtures/pytorch.py`), and as the runtime.
 
 use burn::tensor::{Device, Tensor, TensorData};
-use glam::DVec2;
 use safetensors::SafeTensors;
 use umbracast::STEPS;
 use umbracast::forecast::Weights;
 use umbracast::forecast::lstm::{OBSERVED_DISPLACEMENTS, RHO_LIMIT, SIGMA_FLOOR_M, SIGMA_SCALE_M};
-use umbracast_train::adam::{Adam, gradients};
-use umbracast_train::network::{NAMES, Network, Size, loss};
-use umbracast_train::weights::{from_safetensors, to_safetensors};
+use umbracast::geometry::DVec2;
+use umbracast_train_lstm::adam::{Moments, gradients};
+use umbracast_train_lstm::network::{NAMES, Network, Size, loss};
+use umbracast_train_lstm::weights::{from_safetensors, to_safetensors};
 
 const FIXTURE: &[u8] = include_bytes!("../fixtures/pytorch.safetensors");
 const SIZE: Size = Size { embedded: 8, units: 16 };
@@ -64,11 +64,11 @@ fn loss_and_gradients_are_those_of_pytorch() {
 fn three_clipped_updates_are_those_of_pytorch() {
     let device = Device::flex();
     let mut network = from_safetensors(FIXTURE, "", SIZE, &device).unwrap();
-    let mut adam = Adam::new(&network);
+    let mut moments = Moments::default();
     for _ in 0..3 {
         let tracked = network.tracked();
         let gradients = gradients(&tracked, network_loss(&tracked, &device).backward());
-        network = adam.update(network, gradients, 1e-3, 0.5);
+        network = moments.update(network, gradients, 1e-3, 0.5);
     }
     let farthest = farthest(&network, "updated.");
     assert!(farthest < 1e-4, "a weight is off by {farthest} of its tensor's largest");
@@ -80,8 +80,7 @@ fn the_runtime_rolls_out_as_the_trainer_does() {
     for (size, seed) in [(SIZE, 3), (Size { embedded: 64, units: 512 }, 4)] {
         let network = Network::fresh(size, seed, &device);
         let outputs = network.roll_out(&frames(&device)[..OBSERVED_DISPLACEMENTS], STEPS);
-        let weights =
-            Weights::from_safetensors(&to_safetensors(&NAMES, &[("", &network)], None).unwrap()).unwrap();
+        let weights = Weights::from_safetensors(&to_safetensors(&[("", &network)], None).unwrap()).unwrap();
         let all = numbers("displacements");
         let observed: Vec<[DVec2; OBSERVED_DISPLACEMENTS]> = (0..WINDOWS)
             .map(|window| {

@@ -1,12 +1,11 @@
-//! Fits the model of `umbracast::detect::axis` on simulated returns and writes it with its card.
+//! Fits the model of `umbracast::detect::axis`, from what the sensors saw of a body to where its axis stands, on
+//! simulated returns.
 //!
-//! `cargo run --release -p umbracast-eval --example fit_bias -- [models/body_axis]`
-//!
-//! Training scenes have the seeds 50,000 and on, the scenes that the errors are printed for 130,000 and on. Four layouts
-//! of two sensors; people on ORCA's ways, mixed crowds, pairs, and some of them in a hurry. Takes some minutes.
+//! Training scenes have the seeds 50,000 and on, the scenes that the errors are told for 130,000 and on. Four layouts
+//! of two sensors; people on ORCA's ways, mixed crowds, pairs, and some of them speed-augmented.
 
-use std::path::Path;
-use std::process::Command;
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -15,21 +14,29 @@ use rand_pcg::Pcg64;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use umbracast::config::Config;
 use umbracast::detect::axis::{AxisModel, OUTPUTS, UNIT_M};
-use umbracast::detect::bias::{EVEN, ODD, View};
-use umbracast::detect::{Background, Clusterer, Measurer};
+use umbracast::detect::features::{AxisFeatures, EVEN, ODD};
+use umbracast::detect::measure::SHIFT_M;
+use umbracast::detect::{Background, Clusterer, Measurer, Prior};
 use umbracast::geometry::DVec2;
 use umbracast::lidar::Assembler;
 use umbracast::track::Tracker;
 use umbracast::{Error, Health};
 use umbracast_eval::chain::{empty_frames, push};
-use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, hurried, pairs};
+use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs, speed_augmented};
 use umbracast_sim::scene::Scene;
 
-/// Height of the sensors, their distance from the middle, how many scenes, the first seed.
-const LAYOUTS: [(f64, f64, u64, u64); 4] =
-    [(9.0, 16.0, 36, 50_000), (6.0, 12.5, 24, 51_000), (4.0, 13.0, 12, 52_000), (7.5, 14.0, 12, 53_000)];
+use crate::adam::Adam;
+
+/// Height of the sensors, their distance from the middle, the scenes' seeds.
+type Layout = (f64, f64, Range<u64>);
+const LAYOUTS: [Layout; 4] = [
+    (9.0, 16.0, 50_000..50_036),
+    (6.0, 12.5, 51_000..51_024),
+    (4.0, 13.0, 52_000..52_012),
+    (7.5, 14.0, 53_000..53_012),
+];
 /// Scenes that are not trained on.
-const TEST: (f64, f64, u64, u64) = (9.0, 16.0, 6, 130_000);
+const HELD_OUT: Layout = (9.0, 16.0, 130_000..130_006);
 /// Sensors look this much below the middle of the hall, so that their beams cover both ends.
 const BELOW_MIDDLE_DEG: f64 = 6.0;
 /// A cluster found nearer than this to a person is that person.
@@ -46,56 +53,64 @@ const SHRINK: f64 = 1e-5;
 const PULL_LIMIT: f64 = 4.0;
 const SEED: u64 = 1;
 
-fn main() -> Result<(), Error> {
-    let path = std::env::args().nth(1).unwrap_or("models/body_axis".to_owned());
-    let of_layouts: Result<Vec<Vec<Sample>>, Error> = LAYOUTS.into_iter().map(samples).collect();
-    let (training, test) = (of_layouts?.concat(), samples(TEST)?);
+/// Fits the model; returns it as TOML, and its card. `commit`, which state of the source this is, goes into the card.
+/// `scene_done` is called with scenes done and scenes in all, from any thread.
+///
+/// # Errors
+/// A layout that nothing can be simulated of.
+pub fn train_axis(commit: &str, scene_done: impl Fn(usize, usize) + Sync) -> Result<(String, String), Error> {
+    let scenes = |(_, _, seeds): &Layout| (seeds.end - seeds.start) as usize;
+    let (done, all) = (AtomicUsize::new(0), LAYOUTS.iter().chain([&HELD_OUT]).map(scenes).sum());
+    let told = || scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, all);
+    let of_layouts: Result<Vec<Vec<Sample>>, Error> =
+        LAYOUTS.iter().map(|layout| samples(layout, told)).collect();
+    let (training, held_out) = (of_layouts?.concat(), samples(&HELD_OUT, told)?);
     let model = fit(&training);
-    let error = |s: &Sample| model.locate(&s.view).0 - s.view.base_m - s.off_m;
+    Ok((toml(&model), card(&model, &training, &held_out, commit)))
+}
+
+fn card(model: &AxisModel, training: &[Sample], held_out: &[Sample], commit: &str) -> String {
+    let error = |s: &Sample| model.locate(&s.features).0 - s.features.base_m - s.off_m;
     let rmse = |of: &dyn Fn(&Sample) -> DVec2, samples: &[Sample]| {
         (samples.iter().map(|s| of(s).length_squared()).sum::<f64>() / samples.len() as f64).sqrt()
     };
     let squared = |s: &Sample| {
-        let ([[xx, xy], [_, yy]], e) = (model.locate(&s.view).1, error(s));
+        let ([[xx, xy], [_, yy]], e) = (model.locate(&s.features).1, error(s));
         (yy * e.x * e.x - 2.0 * xy * e.x * e.y + xx * e.y * e.y) / (xx * yy - xy * xy)
     };
-    let consistency = test.iter().map(squared).sum::<f64>() / test.len() as f64;
-    let commit = Command::new("git").args(["describe", "--always", "--dirty"]).output();
-    let commit = commit.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned()).unwrap_or_default();
+    let consistency = held_out.iter().map(squared).sum::<f64>() / held_out.len() as f64;
     let layouts: String = LAYOUTS
         .iter()
-        .map(|(height_m, away_m, scenes, seed)| {
-            format!("- {scenes} scenes from seed {seed}, two HDL-32E {height_m} m high, {away_m} m from the middle\n")
+        .map(|(height_m, away_m, seeds)| {
+            format!(
+                "- {} scenes from seed {}, two HDL-32E {height_m} m high, {away_m} m from the middle\n",
+                seeds.end - seeds.start,
+                seeds.start
+            )
         })
         .collect();
-    let card = format!(
+    format!(
         "# Model of the body axis\n\n\
          From what the sensors saw of one body in one frame to where its axis stands, with the error's covariance: \
          {EVEN} + {ODD} inputs, {HIDDEN} hidden units, {OUTPUTS} outputs (`src/detect/axis.rs`).\n\n\
-         Written by `cargo run --release -p umbracast-eval --example fit_bias`, commit {commit}.\n\n\
-         ## Data\n\nSimulated returns of {PEOPLE} people a scene, in turn: orca-03, mixed in a hurry, orca-06, pairs 0.6 m apart, \
-         mixed, orca-03 in a hurry.\n\n\
+         Written by `umbracast train axis`, commit {commit}.\n\n\
+         ## Data\n\nSimulated returns of {PEOPLE} people a scene, in turn: orca-03, mixed speed-augmented, orca-06, \
+         pairs 0.6 m apart, mixed, orca-03 speed-augmented.\n\n\
          {layouts}\n{} clusters; {EPOCHS} epochs, Adam, negative log-likelihood, mirrored at random, seed {SEED}.\n\n\
          ## Error of one frame\n\n\
          | | training | {} scenes of their own from seed {} |\n|---|---|---|\n\
          | each point moved {} m away from its sensor, m | {:.4} | {:.4} |\n| this model, m | {:.4} | {:.4} |\n\
          | squared error over its variance (2 if honest) | | {consistency:.2} |\n",
         training.len(),
-        TEST.2,
-        TEST.3,
-        Config::default().detect.measure.shift_m,
-        rmse(&|s| s.off_m, &training),
-        rmse(&|s| s.off_m, &test),
-        rmse(&error, &training),
-        rmse(&error, &test),
-    );
-    print!("{card}");
-    write(&Path::new(&path).with_extension("md"), &card)?;
-    write(&Path::new(&path).with_extension("toml"), &toml(&model))
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Error> {
-    std::fs::write(path, text).map_err(|e| Error::new(e.to_string()).within(path.display()))
+        HELD_OUT.2.end - HELD_OUT.2.start,
+        HELD_OUT.2.start,
+        SHIFT_M,
+        rmse(&|s| s.off_m, training),
+        rmse(&|s| s.off_m, held_out),
+        rmse(&error, training),
+        rmse(&error, held_out),
+        commit = if commit.is_empty() { "unknown" } else { commit },
+    )
 }
 
 fn toml(model: &AxisModel) -> String {
@@ -108,7 +123,7 @@ fn toml(model: &AxisModel) -> String {
         format!("[\n{rows}]")
     };
     format!(
-        "# The model of the body axis: see body_axis.md. Written by the example fit_bias.\n\
+        "# The model of the body axis: see body_axis.md. Written by `umbracast train axis`.\n\
          even_mean = {}\neven_scale = {}\nodd_scale = {}\nhidden = {}\nhidden_bias = {}\noutput = {}\n\
          output_bias = {}\n",
         row(&model.even_mean),
@@ -121,23 +136,26 @@ fn toml(model: &AxisModel) -> String {
     )
 }
 
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Sample {
-    view: View,
+    features: AxisFeatures,
     /// From the base to the true axis.
     off_m: DVec2,
 }
 
 /// Of every scene of a layout.
-fn samples((height_m, away_m, scenes, first_seed): (f64, f64, u64, u64)) -> Result<Vec<Sample>, Error> {
+fn samples(layout: &Layout, scene_done: impl Fn() + Sync) -> Result<Vec<Sample>, Error> {
+    let (height_m, away_m, seeds) = layout.clone();
     let mut config = Config::default();
     for sensor in &mut config.site.sensors {
         sensor.position_m = [away_m * sensor.position_m[0].signum(), 0.0, height_m];
         sensor.rotation_deg.pitch = (height_m / away_m).atan().to_degrees() + BELOW_MIDDLE_DEG;
     }
-    let of_scenes = (0..scenes).into_par_iter().map(|scene| {
-        let seed = first_seed + scene;
-        watch(crowd_of(scene, seed), seed, &config)
+    let first = seeds.start;
+    let of_scenes = seeds.into_par_iter().map(|seed| {
+        let samples = watch(crowd_of(seed - first, seed), seed, &config);
+        scene_done();
+        samples
     });
     Ok(of_scenes.collect::<Result<Vec<Vec<Sample>>, Error>>()?.concat())
 }
@@ -147,11 +165,11 @@ fn crowd_of(scene: u64, seed: u64) -> Crowd {
     let drawn = |preset| circle_crossing(preset, PEOPLE, 12.5, seed);
     match scene % 6 {
         0 => drawn(Preset::Orca03),
-        1 => hurried(&drawn(Preset::Mixed), seed),
+        1 => speed_augmented(&drawn(Preset::Mixed), seed),
         2 => drawn(Preset::Orca06),
         3 => pairs(PEOPLE / 2, 0.6, 12.5, seed),
         4 => drawn(Preset::Mixed),
-        _ => hurried(&drawn(Preset::Orca03), seed),
+        _ => speed_augmented(&drawn(Preset::Orca03), seed),
     }
 }
 
@@ -159,7 +177,7 @@ fn crowd_of(scene: u64, seed: u64) -> Crowd {
 fn watch(crowd: Crowd, seed: u64, config: &Config) -> Result<Vec<Sample>, Error> {
     let mut samples: Vec<Sample> = Vec::new();
     let mut health = Health::default();
-    let mut background = Background::new(&config.detect, &config.site)?;
+    let mut background = Background::new(&config.detect, &config.site);
     let mut clusterer = Clusterer::new(&config.detect, &config.site);
     let mut measurer = Measurer::new(&config.detect, &config.site);
     let mut tracker = Tracker::new(&config.track, &config.site);
@@ -178,15 +196,16 @@ fn watch(crowd: Crowd, seed: u64, config: &Config) -> Result<Vec<Sample>, Error>
             tracker.update(&frame, &detections, &mut tracks);
             for cluster in &clusters {
                 let known = !samples.len().is_multiple_of(UNKNOWN_EVERY);
-                let view = measurer.view(&points, cluster, if known { &priors } else { &[] });
+                let priors: &[Prior] = if known { &priors } else { &[] };
+                let features = measurer.features(&points, cluster, priors);
                 let late: i64 = cluster.iter().map(|&i| points[i as usize].time_ns - frame.time_ns).sum();
                 let time_ns = frame.time_ns + late / cluster.len() as i64;
                 let off_m = walkers
                     .iter()
-                    .filter_map(|walker| Some(walker.state_at(time_ns)?.position_m - view.base_m))
+                    .filter_map(|walker| Some(walker.state_at(time_ns)?.position_m - features.base_m))
                     .min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
                     .filter(|off_m| off_m.length() < OWN_M);
-                samples.extend(off_m.map(|off_m| Sample { view, off_m }));
+                samples.extend(off_m.map(|off_m| Sample { features, off_m }));
             }
         }
     }
@@ -198,11 +217,11 @@ fn fit(samples: &[Sample]) -> AxisModel {
     let mut rng = Pcg64::seed_from_u64(SEED);
     let n = samples.len() as f64;
     let even = |f: &dyn Fn(f64, usize) -> f64| -> Vec<f64> {
-        (0..EVEN).map(|i| samples.iter().map(|s| f(s.view.even[i], i)).sum::<f64>() / n).collect()
+        (0..EVEN).map(|i| samples.iter().map(|s| f(s.features.even[i], i)).sum::<f64>() / n).collect()
     };
     let even_mean = even(&|x, _| x);
     let even_scale = even(&|x, i| (x - even_mean[i]).powi(2)).iter().map(|v| v.sqrt() + 1e-6).collect();
-    let odd_square = |i: usize| samples.iter().map(|s| s.view.odd[i].powi(2)).sum::<f64>() / n;
+    let odd_square = |i: usize| samples.iter().map(|s| s.features.odd[i].powi(2)).sum::<f64>() / n;
     let odd_scale = (0..ODD).map(|i| odd_square(i).sqrt() + 1e-6).collect();
     let mut normal = |size: f64, n: usize| -> Vec<f64> {
         (0..n).map(|_| -> f64 { StandardNormal.sample(&mut rng) }).map(|x| size * x).collect()
@@ -217,16 +236,16 @@ fn fit(samples: &[Sample]) -> AxisModel {
         output: (0..OUTPUTS).map(|_| normal(0.1 * fan(HIDDEN), HIDDEN)).collect(),
         output_bias: vec![0.0, 0.0, -1.0, -1.0],
     };
-    let inputs: Vec<_> = samples.iter().map(|s| model.inputs(&s.view.even, &s.view.odd)).collect();
-    let off = |s: &Sample| [s.off_m.dot(s.view.away) / UNIT_M, s.off_m.dot(s.view.away.perp()) / UNIT_M];
+    let inputs: Vec<_> = samples.iter().map(|s| model.inputs(&s.features.even, &s.features.odd)).collect();
+    let off = |s: &Sample| [s.off_m.dot(s.features.away) / UNIT_M, s.off_m.dot(s.features.away.perp()) / UNIT_M];
     let mut order: Vec<usize> = (0..samples.len()).collect();
-    let mut adam = Adam::new(count(&mut model));
+    let mut adam = Adam::new(numbers(&model).count());
     for epoch in 0..EPOCHS {
         order.shuffle(&mut rng);
         let step = STEP * 0.5 * (1.0 + (std::f64::consts::PI * epoch as f64 / EPOCHS as f64).cos()) + 1e-5;
         for batch in order.chunks(BATCH) {
             let mut slope = model.clone();
-            for_each(&mut slope, |w| *w = 0.0);
+            numbers_mut(&mut slope).for_each(|weight| *weight = 0.0);
             for &i in batch {
                 let (mut x, mut y) = (inputs[i], off(&samples[i]));
                 if rng.random_bool(0.5) {
@@ -235,7 +254,10 @@ fn fit(samples: &[Sample]) -> AxisModel {
                 }
                 add_slope(&model, &x, y, 1.0 / batch.len() as f64, &mut slope);
             }
-            adam.step(&mut model, &mut slope, step);
+            numbers_mut(&mut slope)
+                .zip(numbers(&model))
+                .for_each(|(slope, weight)| *slope += SHRINK * weight);
+            adam.update(numbers_mut(&mut model), numbers(&slope), step);
         }
     }
     model
@@ -264,43 +286,80 @@ fn add_slope(model: &AxisModel, x: &[f64], y: [f64; 2], share: f64, slope: &mut 
 }
 
 /// Every weight of a model in a fixed order.
-fn for_each(model: &mut AxisModel, mut f: impl FnMut(&mut f64)) {
-    model.hidden.iter_mut().flatten().for_each(&mut f);
-    model.hidden_bias.iter_mut().for_each(&mut f);
-    model.output.iter_mut().flatten().for_each(&mut f);
-    model.output_bias.iter_mut().for_each(&mut f);
+fn numbers(model: &AxisModel) -> impl Iterator<Item = f64> {
+    let hidden = model.hidden.iter().flatten().chain(&model.hidden_bias);
+    hidden.chain(model.output.iter().flatten()).chain(&model.output_bias).copied()
 }
 
-fn count(model: &mut AxisModel) -> usize {
-    let mut n = 0;
-    for_each(model, |_| n += 1);
-    n
+/// The same, to be changed.
+fn numbers_mut(model: &mut AxisModel) -> impl Iterator<Item = &mut f64> {
+    let hidden = model.hidden.iter_mut().flatten().chain(&mut model.hidden_bias);
+    hidden.chain(model.output.iter_mut().flatten()).chain(&mut model.output_bias)
 }
 
-/// Kingma and Ba 2015, with its usual decays.
-struct Adam {
-    mean: Vec<f64>,
-    square: Vec<f64>,
-    steps: i32,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl Adam {
-    fn new(n: usize) -> Self {
-        Self { mean: vec![0.0; n], square: vec![0.0; n], steps: 0 }
+    /// Somebody whose axis lies off the base by what the first odd input says, to the left.
+    fn sample(rng: &mut Pcg64) -> Sample {
+        let away = DVec2::from_angle(rng.random_range(-3.0..3.0));
+        let mut draw = || rng.random_range(-1.0..1.0);
+        let (even, odd) = (std::array::from_fn(|_| draw()), std::array::from_fn(|_| draw()));
+        let off_m = away.perp() * (0.04 * odd[0] + 0.005 * draw()) + away * 0.005 * draw();
+        Sample { features: AxisFeatures { base_m: DVec2::new(1.0, 2.0), away, even, odd }, off_m }
     }
 
-    fn step(&mut self, model: &mut AxisModel, slope: &mut AxisModel, step: f64) {
-        self.steps += 1;
-        let mut slopes = Vec::with_capacity(self.mean.len());
-        for_each(slope, |s| slopes.push(*s));
-        let (early, early_square) = (1.0 - 0.9_f64.powi(self.steps), 1.0 - 0.999_f64.powi(self.steps));
-        let mut i = 0;
-        for_each(model, |w| {
-            let s = slopes[i] + SHRINK * *w;
-            self.mean[i] += 0.1 * (s - self.mean[i]);
-            self.square[i] += 0.001 * (s * s - self.square[i]);
-            *w -= step * (self.mean[i] / early) / ((self.square[i] / early_square).sqrt() + 1e-8);
-            i += 1;
-        });
+    fn samples() -> Vec<Sample> {
+        let mut rng = Pcg64::seed_from_u64(2);
+        (0..1500).map(|_| sample(&mut rng)).collect()
+    }
+
+    #[test]
+    fn a_law_is_learned_and_the_file_says_what_the_model_says() {
+        let (training, held_out) = (samples(), &samples()[..100]);
+        let model = fit(&training);
+        let read = AxisModel::parse(&toml(&model)).unwrap();
+        for s in held_out {
+            let (found_m, covariance_m2) = model.locate(&s.features);
+            assert!(found_m.distance(s.features.base_m + s.off_m) < 0.02, "{found_m} for {s:?}");
+            assert!(covariance_m2[0][0] < 0.02_f64.powi(2), "{covariance_m2:?}");
+            assert!(read.locate(&s.features).0.abs_diff_eq(found_m, 1e-5));
+        }
+    }
+
+    #[test]
+    fn the_slope_is_that_of_finite_differences() {
+        const MOVED: f64 = 1e-6;
+        let (model, samples) = (fit(&samples()[..300]), samples());
+        let x = model.inputs(&samples[0].features.even, &samples[0].features.odd);
+        // Away from where an error pulls no harder.
+        let y = [0.3, -0.2];
+        let loss = |model: &AxisModel| -> f64 {
+            let units: Vec<f64> = model
+                .hidden
+                .iter()
+                .zip(&model.hidden_bias)
+                .map(|(row, bias)| (row.iter().zip(&x).map(|(w, x)| w * x).sum::<f64>() + bias).tanh())
+                .collect();
+            let out = |o: usize| -> f64 {
+                model.output[o].iter().zip(&units).map(|(w, u)| w * u).sum::<f64>() + model.output_bias[o]
+            };
+            (0..2).map(|k| 0.5 * ((out(k) - y[k]).powi(2) * (-out(k + 2)).exp() + out(k + 2))).sum()
+        };
+        let mut slope = model.clone();
+        numbers_mut(&mut slope).for_each(|weight| *weight = 0.0);
+        add_slope(&model, &x, y, 1.0, &mut slope);
+        let largest = numbers(&slope).fold(0.0_f64, |largest, slope| largest.max(slope.abs()));
+        assert!(largest > 0.1, "a slope that tells something");
+        for (i, found) in numbers(&slope).enumerate() {
+            let moved = |by: f64| {
+                let mut model = model.clone();
+                *numbers_mut(&mut model).nth(i).unwrap() += by;
+                loss(&model)
+            };
+            let expected = (moved(MOVED) - moved(-MOVED)) / (2.0 * MOVED);
+            assert!((found - expected).abs() < 1e-6 * largest, "weight {i}: {found}, expected {expected}");
+        }
     }
 }

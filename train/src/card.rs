@@ -2,10 +2,9 @@
 
 use umbracast::STEPS;
 use umbracast::forecast::lstm::{RHO_LIMIT, SIGMA_FLOOR_M, SIGMA_SCALE_M};
-
 use umbracast_sim::crowd::Preset;
+use umbracast_train::score::Scores;
 
-use crate::score::Scores;
 use crate::train::TrainOptions;
 
 /// The card as Markdown.
