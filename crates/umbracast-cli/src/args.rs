@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use umbracast::{Error, Mode};
-use umbracast_eval::experiment::Shard;
+use umbracast_eval::run::experiment::Shard;
 use umbracast_io::trajectories::Unit;
 use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::Preset;

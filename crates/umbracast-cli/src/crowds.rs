@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use umbracast::geometry::DVec2;
 use umbracast::{Error, Site};
-use umbracast_eval::chain::{People, SceneSpec};
+use umbracast_eval::run::chain::{People, SceneSpec};
 use umbracast_io::bvh;
 use umbracast_io::trajectories::{self, Options};
 use umbracast_sim::body::Gait;
@@ -125,7 +125,7 @@ pub fn dressed((mut scenes, mut told): Told, args: &BodyArgs) -> Result<Told, Er
 mod tests {
     use super::*;
     use umbracast::Config;
-    use umbracast_eval::chain::drawn_scenes;
+    use umbracast_eval::run::chain::drawn_scenes;
     use umbracast_sim::crowd::Preset;
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use umbracast_eval::matching::match_scene;
+use umbracast_eval::score::matching::match_scene;
 use umbracast_io::rows::{MatchRow, PeopleRow, TrackRow};
 
 /// The pairs of a scene, by frame and person.

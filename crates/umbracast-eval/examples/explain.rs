@@ -12,7 +12,6 @@ use umbracast::config::{BoxKind, ForecastMethod, Rollout};
 use umbracast::forecast::Weights;
 use umbracast::site::AccessPoint;
 use umbracast::{Config, Error, Mode, STEPS};
-use umbracast_eval::chain::{self, SceneResult, SceneSpec, Spec, drawn_scenes};
 use umbracast_eval::explain::figure::{Source, Story, draw};
 use umbracast_eval::explain::replay::{Noise, Replay, Surroundings};
 use umbracast_eval::explain::search::{
@@ -21,11 +20,12 @@ use umbracast_eval::explain::search::{
 use umbracast_eval::explain::table_one::{
     displacement_m, fitted, means_m, off_table_one_m, standing_still_m,
 };
-use umbracast_eval::ladder;
-use umbracast_eval::link_counts::LinkCounts;
+use umbracast_eval::oracle::ladder;
 use umbracast_eval::report::published::{DISPLACEMENT_M, F1_AT_300_MS};
 use umbracast_eval::report::tables::Table;
-use umbracast_eval::score::Predictor;
+use umbracast_eval::run::chain::{self, SceneResult, SceneSpec, Spec, drawn_scenes};
+use umbracast_eval::run::scene_score::Predictor;
+use umbracast_eval::score::link_counts::LinkCounts;
 use umbracast_sim::crowd::Preset;
 
 /// Tuning seeds only (docs/CONVENTIONS.md).

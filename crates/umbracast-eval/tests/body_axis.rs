@@ -3,7 +3,7 @@
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::lidar::Assembler;
 use umbracast::{Config, Health, Mode, Pipeline};
-use umbracast_eval::chain::{CIRCLE_M, empty_frames, push};
+use umbracast_eval::run::chain::{CIRCLE_M, empty_frames, push};
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 

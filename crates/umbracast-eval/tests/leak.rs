@@ -3,7 +3,7 @@
 use umbracast::config::ForecastMethod;
 use umbracast::lidar::{Assembler, Frame};
 use umbracast::{Config, Health, Mode, Outcome, Pipeline};
-use umbracast_eval::chain::{TEST_SEEDS, empty_frames, push};
+use umbracast_eval::run::chain::{TEST_SEEDS, empty_frames, push};
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 

@@ -21,7 +21,7 @@ use umbracast::geometry::DVec2;
 use umbracast::lidar::Assembler;
 use umbracast::track::Tracker;
 use umbracast::{Error, Health};
-use umbracast_eval::chain::{empty_frames, push};
+use umbracast_eval::run::chain::{empty_frames, push};
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs, speed_augmented};
 use umbracast_sim::scene::Scene;
 
@@ -237,7 +237,8 @@ fn fit(samples: &[Sample]) -> AxisModel {
         output_bias: vec![0.0, 0.0, -1.0, -1.0],
     };
     let inputs: Vec<_> = samples.iter().map(|s| model.inputs(&s.features.even, &s.features.odd)).collect();
-    let off = |s: &Sample| [s.off_m.dot(s.features.away) / UNIT_M, s.off_m.dot(s.features.away.perp()) / UNIT_M];
+    let off =
+        |s: &Sample| [s.off_m.dot(s.features.away) / UNIT_M, s.off_m.dot(s.features.away.perp()) / UNIT_M];
     let mut order: Vec<usize> = (0..samples.len()).collect();
     let mut adam = Adam::new(numbers(&model).count());
     for epoch in 0..EPOCHS {

@@ -185,7 +185,8 @@ fn probability(body: &BodyModel, numbers: &Numbers, case: &Case) -> f64 {
             let share = ((k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person)).fract();
             let posture = Posture {
                 width_scale: 1.0
-                    + WIDTH_SCALE_SIGMA.hypot(numbers.width_sigma) * NORMAL[(k + p.person as usize) % POSTURES],
+                    + WIDTH_SCALE_SIGMA.hypot(numbers.width_sigma)
+                        * NORMAL[(k + p.person as usize) % POSTURES],
                 speed_mps: p.vx_mps.hypot(p.vy_mps),
                 phase_rad: phases.at(share),
                 arm_swing: 1.0,

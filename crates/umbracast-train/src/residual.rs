@@ -8,11 +8,10 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use umbracast::forecast::inputs::{INPUTS, mirror};
 use umbracast::forecast::constant_velocity::ACCELERATION_PSD_M2PS3;
+use umbracast::forecast::inputs::{INPUTS, mirror};
 use umbracast::forecast::residual::{
-    COEFFICIENT_M, COEFFICIENTS, LOG_DENSITY_LIMIT, LOG_FACTOR_LIMIT, OUTPUTS, RHO_LIMIT,
-    SPREAD, UNITS,
+    COEFFICIENT_M, COEFFICIENTS, LOG_DENSITY_LIMIT, LOG_FACTOR_LIMIT, OUTPUTS, RHO_LIMIT, SPREAD, UNITS,
 };
 use umbracast::{Error, STEP_S, STEPS};
 

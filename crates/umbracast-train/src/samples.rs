@@ -11,9 +11,9 @@ use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Frame};
 use umbracast::track::Track;
 use umbracast::{Config, Error, Health, Pipeline, STEP_S, STEPS};
-use umbracast_eval::chain::{empty_frames, note_truth, push};
-use umbracast_eval::matching::match_scene;
-use umbracast_eval::scene::{SceneTruth, TruthIndex};
+use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast_eval::score::matching::match_scene;
+use umbracast_eval::score::scene::{SceneTruth, TruthIndex, note_truth};
 use umbracast_io::rows;
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, mixed, speed_augmented};
 use umbracast_sim::scene::Scene;
@@ -45,7 +45,7 @@ pub fn drawn_scenes(
     people: usize,
     seeds: std::ops::Range<u64>,
 ) -> Vec<SampleScene> {
-    const CIRCLE_M: f64 = umbracast_eval::chain::CIRCLE_M;
+    const CIRCLE_M: f64 = umbracast_eval::run::chain::CIRCLE_M;
     let scene = |seed: u64| {
         let (preset, augmented) = presets[seed as usize % presets.len()];
         let crowd = match preset {

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use umbracast::{Config, Error, STEPS};
-use umbracast_eval::chain::{self, SceneSpec, Spec};
-use umbracast_eval::instances::instances;
-use umbracast_eval::links::Said;
-use umbracast_eval::matching::match_scene;
-use umbracast_eval::scene::TruthIndex;
+use umbracast_eval::run::chain::{self, SceneSpec, Spec};
+use umbracast_eval::score::instances::instances;
+use umbracast_eval::score::links::Said;
+use umbracast_eval::score::matching::match_scene;
+use umbracast_eval::score::scene::TruthIndex;
 use umbracast_sim::crowd::Preset;
 
 /// Tuning seeds only (docs/CONVENTIONS.md).

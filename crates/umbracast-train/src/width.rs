@@ -12,7 +12,7 @@ use umbracast::track::Track;
 use umbracast::track::visibility::{Body, Visibility};
 use umbracast::track::width::share;
 use umbracast::{Error, Health, Pipeline};
-use umbracast_eval::chain::{empty_frames, push};
+use umbracast_eval::run::chain::{empty_frames, push};
 use umbracast_sim::body::Walker;
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use umbracast::config::Mechanism;
 use umbracast::{Config, Error, Health, Mode};
-use umbracast_eval::ablate::{self, DataSet, Source};
-use umbracast_eval::chain::{SceneSpec, drawn_scenes};
-use umbracast_eval::labels;
+use umbracast_eval::run::ablate::{self, DataSet, Source};
+use umbracast_eval::run::chain::{SceneSpec, drawn_scenes};
+use umbracast_eval::score::labels;
 use umbracast_io::trajectories::Unit;
 use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::Preset;

@@ -1,7 +1,7 @@
 //! `demo`: one scene, every stage, every mode, scores and report.
 
 use umbracast::{Config, Error, Mode};
-use umbracast_eval::chain;
+use umbracast_eval::run::chain;
 
 use crate::args::{Common, Demo};
 use crate::commands::evaluate;

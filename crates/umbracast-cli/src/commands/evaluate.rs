@@ -6,12 +6,12 @@ use std::path::Path;
 use umbracast::forecast::Weights;
 use umbracast::site::AccessPoint;
 use umbracast::{Config, Error, Health, Mode};
-use umbracast_eval::chain::{self, Spec};
-use umbracast_eval::labels;
-use umbracast_eval::pooled::{self, Scores, pool};
 use umbracast_eval::report::{self, Context, Kept};
-use umbracast_eval::scene::{SceneRun, SceneTruth};
-use umbracast_eval::score::{ModeRun, SceneScore, score_scene};
+use umbracast_eval::run::chain::{self, Spec};
+use umbracast_eval::run::pooled::{self, Scores, pool};
+use umbracast_eval::run::scene_score::{ModeRun, SceneScore, score_scene};
+use umbracast_eval::score::labels;
+use umbracast_eval::score::scene::{SceneRun, SceneTruth};
 use umbracast_io::rows::{LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
 use umbracast_io::tables;
 

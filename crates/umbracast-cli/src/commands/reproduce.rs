@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Mode};
-use umbracast_eval::chain::{self, Spec};
-use umbracast_eval::experiment::{Experiment, Shard};
-use umbracast_eval::pooled;
 use umbracast_eval::report::{self, Context};
+use umbracast_eval::run::chain::{self, Spec};
+use umbracast_eval::run::experiment::{Experiment, Shard};
+use umbracast_eval::run::pooled;
 
 use crate::args::{Common, Replay, Reproduce};
 use crate::progress::SceneClock;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
-use umbracast_eval::scene::SceneRun;
+use umbracast_eval::score::scene::SceneRun;
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::tables::TableWriter;
 

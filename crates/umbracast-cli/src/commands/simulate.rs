@@ -7,8 +7,8 @@ use indicatif::ProgressBar;
 use rayon::prelude::*;
 use umbracast::lidar::Assembler;
 use umbracast::{Config, Error, Health, Mode};
-use umbracast_eval::chain::{self, EMPTY_FRAMES, SceneSpec};
-use umbracast_eval::scene::SceneTruth;
+use umbracast_eval::run::chain::{self, EMPTY_FRAMES, SceneSpec};
+use umbracast_eval::score::scene::SceneTruth;
 use umbracast_io::recording::RecordingWriter;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables::TableWriter;
@@ -110,7 +110,7 @@ fn record_scene(
     let mut all = SceneTruth::default();
     while let Some(frame) = scene.next_frame() {
         let mut truth = SceneTruth::default();
-        chain::note_truth(number as u32, &frame, &mut truth);
+        umbracast_eval::score::scene::note_truth(number as u32, &frame, &mut truth);
         writer.packets(frame.time_ns, &frame.packets)?;
         writer.recording.write_truth(frame.time_ns, frame.index, &truth.people, &truth.links)?;
         all.people.append(&mut truth.people);

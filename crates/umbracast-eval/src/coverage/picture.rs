@@ -8,8 +8,8 @@ use umbracast::geometry::{DVec2, DVec3};
 use umbracast::site::Sensor;
 
 use super::{Coverage, Place};
-use crate::chain::CIRCLE_M;
 use crate::report::html::escaped;
+use crate::run::chain::CIRCLE_M;
 
 /// The longer side of the hall, pixels.
 const PLAN: f64 = 640.0;

@@ -7,8 +7,8 @@ use umbracast::geometry::DVec2;
 use umbracast::{Error, Site};
 
 use super::{Coverage, Place, SEEN_RETURNS, WELL_SEEN_RETURNS};
-use crate::chain::CIRCLE_M;
 use crate::report::tables::{Table, number};
+use crate::run::chain::CIRCLE_M;
 
 /// Badly seen regions that are named.
 const NAMED: usize = 6;

@@ -17,13 +17,12 @@ use umbracast_sim::random::stream;
 use umbracast_sim::scene::{Scene, SceneFrame};
 use umbracast_sim::truth::BodyMesh;
 
-use crate::chain::note_truth;
-use crate::counts::Counts;
-use crate::displacement::Displacement;
-use crate::instances::{Instance, instances};
-use crate::ladder::lasting_errors;
-use crate::oracles::true_track;
-use crate::scene::{SceneTruth, TruthIndex};
+use crate::oracle::ladder::lasting_errors;
+use crate::oracle::replaced::true_track;
+use crate::score::counts::Counts;
+use crate::score::displacement::Displacement;
+use crate::score::instances::{Instance, instances};
+use crate::score::scene::{SceneTruth, TruthIndex, note_truth};
 
 /// Every which instant is asked: neighbours are nearly equal.
 const EVERY: u64 = 5;
@@ -294,7 +293,7 @@ fn widened_obb(obb: &Obb, scale: f64) -> Obb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::CIRCLE_M;
+    use crate::run::chain::CIRCLE_M;
     use umbracast::Config;
     use umbracast_sim::crowd::{Preset, circle_crossing};
 

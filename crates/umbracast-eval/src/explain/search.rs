@@ -6,9 +6,9 @@ use umbracast::forecast::Weights;
 use umbracast::{Error, STEPS};
 
 use super::replay::{BoxModel, Noise, Replay, Surroundings};
-use crate::bootstrap::Pooled;
-use crate::counts::Counts;
 use crate::report::published::{AT_300_MS, BASE_RATE_AT_300_MS, F1_FROM_800_MS};
+use crate::score::bootstrap::Pooled;
+use crate::score::counts::Counts;
 
 /// One published figure.
 #[derive(Debug, Clone, Copy, PartialEq)]

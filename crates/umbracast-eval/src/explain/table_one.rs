@@ -6,9 +6,9 @@ use umbracast::forecast::Weights;
 use umbracast::{Error, STEPS};
 
 use super::replay::{Noise, Replay};
-use crate::bootstrap::Pooled;
-use crate::displacement::Displacement;
 use crate::report::published::DISPLACEMENT_M;
+use crate::score::bootstrap::Pooled;
+use crate::score::displacement::Displacement;
 
 /// How often the bracket is narrowed: to a fiftieth.
 const STEPS_OF_SEARCH: u32 = 8;

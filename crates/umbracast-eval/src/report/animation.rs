@@ -10,8 +10,8 @@ use umbracast_io::rows::{LinkRow, TrackRow};
 use super::Kept;
 use super::animation_svg::Canvas;
 use super::floor;
-use crate::matching::match_scene;
-use crate::scene::{Matching, TruthIndex};
+use crate::score::matching::match_scene;
+use crate::score::scene::{Matching, TruthIndex};
 
 /// No longer is shown, seconds.
 const LONGEST_S: f64 = 10.0;

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use umbracast::{Error, Mode};
 
 use super::tables::{Table, number};
-use crate::pooled::Estimate;
-use crate::score::Predictor;
+use crate::run::pooled::Estimate;
+use crate::run::scene_score::Predictor;
 
 /// One mode in one group of scenes of one report.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -204,11 +204,11 @@ fn table(title: &str, rows: &[Row], text: impl Fn(Estimate, usize) -> String) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{link_row, track_row, truth_of};
-    use crate::pooled::pool;
     use crate::report::to_json;
-    use crate::scene::SceneRun;
-    use crate::score::{ModeRun, score_scene};
+    use crate::run::pooled::pool;
+    use crate::run::scene_score::{ModeRun, score_scene};
+    use crate::score::hand_made::{link_row, track_row, truth_of};
+    use crate::score::scene::SceneRun;
     use umbracast::Config;
 
     #[test]

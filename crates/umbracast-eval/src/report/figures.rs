@@ -4,8 +4,8 @@ use umbracast::{Error, Mode, STEPS};
 
 use super::plot::{Drawing, Mark, Panel, Series, draw, draw_grid, svg};
 use super::{Kept, one_scene, published};
-use crate::pooled::{Estimate, Group, Scores, WindowScores};
-use crate::score::Predictor;
+use crate::run::pooled::{Estimate, Group, Scores, WindowScores};
+use crate::run::scene_score::Predictor;
 
 /// A figure with what a reader needs to understand it.
 #[derive(Debug, Clone, PartialEq)]

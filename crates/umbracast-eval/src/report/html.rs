@@ -6,8 +6,8 @@ use super::figures::Figure;
 use super::plot::Mark;
 use super::tables::Table;
 use super::{Context, published};
-use crate::pooled::{Group, Scores};
-use crate::score::Predictor;
+use crate::run::pooled::{Group, Scores};
+use crate::run::scene_score::Predictor;
 use umbracast::Mode;
 
 /// A table with more rows is folded.

@@ -1,7 +1,7 @@
 //! The ladder of oracles: what is reached by who knows the future, with ever better bodies, then with ever larger errors.
 
 use super::tables::{Table, number, scenes, window};
-use crate::pooled::{Group, Scores};
+use crate::run::pooled::{Group, Scores};
 
 /// Windows that are shown.
 const WINDOWS: [usize; 3] = [1, 3, 9];

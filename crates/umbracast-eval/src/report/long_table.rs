@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use umbracast::Mode;
 
 use super::published;
-use crate::pooled::{Estimate, Group, Scores};
+use crate::run::pooled::{Estimate, Group, Scores};
 
 /// Columns `group`, `scenes`, `mode`, `predictor`, `access_point`, `step` (the window or the step of the forecast,
 /// each of 100 ms), `score`, `value` and the ends of its 95 % interval, empty where there is none. Words hold no

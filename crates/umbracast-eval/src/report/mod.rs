@@ -17,8 +17,8 @@ use std::path::Path;
 
 use umbracast::{Config, Error, Mode, Site};
 
-use crate::pooled::{Group, Scores};
-use crate::scene::{SceneRun, SceneTruth};
+use crate::run::pooled::{Group, Scores};
+use crate::score::scene::{SceneRun, SceneTruth};
 use tables::Table;
 
 /// What a report is made of, beside the scores.

@@ -10,9 +10,9 @@ use super::Kept;
 use super::figures::{BLACK, BLUE, Figure, GOLD, GREEN, GREY, LIGHT, PURPLE, RED, Sizes, axes, series};
 use super::floor::{self, Window};
 use super::plot::{Mark, Panel};
-use crate::instances::instances;
-use crate::matching::match_scene;
-use crate::scene::TruthIndex;
+use crate::score::instances::instances;
+use crate::score::matching::match_scene;
+use crate::score::scene::TruthIndex;
 
 /// Width of a figure, pixels.
 const WIDTH: f64 = 860.0;

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use umbracast::{Mode, STEPS};
 
 use super::published;
-use crate::pooled::{Estimate, Group, ModeScores, Scores, WindowScores};
-use crate::score::Predictor;
+use crate::run::pooled::{Estimate, Group, ModeScores, Scores, WindowScores};
+use crate::run::scene_score::Predictor;
 
 /// A table.
 #[derive(Debug, Clone, Default, PartialEq)]

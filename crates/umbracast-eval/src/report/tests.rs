@@ -1,9 +1,9 @@
 //! What a report says and does not say.
 
 use super::*;
-use crate::hand_made::{link_row, track_row, truth_of};
-use crate::pooled::pool;
-use crate::score::{ModeRun, score_scene};
+use crate::run::pooled::pool;
+use crate::run::scene_score::{ModeRun, score_scene};
+use crate::score::hand_made::{link_row, track_row, truth_of};
 use umbracast::Health;
 
 /// Three people who stand still; the link of the first is blocked from frame 30 on and we say so in time.

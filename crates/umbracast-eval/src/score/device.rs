@@ -1,6 +1,6 @@
 //! The track that speaks for a person's device when the two are bound once, instead of matched anew in every frame.
 //!
-//! [`crate::matching`] asks the truth in each frame which track is whose. In operation nobody can: a device registers,
+//! [`crate::score::matching`] asks the truth in each frame which track is whose. In operation nobody can: a device registers,
 //! its place tells which track it walks with, and from then on it gets what is said of that track. So an identity
 //! swap costs warnings: it shows nowhere, and the device gets those of the person whom its track follows now. A
 //! track that has died does show, because nothing is said of it any more: the device registers anew, and is bound
@@ -9,10 +9,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::scene::{Matching, SceneRun, TruthIndex};
+use crate::score::scene::{Matching, SceneRun, TruthIndex};
 
 /// The track of each person's device in every frame that has one; `matching` is the truth's word on which track is
-/// whose ([`crate::matching::match_scene`]), heard once a registration.
+/// whose ([`crate::score::matching::match_scene`]), heard once a registration.
 pub fn bound_once(truth: &TruthIndex, run: &SceneRun, matching: &Matching) -> Matching {
     let track_ends = last_frames(run.tracks.iter().map(|row| (row.track, row.frame)));
     let in_scene = |&(frame, person): &(u64, u32)| truth.person(frame, person).is_some();
@@ -44,9 +44,9 @@ fn last_frames<T: Ord>(seen: impl Iterator<Item = (T, u64)>) -> BTreeMap<T, u64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{track_row, truth_of};
-    use crate::matching::match_scene;
-    use crate::scene::SceneTruth;
+    use crate::score::hand_made::{track_row, truth_of};
+    use crate::score::matching::match_scene;
+    use crate::score::scene::SceneTruth;
 
     /// Two people 10 m apart; `track(person, frame)` is who follows a person, if anybody does.
     fn bound(truth: &SceneTruth, track: impl Fn(u32, u64) -> Option<u64>) -> Matching {

@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-use crate::counts::Counts;
+use crate::score::counts::Counts;
 
 /// Fewer recordings say nothing of how recordings differ: drawn anew they give their own scores back.
 const RECORDINGS_MIN: usize = 5;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use umbracast::track::association::{FORBIDDEN, optimal};
 
-use crate::matching::{GATE_M, SceneFrame, apart_m};
+use crate::score::matching::{GATE_M, SceneFrame, apart_m};
 
 /// Thresholds of the similarity that HOTA averages over: 0.05, 0.10 .. 0.95.
 pub const ALPHAS: usize = 19;

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use umbracast::{STEP_NS, STEPS};
 
-use crate::bootstrap::Pooled;
-use crate::counts::{Counts, ratio};
-use crate::instances::Instance;
+use crate::score::bootstrap::Pooled;
+use crate::score::counts::{Counts, ratio};
+use crate::score::instances::Instance;
 
 /// Bins of the calibration error, equally wide from 0 to 1.
 pub const ECE_BINS: usize = 15;
@@ -267,9 +267,9 @@ impl LinkCounts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::truth_of;
-    use crate::instances::instances;
-    use crate::scene::TruthIndex;
+    use crate::score::hand_made::truth_of;
+    use crate::score::instances::instances;
+    use crate::score::scene::TruthIndex;
 
     fn instance(frame: u64, blocked_now: bool, first_blocked: Option<usize>) -> Instance {
         let time_ns = (frame as i64 + 1) * STEP_NS;

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use umbracast::STEPS;
 use umbracast::blockage::Blockage;
 
-use crate::instances::Instance;
-use crate::link_counts::Prediction;
-use crate::scene::{Matching, SceneRun};
+use crate::score::instances::Instance;
+use crate::score::link_counts::Prediction;
+use crate::score::scene::{Matching, SceneRun};
 
 /// What was said of links, by (frame, access point, track or person).
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -80,10 +80,10 @@ pub fn persistence_of_truth(instances: &[Instance]) -> Vec<Prediction> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{link_row, truth_of};
-    use crate::instances::instances;
-    use crate::link_counts::WindowCounts;
-    use crate::scene::TruthIndex;
+    use crate::score::hand_made::{link_row, truth_of};
+    use crate::score::instances::instances;
+    use crate::score::link_counts::WindowCounts;
+    use crate::score::scene::TruthIndex;
 
     #[test]
     fn who_has_no_track_counts_as_predicted_not_blocked() {

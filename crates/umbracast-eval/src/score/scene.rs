@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
+use umbracast_sim::scene::SceneFrame;
 
-use crate::fingerprint::fingerprint;
+use crate::score::fingerprint::fingerprint;
 
 /// What was so: the tables `people` and `people_links` of one scene, in any order.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -22,6 +23,35 @@ pub struct SceneRun {
     pub tracks: Vec<TrackRow>,
     /// Every link of a confirmed track in every frame.
     pub links: Vec<LinkRow>,
+}
+
+/// The rows of a frame's truth.
+pub fn note_truth(scene: u32, frame: &SceneFrame, truth: &mut SceneTruth) {
+    let (number, time_ns) = (frame.index, frame.time_ns);
+    truth.people.extend(frame.people.iter().map(|p| PeopleRow {
+        scene,
+        frame: number,
+        time_ns,
+        person: p.person,
+        x_m: p.state.position_m.x,
+        y_m: p.state.position_m.y,
+        vx_mps: p.state.velocity_mps.x,
+        vy_mps: p.state.velocity_mps.y,
+        heading_rad: p.state.heading_rad,
+        height_m: p.state.height_m,
+        arrived: p.arrived,
+        returns: p.returns,
+    }));
+    truth.links.extend(frame.links.iter().map(|link| PeopleLinkRow {
+        scene,
+        frame: number,
+        time_ns,
+        access_point: link.access_point as u32,
+        person: link.person,
+        blocked: link.blocked,
+        static_blocked: link.static_blocked,
+        self_blocked: link.self_blocked,
+    }));
 }
 
 /// Which track is a person's, by (frame, person): at most one, and no track twice in a frame.
@@ -113,7 +143,7 @@ fn ascending<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::truth_of;
+    use crate::score::hand_made::truth_of;
 
     #[test]
     fn scenes_of_the_same_trajectories_are_one_recording_whoever_is_blocked() {

@@ -13,9 +13,9 @@ use umbracast::track::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
 use umbracast::{Config, Error, STEP_S, STEPS};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
-use crate::links::Said;
-use crate::scene::{Matching, SceneRun, TruthIndex};
-use crate::true_forecasts::TrueForecasts;
+use crate::oracle::true_forecasts::TrueForecasts;
+use crate::score::links::Said;
+use crate::score::scene::{Matching, SceneRun, TruthIndex};
 
 /// Front to back and side to side of the box given to a person whom no track has measured (PAPER's ladder).
 const PERSON_BOX_M: [f64; 2] = [0.28, 0.46];
@@ -269,9 +269,9 @@ fn track_of(row: &TrackRow) -> Track {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{track_row, truth_of};
-    use crate::instances::instances;
-    use crate::scene::SceneTruth;
+    use crate::score::hand_made::{track_row, truth_of};
+    use crate::score::instances::instances;
+    use crate::score::scene::SceneTruth;
     use umbracast::Mode;
 
     /// The access point hangs beside person 0, 3 m up at x = -4; person 1 walks by in front of person 0 within
@@ -316,7 +316,7 @@ mod tests {
         let (truth, _) = crossing();
         let index = TruthIndex::new(&truth);
         let weights =
-            Weights::from_safetensors(include_bytes!("../../../models/paper_lstm.safetensors")).unwrap();
+            Weights::from_safetensors(include_bytes!("../../../../models/paper_lstm.safetensors")).unwrap();
         // Both follow person 1; the modes' tracks differ.
         let matching = Matching::from([((9, 1), 7)]);
         let run = |height_m, heading_rad| SceneRun {

@@ -9,25 +9,25 @@ use umbracast::{Config, Error, Health, Mode};
 use umbracast_io::rows::TrackRow;
 use umbracast_sim::body::Walker;
 
-use crate::device::bound_once;
-use crate::displacement::Displacement;
-use crate::instances::instances;
-use crate::link_counts::{LinkCounts, Prediction};
-use crate::links::{Said, never, persistence_of_truth};
-use crate::matching::match_scene;
-use crate::oracles;
-use crate::scene::{SceneRun, SceneTruth, TruthIndex};
-use crate::stage1::Stage1;
-use crate::times::Times;
-use crate::true_bodies::true_bodies;
-use crate::true_forecasts::TrueForecasts;
+use crate::oracle::replaced;
+use crate::oracle::true_bodies::true_bodies;
+use crate::oracle::true_forecasts::TrueForecasts;
+use crate::score::device::bound_once;
+use crate::score::displacement::Displacement;
+use crate::score::instances::instances;
+use crate::score::link_counts::{LinkCounts, Prediction};
+use crate::score::links::{Said, never, persistence_of_truth};
+use crate::score::matching::match_scene;
+use crate::score::scene::{SceneRun, SceneTruth, TruthIndex};
+use crate::score::stage1::Stage1;
+use crate::score::times::Times;
 
 /// Who predicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Predictor {
     /// The mode itself.
     Run,
-    /// The mode itself, heard through devices that are bound to a track once ([`crate::device`]).
+    /// The mode itself, heard through devices that are bound to a track once ([`crate::score::device`]).
     BoundOnce,
     /// The mode with Algorithm 1 on axis-aligned boxes for its stage 3.
     Aabb,
@@ -158,16 +158,16 @@ pub fn score_scene(
         let bound = bound_once(&index, rows, &matching);
         add(mode, Predictor::Run, own.of_tracks(&instances, &matching));
         add(mode, Predictor::BoundOnce, own.of_tracks(&instances, &bound));
-        add(mode, Predictor::Aabb, of_tracks(oracles::algorithm_1(rows, config, BoxKind::Aabb)));
-        add(mode, Predictor::Obb, of_tracks(oracles::algorithm_1(rows, config, BoxKind::Obb)));
+        add(mode, Predictor::Aabb, of_tracks(replaced::algorithm_1(rows, config, BoxKind::Aabb)));
+        add(mode, Predictor::Obb, of_tracks(replaced::algorithm_1(rows, config, BoxKind::Obb)));
         add(
             mode,
             Predictor::ConstantVelocityOfTruth,
-            of_persons(oracles::constant_velocity_of_truth(&index, config)),
+            of_persons(replaced::constant_velocity_of_truth(&index, config)),
         );
-        let true_state = oracles::true_state(&index, rows, &matching, config, weights, &mut true_forecasts)?;
+        let true_state = replaced::true_state(&index, rows, &matching, config, weights, &mut true_forecasts)?;
         add(mode, Predictor::TrueState, of_persons(true_state));
-        add(mode, Predictor::TrueFuture, of_tracks(oracles::true_future(&index, rows, &matching, config)));
+        add(mode, Predictor::TrueFuture, of_tracks(replaced::true_future(&index, rows, &matching, config)));
         if let Some(walkers) = walkers {
             add(mode, Predictor::TrueBody, of_tracks(true_bodies(rows, &matching, walkers, &config.site)));
         }
@@ -175,7 +175,7 @@ pub fn score_scene(
             rows.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
         let forecast = |frame, person| {
             let track = matching.get(&(frame, person))?;
-            forecasts.get(&(frame, *track)).map(|row| oracles::forecast_of(row))
+            forecasts.get(&(frame, *track)).map(|row| replaced::forecast_of(row))
         };
         modes.push(ModeSums {
             mode: config.mode,
@@ -185,7 +185,7 @@ pub fn score_scene(
             health: *health,
         });
     }
-    let carried_on = |frame, person| index.person(frame, person).map(oracles::constant_velocity_steps);
+    let carried_on = |frame, person| index.person(frame, person).map(replaced::constant_velocity_steps);
     Ok(SceneScore {
         scene,
         group: group.to_owned(),
@@ -200,7 +200,7 @@ pub fn score_scene(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{link_row, track_row, truth_of};
+    use crate::score::hand_made::{link_row, track_row, truth_of};
     use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow};
     use umbracast_io::tables::{read, write};
 

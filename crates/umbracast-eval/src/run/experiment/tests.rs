@@ -1,7 +1,7 @@
 use super::*;
-use crate::chain::tests::walk;
-use crate::pooled;
 use crate::report;
+use crate::run::chain::tests::walk;
+use crate::run::pooled;
 use umbracast::Config;
 use umbracast::geometry::DVec2;
 

@@ -3,15 +3,15 @@
 use serde::{Deserialize, Serialize};
 use umbracast::{Health, Mode, STEPS, Site};
 
-use crate::bootstrap::{Bootstrap, Pooled, interval};
-use crate::chain::SceneResult;
-use crate::counts::Counts;
-use crate::displacement::Displacement;
-use crate::ladder::{self, LadderRow, SceneLadder};
-use crate::link_counts::{Bin, LinkCounts};
-use crate::score::{Predictor, SceneScore};
-use crate::stage1::Stage1;
-use crate::times::{TimeCounts, Times};
+use crate::oracle::ladder::{self, LadderRow, SceneLadder};
+use crate::run::chain::SceneResult;
+use crate::run::scene_score::{Predictor, SceneScore};
+use crate::score::bootstrap::{Bootstrap, Pooled, interval};
+use crate::score::counts::Counts;
+use crate::score::displacement::Displacement;
+use crate::score::link_counts::{Bin, LinkCounts};
+use crate::score::stage1::Stage1;
+use crate::score::times::{TimeCounts, Times};
 
 /// The group of all scenes, where there are several presets.
 pub const ALL: &str = "all";

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use umbracast::geometry::DVec2;
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
-use crate::bootstrap::Pooled;
-use crate::counts::{ratio, squared_mahalanobis};
-use crate::identity::{ALPHAS, HotaSums, hota_sums, identity_true_positives};
-use crate::matching::{apart_m, by_frame, match_frame};
+use crate::score::bootstrap::Pooled;
+use crate::score::counts::{ratio, squared_mahalanobis};
+use crate::score::identity::{ALPHAS, HotaSums, hota_sums, identity_true_positives};
+use crate::score::matching::{apart_m, by_frame, match_frame};
 
 /// How many classes of people by returns there are: none, 1 to 5, 6 and more.
 pub const RETURN_CLASSES: usize = 3;
@@ -223,7 +223,7 @@ impl Pooled for Stage1 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{track_row, truth_of};
+    use crate::score::hand_made::{track_row, truth_of};
 
     /// Six people abreast, tracks with errors, gaps, two swaps, a new identity and false tracks.
     fn tangled() -> (Vec<PeopleRow>, Vec<TrackRow>) {

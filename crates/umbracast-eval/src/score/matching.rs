@@ -6,7 +6,7 @@ use umbracast::geometry::DVec2;
 use umbracast::track::association::{FORBIDDEN, optimal};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
-use crate::scene::Matching;
+use crate::score::scene::Matching;
 
 /// A track farther than this from a person is not that person's, metres.
 pub const GATE_M: f64 = 0.5;
@@ -76,7 +76,7 @@ pub fn apart_m(person: &PeopleRow, track: &TrackRow) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{track_row, truth_of};
+    use crate::score::hand_made::{track_row, truth_of};
 
     #[test]
     fn yesterdays_pair_is_kept_though_another_track_is_nearer() {

@@ -5,10 +5,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::chain::SceneResult;
-use crate::fingerprint::fingerprint;
-use crate::ladder::SceneLadder;
-use crate::score::SceneScore;
+use crate::oracle::ladder::SceneLadder;
+use crate::run::chain::SceneResult;
+use crate::run::scene_score::SceneScore;
+use crate::score::fingerprint::fingerprint;
 
 /// How every file begins; the last digit counts the formats.
 const MAGIC: &[u8; 16] = b"umbracast scene1";
@@ -68,9 +68,9 @@ pub fn from_bytes(bytes: &[u8], stamp: &Stamp) -> Result<SceneResult, Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{link_row, track_row, truth_of};
-    use crate::scene::SceneRun;
-    use crate::score::{ModeRun, score_scene};
+    use crate::run::scene_score::{ModeRun, score_scene};
+    use crate::score::hand_made::{link_row, track_row, truth_of};
+    use crate::score::scene::SceneRun;
     use umbracast::{Config, Health, Mode};
 
     const STAMP: Stamp = Stamp { program: 1, inputs: 2, scene: 3 };

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 use umbracast::geometry::DVec2;
 use umbracast::{STEPS, forecast::Gaussian2};
 
-use crate::bootstrap::Pooled;
-use crate::counts::{ratio, squared_mahalanobis};
-use crate::instances::person_counts;
-use crate::scene::TruthIndex;
+use crate::score::bootstrap::Pooled;
+use crate::score::counts::{ratio, squared_mahalanobis};
+use crate::score::instances::person_counts;
+use crate::score::scene::TruthIndex;
 
 /// Squared Mahalanobis distance within which 50 % of a plane Gaussian lies (chi-square, 2 degrees of freedom).
 const CHI2_50: f64 = 1.386;
@@ -135,7 +135,7 @@ impl Pooled for Displacement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::truth_of;
+    use crate::score::hand_made::truth_of;
 
     fn at(x_m: f64, y_m: f64, variance_m2: f64) -> [Gaussian2; STEPS] {
         [Gaussian2 { mean_m: DVec2::new(x_m, y_m), xx_m2: variance_m2, xy_m2: 0.0, yy_m2: variance_m2 };

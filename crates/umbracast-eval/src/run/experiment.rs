@@ -9,9 +9,9 @@ use std::time::SystemTime;
 use rayon::prelude::*;
 use umbracast::Error;
 
-use crate::chain::{Chain, Progress, SceneResult, Spec};
-use crate::fingerprint::fingerprint;
-use crate::scene_file::{self, Fault, Stamp};
+use crate::run::chain::{Chain, Progress, SceneResult, Spec};
+use crate::run::scene_file::{self, Fault, Stamp};
+use crate::score::fingerprint::fingerprint;
 
 /// Where the sums of an experiment are kept.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use umbracast::STEPS;
 use umbracast::track::OBSERVED;
 
-use crate::scene::TruthIndex;
+use crate::score::scene::TruthIndex;
 
 /// One link at one instant `t_e`, with what really happened after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,7 +79,7 @@ fn instance(truth: &TruthIndex, access_point: u32, person: u32, frame: u64) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::truth_of;
+    use crate::score::hand_made::truth_of;
 
     #[test]
     fn the_first_and_the_last_instant_leave_room_for_both_windows() {

@@ -8,7 +8,7 @@ use umbracast::Error;
 use umbracast::geometry::{DVec3, Pose};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
-use crate::stage1::Stage1;
+use crate::score::stage1::Stage1;
 
 /// Reads labels as rows of truth in the site frame. `file` names the text in errors.
 ///

@@ -9,10 +9,10 @@ use umbracast_io::rows::TrackRow;
 use umbracast_sim::body::Walker;
 use umbracast_sim::truth::BodyMesh;
 
-use crate::link_counts::Prediction;
-use crate::links::Said;
-use crate::oracles::forecast_of;
-use crate::scene::{Matching, SceneRun};
+use crate::oracle::replaced::forecast_of;
+use crate::score::link_counts::Prediction;
+use crate::score::links::Said;
+use crate::score::scene::{Matching, SceneRun};
 
 /// Casts, yes or no, at the forecast means. Who is not followed blocks nobody; a track of nobody has no body.
 ///
@@ -127,7 +127,7 @@ mod tests {
             true_bodies(&run, &matching, &walkers, &site)
         };
         let of_person_0 = |said: &Said| {
-            let instance = crate::instances::Instance {
+            let instance = crate::score::instances::Instance {
                 access_point: 0,
                 person: 0,
                 frame: 4,

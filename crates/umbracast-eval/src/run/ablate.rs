@@ -11,18 +11,18 @@ use umbracast::config::Mechanism;
 use umbracast::{Config, Error, Frame, Pipeline};
 use umbracast_io::rows::{PeopleRow, TrackRow};
 
-use crate::bootstrap::{Bootstrap, Pooled, interval, quantile};
-use crate::chain::{Chain, Lane, SceneSpec, Spec};
-use crate::counts::Counts;
-use crate::displacement::Displacement;
-use crate::instances::instances;
-use crate::labels;
-use crate::link_counts::{ECE_BINS, LinkCounts, WindowCounts};
-use crate::links::Said;
-use crate::matching::match_scene;
-use crate::oracles;
-use crate::scene::{Matching, SceneRun, SceneTruth, TruthIndex};
-use crate::stage1::Stage1;
+use crate::oracle::replaced;
+use crate::run::chain::{Chain, Lane, SceneSpec, Spec};
+use crate::score::bootstrap::{Bootstrap, Pooled, interval, quantile};
+use crate::score::counts::Counts;
+use crate::score::displacement::Displacement;
+use crate::score::instances::instances;
+use crate::score::labels;
+use crate::score::link_counts::{ECE_BINS, LinkCounts, WindowCounts};
+use crate::score::links::Said;
+use crate::score::matching::match_scene;
+use crate::score::scene::{Matching, SceneRun, SceneTruth, TruthIndex};
+use crate::score::stage1::Stage1;
 
 mod table;
 
@@ -185,7 +185,7 @@ fn displacement(index: &TruthIndex, matching: &Matching, run: &SceneRun) -> Disp
         run.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
     Displacement::of(index, |frame, person| {
         let track = matching.get(&(frame, person))?;
-        rows.get(&(frame, *track)).map(|row| oracles::forecast_of(row))
+        rows.get(&(frame, *track)).map(|row| replaced::forecast_of(row))
     })
 }
 
@@ -331,7 +331,7 @@ fn median(seconds: &[f64]) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::tests::walk;
+    use crate::run::chain::tests::walk;
     use umbracast::geometry::DVec2;
 
     #[test]

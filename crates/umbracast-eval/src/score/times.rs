@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use umbracast::{STEP_S, STEPS};
 use umbracast_io::rows::LinkRow;
 
-use crate::counts::ratio;
-use crate::instances::Instance;
-use crate::scene::{Matching, SceneRun, TruthIndex};
+use crate::score::counts::ratio;
+use crate::score::instances::Instance;
+use crate::score::scene::{Matching, SceneRun, TruthIndex};
 
 /// Quantiles that were reported of one kind of time at one access point.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -116,8 +116,8 @@ impl TimeCounts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{link_row, truth_of};
-    use crate::instances::instances;
+    use crate::score::hand_made::{link_row, truth_of};
+    use crate::score::instances::instances;
 
     #[test]
     fn what_happens_later_than_the_last_step_is_later_than_any_quantile() {

@@ -14,10 +14,10 @@ use umbracast_sim::random::stream;
 use umbracast_sim::scene::Scene;
 use umbracast_sim::truth::BodyMesh;
 
-use crate::instances::instances;
-use crate::link_counts::{LinkCounts, Prediction};
-use crate::links::Said;
-use crate::scene::{SceneTruth, TruthIndex};
+use crate::score::instances::instances;
+use crate::score::link_counts::{LinkCounts, Prediction};
+use crate::score::links::Said;
+use crate::score::scene::{SceneTruth, TruthIndex};
 
 /// What a ray meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -333,7 +333,7 @@ impl Play<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chain::note_truth;
+    use crate::score::scene::note_truth;
     use umbracast::Config;
     use umbracast_sim::crowd::{Preset, circle_crossing};
 

@@ -3,7 +3,7 @@
 use umbracast::{STEP_NS, STEPS};
 use umbracast_io::rows::{LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
 
-use crate::scene::SceneTruth;
+use crate::score::scene::SceneTruth;
 
 /// `people` persons who stand 10 m apart for `frames` frames, one access point; `blocked` takes
 /// (person, frame).

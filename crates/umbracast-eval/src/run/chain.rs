@@ -7,15 +7,15 @@ use rayon::prelude::*;
 use umbracast::forecast::Weights;
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
-use umbracast_io::rows::{self, PeopleLinkRow, PeopleRow};
+use umbracast_io::rows;
 use umbracast_sim::body::kind::Bodies;
 use umbracast_sim::crowd::{self, Crowd, Preset};
-use umbracast_sim::scene::{Scene, SceneFrame};
+use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
 
-use crate::ladder::{self, SceneLadder};
-use crate::scene::{SceneRun, SceneTruth};
-use crate::score::{ModeRun, SceneScore, score_scene};
+use crate::oracle::ladder::{self, SceneLadder};
+use crate::run::scene_score::{ModeRun, SceneScore, score_scene};
+use crate::score::scene::{SceneRun, SceneTruth, note_truth};
 
 /// Revolutions without people from which the background is learned.
 pub const EMPTY_FRAMES: u64 = 20;
@@ -280,39 +280,10 @@ pub fn push(assembler: &mut Assembler, packets: &[Vec<Packet>], health: &mut Hea
     }
 }
 
-/// The rows of a frame's truth.
-pub fn note_truth(scene: u32, frame: &SceneFrame, truth: &mut SceneTruth) {
-    let (number, time_ns) = (frame.index, frame.time_ns);
-    truth.people.extend(frame.people.iter().map(|p| PeopleRow {
-        scene,
-        frame: number,
-        time_ns,
-        person: p.person,
-        x_m: p.state.position_m.x,
-        y_m: p.state.position_m.y,
-        vx_mps: p.state.velocity_mps.x,
-        vy_mps: p.state.velocity_mps.y,
-        heading_rad: p.state.heading_rad,
-        height_m: p.state.height_m,
-        arrived: p.arrived,
-        returns: p.returns,
-    }));
-    truth.links.extend(frame.links.iter().map(|link| PeopleLinkRow {
-        scene,
-        frame: number,
-        time_ns,
-        access_point: link.access_point as u32,
-        person: link.person,
-        blocked: link.blocked,
-        static_blocked: link.static_blocked,
-        self_blocked: link.self_blocked,
-    }));
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::score::Predictor;
+    use crate::run::scene_score::Predictor;
     use std::sync::atomic::{AtomicU64, Ordering};
     use umbracast::config::{BlockageMethod, BoxKind};
     use umbracast::geometry::DVec2;
