@@ -4,6 +4,7 @@ pub mod body_model;
 pub mod body;
 pub mod algorithm1;
 mod draws;
+mod steps;
 pub mod numbers;
 pub mod probability;
 pub mod caster;

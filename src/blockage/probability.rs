@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use super::body::{self, Posture, distance2_to_segment};
-use super::caster::{heading_at, position_at};
 use super::draws::Draws;
 use super::numbers::Numbers;
+use super::steps::{heading_at, position_at};
 use crate::forecast::Forecast;
 use crate::gait::{self, GaitPhase, WALKS_FROM_MPS};
 use crate::geometry::{DVec2, DVec3};

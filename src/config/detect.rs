@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Mechanism;
+use super::mechanism::Mechanism;
 
 /// See `config/default.toml` for every value and its reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{BackgroundMethod, ClusterMethod, Config, ForecastMethod, PositionMethod};
-
 /// A part of the default mode that can be left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -113,53 +111,6 @@ impl Mechanism {
             Self::ArmSwing => "arm-swing",
             Self::TrunkSway => "trunk-sway",
             Self::JointSampling => "joint-sampling",
-        }
-    }
-}
-
-impl Config {
-    /// The same without a mechanism: by a plainer method where there is one, else with the mechanism named in the
-    /// stages' `without`.
-    #[must_use]
-    pub fn without(&self, mechanism: Mechanism) -> Self {
-        let mut config = self.clone();
-        let Self { detect, track, forecast, blockage, .. } = &mut config;
-        match mechanism {
-            Mechanism::RangeModel => detect.background = BackgroundMethod::Voxels,
-            Mechanism::CountTest => detect.clusters = ClusterMethod::Haselich,
-            Mechanism::AxisNetwork => {
-                detect.position = PositionMethod::ShiftedMean;
-                track.without.push(mechanism);
-            }
-            Mechanism::Residual => forecast.method = ForecastMethod::ConstantVelocity,
-            _ => {
-                for stage in mechanism.stages() {
-                    match *stage {
-                        "detect" => detect.without.push(mechanism),
-                        "track" => track.without.push(mechanism),
-                        "forecast" => forecast.without.push(mechanism),
-                        _ => blockage.without.push(mechanism),
-                    }
-                }
-            }
-        }
-        config
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_mechanism_leaves_something_out_and_is_named_in_files_as_in_tables() {
-        let whole = Config::default();
-        for mechanism in Mechanism::ALL {
-            let without = whole.without(mechanism);
-            assert_ne!(without, whole, "{mechanism:?}");
-            assert_eq!(Config::of_run(&without.to_toml(), "config.toml").unwrap(), without);
-            let named = toml::Value::try_from(mechanism).unwrap();
-            assert_eq!(named.as_str(), Some(mechanism.name()));
         }
     }
 }

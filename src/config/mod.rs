@@ -107,8 +107,14 @@ impl Config {
             let (asked, found) = (mode.name(), config.mode.name());
             return Err(Error::new(format!("{file}: mode: expected {asked}, found a file of mode {found}")));
         }
-        check::check(&config).map_err(|error| error.within(file))?;
+        config.check().map_err(|error| error.within(file))?;
         Ok(config)
+    }
+
+    /// Refuses values that cannot work.
+    fn check(&self) -> Result<(), Error> {
+        check::stages(&self.detect, &self.track, &self.forecast, &self.blockage)?;
+        check_site::check_site(&self.site)
     }
 
     /// The configuration that a run wrote beside its output: its mode is the one it names.
@@ -131,6 +137,34 @@ impl Config {
             toml::from_str(text).map_err(|e| Error::new(e.to_string()).within(file))?;
         recorded.retain(|key, _| key == "site");
         Ok(Self::with_overlay(Mode::Default, &recorded.to_string(), file)?.site)
+    }
+
+    /// The same without a mechanism: by a plainer method where there is one, else with the mechanism named in the
+    /// stages' `without`.
+    #[must_use]
+    pub fn without(&self, mechanism: Mechanism) -> Self {
+        let mut config = self.clone();
+        let Self { detect, track, forecast, blockage, .. } = &mut config;
+        match mechanism {
+            Mechanism::RangeModel => detect.background = BackgroundMethod::Voxels,
+            Mechanism::CountTest => detect.clusters = ClusterMethod::Haselich,
+            Mechanism::AxisNetwork => {
+                detect.position = PositionMethod::ShiftedMean;
+                track.without.push(mechanism);
+            }
+            Mechanism::Residual => forecast.method = ForecastMethod::ConstantVelocity,
+            _ => {
+                for stage in mechanism.stages() {
+                    match *stage {
+                        "detect" => detect.without.push(mechanism),
+                        "track" => track.without.push(mechanism),
+                        "forecast" => forecast.without.push(mechanism),
+                        _ => blockage.without.push(mechanism),
+                    }
+                }
+            }
+        }
+        config
     }
 
     /// The same as TOML text, as every run writes it beside its output.
@@ -191,5 +225,50 @@ mod tests {
         let message = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
         assert!(message.starts_with("lab.toml:2:"), "{message}");
         assert!(message.contains("expected a number") && message.contains("found a string"), "{message}");
+    }
+
+    #[test]
+    fn every_mechanism_leaves_something_out_and_is_named_in_files_as_in_tables() {
+        let whole = Config::default();
+        for mechanism in Mechanism::ALL {
+            let without = whole.without(mechanism);
+            assert_ne!(without, whole, "{mechanism:?}");
+            assert_eq!(Config::of_run(&without.to_toml(), "config.toml").unwrap(), without);
+            let named = toml::Value::try_from(mechanism).unwrap();
+            assert_eq!(named.as_str(), Some(mechanism.name()));
+        }
+    }
+
+    #[test]
+    fn what_cannot_work_is_refused_with_its_key() {
+        for (text, key) in [
+            ("[detect]\nhighest_m = 0.0", "detect.highest_m"),
+            ("[detect]\nthin_m = -1.0", "detect.thin_m"),
+            ("[track]\ncoast_max_s = nan", "track.coast_max_s"),
+            ("[track]\nwithout = [\"arms\"]", "track.without"),
+            ("[blockage]\nsamples = 0", "blockage.samples"),
+            ("[blockage]\nthreshold = 1.5", "blockage.threshold"),
+            ("[site]\nsensors = []", "site.sensors"),
+            ("[[site.pillars]]\nposition_m = [1.0, 2.0]\nradius_m = -1.0", "site.pillars[0].radius_m"),
+            (
+                "[[site.furniture]]\nposition_m = [1.0, 2.0]\nsize_m = [1.0, 0.0, 1.0]\nyaw_deg = 0.0",
+                "site.furniture[0].size_m",
+            ),
+        ] {
+            let message = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
+            assert!(message.starts_with("lab.toml") && message.contains(key), "{message}");
+        }
+    }
+
+    /// Two sensors of one name shared a topic, and each took the other's packets for its own repeated.
+    #[test]
+    fn two_sensors_of_one_name_are_refused() {
+        let mut config = Config::default();
+        config.site.sensors[1].name = config.site.sensors[0].name.clone();
+        let message = config.check().unwrap_err().to_string();
+        assert!(message.contains("site.sensors") && message.contains("twice"), "{message}");
+        let mut config = Config::default();
+        config.site.access_points[1].name = config.site.access_points[0].name.clone();
+        assert!(config.check().unwrap_err().to_string().contains("site.access_points"));
     }
 }
