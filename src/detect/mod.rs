@@ -6,12 +6,12 @@
 pub mod range_model;
 pub mod voxel;
 pub mod background;
+pub mod features;
 pub mod cluster;
 pub mod dp_means;
 pub mod guided;
 pub mod evidence;
 pub mod split_merge;
-pub mod features;
 pub mod axis;
 pub mod limbs;
 pub mod measure;

@@ -2,8 +2,8 @@
 //! sensors together ([`Frame`]). Nothing after this module knows a sensor model.
 
 pub mod model;
-pub mod packet;
 pub mod scan;
+pub mod packet;
 pub mod assemble;
 
 pub use assemble::Assembler;

@@ -2,11 +2,11 @@
 //! sensors can see of everybody.
 
 use super::association::{FORBIDDEN, in_order, optimal};
+use super::followed::{Track, seconds};
 use super::gaussian::{State, inverted, plus, quadratic, round};
 use super::numbers::Numbers;
 use super::person::{Person, noise, sway};
 use super::visibility::{Body, BodyView, Visibility, detection_probability};
-use super::{Track, seconds};
 use crate::config::TrackConfig;
 use crate::detect::{Detection, Prior};
 use crate::geometry::DVec2;

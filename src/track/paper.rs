@@ -6,8 +6,10 @@
 #![allow(non_snake_case)]
 
 use super::association::{FORBIDDEN, greedy, in_order, optimal};
+use super::followed::{
+    ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, WIDTH_SCALE_SIGMA, seconds,
+};
 use super::gaussian::State;
-use super::{ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, WIDTH_SCALE_SIGMA, seconds};
 use crate::Frame;
 use crate::detect::Detection;
 use crate::gait::{GaitPhase, WALKS_FROM_MPS};

@@ -1,5 +1,6 @@
 //! One person followed: filter, height, heading, boxes, and how sure it is that somebody is there.
 
+use super::followed::{ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, seconds};
 use super::gaussian::{Mat2, State, largest_sigma, plus, round};
 use super::height::Height;
 use super::kalman::Filter;
@@ -7,7 +8,6 @@ use super::limb_phase::LimbPhase;
 use super::numbers::Numbers;
 use super::visibility::{Body, BodyView};
 use super::width::BodyWidth;
-use super::{ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, seconds};
 use crate::detect::{Detection, Prior};
 use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};

@@ -1,0 +1,85 @@
+//! What a tracker says of one person.
+
+use std::collections::VecDeque;
+
+use super::width;
+use crate::gait::GaitPhase;
+use crate::geometry::{Aabb, DVec2, Obb};
+
+/// Positions of the observation window: 10 frames (paper, section V-B).
+pub const OBSERVED: usize = 10;
+/// Variance of a heading that may be any: even over a turn.
+pub(super) const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
+/// How fast who stands may turn away from the last heading: 40 degrees (one sigma) in a second. A guess: nothing
+/// that is measured here tells it.
+pub(super) const STANDING_TURN_RAD2PS: f64 = 0.5;
+
+/// One standard deviation of the width scale of adults of whom nothing is known.
+pub const WIDTH_SCALE_SIGMA: f64 = width::PRIOR_SIGMA;
+
+/// One person followed over time, at the frame's instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// Never used twice in a run.
+    pub id: u64,
+    /// Ground point of the body axis.
+    pub position_m: DVec2,
+    /// Its velocity.
+    pub velocity_mps: DVec2,
+    /// Of (x, y, vx, vy); metres and seconds.
+    pub covariance: [[f64; 4]; 4],
+    /// The trunk's, counter-clockwise from +x: the velocity's while walking, held while standing.
+    pub heading_rad: f64,
+    /// One standard deviation of `heading_rad`: what the velocity's covariance leaves open while walking, more
+    /// with the time while standing, and 1.81 (any direction) for who has never walked.
+    pub heading_sigma_rad: f64,
+    /// Standing height, shoes and hair included; by the paper's method the last detection's highest point.
+    pub height_m: f64,
+    /// One standard deviation of `height_m`.
+    pub height_sigma_m: f64,
+    /// Depths and widths of the body beside those of a usual one of this height: 1.
+    pub width_scale: f64,
+    /// One standard deviation of `width_scale`.
+    pub width_scale_sigma: f64,
+    /// Where in the stride, as arms and legs tell it.
+    pub gait: GaitPhase,
+    /// Points of this frame's detection; 0 while it coasts.
+    pub points: u32,
+    /// False until the track has been seen often enough to be believed, and while it has been out of sight so long
+    /// that its position says little.
+    pub confirmed: bool,
+    /// The person's box along the site's axes, at `position_m`.
+    pub aabb: Aabb,
+    /// The person's oriented box, at `position_m`.
+    pub obb: Obb,
+    /// The last states, oldest first, this frame's last: at most [`OBSERVED`].
+    pub observed: VecDeque<Observed>,
+}
+
+/// A track's state at a frame of the observation window, as the filter held it then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observed {
+    /// The frame's.
+    pub time_ns: i64,
+    /// Position.
+    pub position_m: DVec2,
+    /// Velocity.
+    pub velocity_mps: DVec2,
+}
+
+/// The observation window of a track.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Observations(pub(super) VecDeque<Observed>);
+
+impl Observations {
+    pub(super) fn push(&mut self, time_ns: i64, position_m: DVec2, velocity_mps: DVec2) {
+        if self.0.len() == OBSERVED {
+            self.0.pop_front();
+        }
+        self.0.push_back(Observed { time_ns, position_m, velocity_mps });
+    }
+}
+
+pub(super) fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 * 1e-9
+}
