@@ -124,6 +124,10 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     tables.finish()?;
     result?;
     progress.finish_and_clear();
+    let empty_handed = inputs.iter().zip(&frames).filter(|(_, frames)| frames.is_empty());
+    lost.extend(empty_handed.map(|(input, _)| {
+        format!("{input}: expected frames of the site's sensors, found none; `umbracast inspect` says what it holds")
+    }));
     step_s.sort_by(f64::total_cmp);
     let at = |share: f64| step_s.get(((step_s.len() as f64 * share) as usize).min(step_s.len().max(1) - 1));
     let ms = |share: f64| at(share).map_or(0.0, |s| s * 1e3);
