@@ -227,7 +227,7 @@ fn run_scene(
     Ok(done)
 }
 
-/// The recording without people: as given, else `empty.mcap` beside the first recording.
+/// The scene without people: as given, in any form that `run` reads, else `empty.mcap` beside the first recording.
 fn empty_frames(
     args: &Run,
     first: &Input,
@@ -242,8 +242,11 @@ fn empty_frames(
     let Some(file) = args.empty.clone().or_else(beside).filter(|_| !args.no_empty) else {
         return Ok(Vec::new());
     };
+    let [empty] = &input::scenes(std::slice::from_ref(&file))?[..] else {
+        return Err(Error::new("expected one scene without people, found several").within(file.display()));
+    };
     let mut frames = Vec::new();
-    lost.extend(Input::Recording(file).frames(&config.site, health, |frame| {
+    lost.extend(empty.frames(&config.site, health, |frame| {
         frames.push(frame.clone());
         Ok(())
     })?);
