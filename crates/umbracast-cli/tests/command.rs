@@ -301,7 +301,12 @@ fn captures_of_other_sensors_end_with_code_3_and_may_show_the_empty_hall() {
     for name in ["east.pcap", "west.pcap"] {
         let file = fs::File::create(folder.join(name)).expect("creates");
         let mut capture = umbracast_io::pcap::PcapWriter::new(file).expect("writes");
-        let datagram = umbracast_io::pcap::Datagram { time_ns: 0, from: [10, 0, 0, 1], port: 7502, payload: vec![0; 64] };
+        let datagram = umbracast_io::pcap::Datagram {
+            time_ns: 0,
+            from: [10, 0, 0, 1],
+            port: 7502,
+            payload: vec![0; 64],
+        };
         capture.write(&datagram).expect("writes");
         capture.finish().expect("writes");
     }

@@ -61,6 +61,19 @@ fn the_page_of_commands_is_what_they_say_of_themselves() {
 }
 
 #[test]
+fn the_site_file_of_the_guide_is_understood() {
+    let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/USING.md");
+    let guide = fs::read_to_string(guide).expect("docs/USING.md");
+    let site =
+        guide.split("```toml\n").nth(1).and_then(|after| after.split("```").next()).expect("a site file");
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hall.toml");
+    fs::write(&file, site).expect("writes");
+    let done = Command::new(env!("CARGO_BIN_EXE_umbracast")).args(["config", "--check"]).arg(&file).output();
+    let done = done.expect("it runs");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+}
+
+#[test]
 fn listed_commands_are_read_from_a_help() {
     let help = "Usage: x\n\nCommands:\n  demo  One\n  run   Two\n  help  Three\n\nOptions:\n  -h\n";
     assert_eq!(listed(help), ["demo", "run"]);
