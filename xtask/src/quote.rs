@@ -73,7 +73,7 @@ fn opened(part: &str) -> Option<(usize, usize)> {
     Some((from, from + part[from..].find(FENCE)?))
 }
 
-/// The record's lines that the rules choose, and what found none.
+/// The record's lines that the rules choose, tables with an empty line between, and what found none.
 fn cut(record: &str, rules: &[&str]) -> (String, Vec<String>) {
     let (mut block, mut found_nothing) = (String::new(), Vec::new());
     for rule in rules {
@@ -85,6 +85,9 @@ fn cut(record: &str, rules: &[&str]) -> (String, Vec<String>) {
             found_nothing.push(title.to_owned());
             continue;
         };
+        if !block.is_empty() && !further.is_empty() {
+            block.push('\n');
+        }
         block += first.trim_end();
         block.push('\n');
         let paragraph: Vec<&str> = lines.take_while(|line| !line.trim().is_empty()).collect();
@@ -122,7 +125,7 @@ mod tests {
         let new =
             renewed(page, |name| (name == "record/a.txt").then(|| RECORD.to_owned()), |m| panic!("{m}"));
         let block =
-            "```text\n$ umbracast evaluate\nmode   F1\nours   .94\nDetection\nours   .99\n```\nAfter.";
+            "```text\n$ umbracast evaluate\nmode   F1\nours   .94\n\nDetection\nours   .99\n```\nAfter.";
         assert!(new.contains(block), "{new}");
         assert!(new.starts_with("Before.\n<!-- from record/a.txt\n$ umbracast | mode"), "{new}");
         assert!(new.ends_with("<!-- from record/b.txt -->\n```text\nx\n```\n"), "{new}");
