@@ -151,23 +151,56 @@ fn nothing_is_left_undone() {
     }
 }
 
+/// README.md and the pages of docs/: name and text.
+fn pages() -> Vec<(String, String)> {
+    let docs = fs::read_dir(root().join("docs")).expect("docs/").flatten().map(|entry| entry.path());
+    let mut paths: Vec<PathBuf> = docs.filter(|path| path.extension().is_some_and(|e| e == "md")).collect();
+    paths.push(root().join("README.md"));
+    paths.sort();
+    let name = |path: &Path| path.strip_prefix(root()).unwrap_or(path).display().to_string();
+    paths.iter().map(|path| (name(path), fs::read_to_string(path).expect("a page is text"))).collect()
+}
+
+/// `cargo xtask quote` cuts the blocks anew.
 #[test]
 fn every_figure_of_a_page_stands_in_a_recorded_run() {
-    for page in ["README.md", "docs/PAPER_FIGURES.md"] {
-        let text = fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
-        let mut checked = 0;
+    let mut quoting = Vec::new();
+    for (page, text) in pages() {
         for part in text.split("<!-- from ").skip(1) {
-            let (name, rest) = part.split_once(" -->").expect("a comment that names a record");
-            let record = fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let (comment, rest) = part.split_once("-->").expect("a comment that names a record");
+            let name = comment.split_whitespace().next().expect("the name of a record");
+            let record =
+                fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{page}: {name}: {e}"));
             let block = rest.split("```").nth(1).expect("a block below the comment");
-            for line in block.lines().skip(1).filter(|line| !line.trim().is_empty()) {
-                assert!(
-                    record.contains(line.trim_end()),
-                    "{page} quotes a line that {name} does not hold: {line}"
-                );
-                checked += 1;
+            let lines: Vec<&str> = block.lines().skip(1).filter(|line| !line.trim().is_empty()).collect();
+            assert!(!lines.is_empty(), "{page} quotes nothing of {name}");
+            for line in lines {
+                let found = record.lines().any(|recorded| recorded.trim_end() == line.trim_end());
+                assert!(found, "{page} quotes a line that {name} does not hold: {line}");
             }
+            quoting.push(page.clone());
         }
-        assert!(checked > 0, "{page} quotes no recorded run");
     }
+    for page in ["README.md", "docs/RESULTS.md", "docs/PAPER_FIGURES.md"] {
+        assert!(quoting.iter().any(|name| name == page), "{page} quotes no recorded run");
+    }
+}
+
+#[test]
+fn every_link_of_a_page_leads_somewhere() {
+    for (page, text) in pages() {
+        let folder = root().join(&page).parent().map(Path::to_path_buf).unwrap_or_default();
+        for target in text.split("](").skip(1).filter_map(|after| after.split(')').next()) {
+            let file = target.split('#').next().unwrap_or_default();
+            let elsewhere = file.is_empty() || file.contains("://") || file.contains(char::is_whitespace);
+            assert!(elsewhere || folder.join(file).exists(), "{page} leads to {file}, which is not there");
+        }
+    }
+}
+
+#[test]
+fn the_front_door_is_short() {
+    let (_, text) = pages().into_iter().find(|(name, _)| name == "README.md").expect("README.md");
+    let lines = text.lines().count();
+    assert!(lines <= 120, "README.md: {lines} lines");
 }

@@ -2,6 +2,7 @@
 
 mod tools;
 mod record;
+mod quote;
 mod same_tables;
 mod structure;
 
@@ -11,6 +12,7 @@ const USAGE: &str = "\
 cargo xtask record NAME...    make these files of record/ anew; `all` makes all but `locked`
     --dirty                       from a tree with changes; the record says so
 cargo xtask record            list the names
+cargo xtask quote             cut every block of figures in README.md and docs/ anew from its record
 cargo xtask same-tables REV   whether a git revision and the working tree write the same tables, byte for byte
 cargo xtask structure         files and imports as a picture, docs/structure.svg, and in words
     --check                       write nothing; fail where the picture is stale or files of src/ use one another in a circle";
@@ -20,6 +22,7 @@ fn main() -> ExitCode {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let result = match words.as_slice() {
         ["record", names @ ..] => record::run(names),
+        ["quote"] => quote::run(),
         ["same-tables", revision] => same_tables::run(revision),
         ["structure"] => structure::run(false),
         ["structure", "--check"] => structure::run(true),

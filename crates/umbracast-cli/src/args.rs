@@ -188,8 +188,9 @@ pub struct Run {
     /// Whose method: hdl, paper or default.
     #[arg(long, default_value = "default")]
     pub mode: Mode,
-    /// A recording without people; default: empty.mcap beside the recordings, else learned on the way.
-    #[arg(long, value_name = "FILE")]
+    /// The hall without people, in any form that INPUT may have; default: empty.mcap beside the recordings, else learned
+    /// on the way.
+    #[arg(long, value_name = "PATH")]
     pub empty: Option<PathBuf>,
     /// Learn the background on the way even where there is an empty recording.
     #[arg(long)]

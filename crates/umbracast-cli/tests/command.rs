@@ -296,6 +296,28 @@ fn a_capture_among_recordings_is_refused_because_it_names_no_site() {
 }
 
 #[test]
+fn captures_of_other_sensors_end_with_code_3_and_may_show_the_empty_hall() {
+    let folder = folder("foreign_captures");
+    for name in ["east.pcap", "west.pcap"] {
+        let file = fs::File::create(folder.join(name)).expect("creates");
+        let mut capture = umbracast_io::pcap::PcapWriter::new(file).expect("writes");
+        let datagram = umbracast_io::pcap::Datagram {
+            time_ns: 0,
+            from: [10, 0, 0, 1],
+            port: 7502,
+            payload: vec![0; 64],
+        };
+        capture.write(&datagram).expect("writes");
+        capture.finish().expect("writes");
+    }
+    let (east, west) = (folder.join("east.pcap"), folder.join("west.pcap"));
+    let out = folder.join("out");
+    let message =
+        ends_with(3, &["run", text(&east), text(&west), "--empty", text(&folder), "--out", text(&out)]);
+    assert!(message.contains("east.pcap and 1 more: expected frames"), "{message}");
+}
+
+#[test]
 fn a_sensor_that_the_site_loses_is_counted_in_the_run_s_health() {
     let folder = folder("lost_sensor");
     let site = folder.join("lost.toml");

@@ -124,6 +124,10 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     tables.finish()?;
     result?;
     progress.finish_and_clear();
+    let empty_handed = inputs.iter().zip(&frames).filter(|(_, frames)| frames.is_empty());
+    lost.extend(empty_handed.map(|(input, _)| {
+        format!("{input}: expected frames of the site's sensors, found none; `umbracast inspect` says what it holds")
+    }));
     step_s.sort_by(f64::total_cmp);
     let at = |share: f64| step_s.get(((step_s.len() as f64 * share) as usize).min(step_s.len().max(1) - 1));
     let ms = |share: f64| at(share).map_or(0.0, |s| s * 1e3);
@@ -223,7 +227,7 @@ fn run_scene(
     Ok(done)
 }
 
-/// The recording without people: as given, else `empty.mcap` beside the first recording.
+/// The scene without people: as given, in any form that `run` reads, else `empty.mcap` beside the first recording.
 fn empty_frames(
     args: &Run,
     first: &Input,
@@ -238,8 +242,11 @@ fn empty_frames(
     let Some(file) = args.empty.clone().or_else(beside).filter(|_| !args.no_empty) else {
         return Ok(Vec::new());
     };
+    let [empty] = &input::scenes(std::slice::from_ref(&file))?[..] else {
+        return Err(Error::new("expected one scene without people, found several").within(file.display()));
+    };
     let mut frames = Vec::new();
-    lost.extend(Input::Recording(file).frames(&config.site, health, |frame| {
+    lost.extend(empty.frames(&config.site, health, |frame| {
         frames.push(frame.clone());
         Ok(())
     })?);

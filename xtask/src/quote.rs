@@ -1,0 +1,147 @@
+//! `quote`: every block of figures in a document is cut anew from the record that the comment above it names.
+//!
+//! ```text
+//! <!-- from record/speed.txt
+//! $ umbracast run * --mode default | * frames
+//! -->
+//! ```
+//!
+//! Each line of the comment is one rule: first what a line of the record begins with, then, between bars, what further
+//! lines up to the next empty one begin with. A star stands for anything. Only a comment that has rules is followed.
+
+use std::fs;
+
+use crate::tools::{Result, files_below, root};
+
+/// What a comment of a quoted block begins with.
+const MARK: &str = "<!-- from ";
+const FENCE: &str = "```";
+
+/// Rewrites README.md and the pages of docs/. Fails, once all that can be is written, where a rule finds nothing.
+pub fn run() -> Result<()> {
+    let mut missing = Vec::new();
+    for page in [vec![root().join("README.md")], files_below(&root().join("docs"), ".md")].concat() {
+        let name = page.strip_prefix(root()).unwrap_or(&page).display().to_string();
+        let text = fs::read_to_string(&page).map_err(|e| format!("{name}: {e}"))?;
+        let told = |what: String| missing.push(format!("{name}: {what}"));
+        let renewed = renewed(&text, |record| fs::read_to_string(root().join(record)).ok(), told);
+        if renewed != text {
+            fs::write(&page, renewed).map_err(|e| format!("{name}: {e}"))?;
+            println!("{name}");
+        }
+    }
+    if missing.is_empty() { Ok(()) } else { Err(format!("quote:\n{}", missing.join("\n"))) }
+}
+
+/// The page with every block cut anew. A block whose record is not there, or of which nothing is found, stays.
+fn renewed(page: &str, record: impl Fn(&str) -> Option<String>, mut missing: impl FnMut(String)) -> String {
+    let mut parts = page.split(MARK);
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text += MARK;
+        let comment = part.split("-->").next().unwrap_or_default();
+        let mut lines = comment.lines().map(str::trim).filter(|line| !line.is_empty());
+        let name = lines.next().unwrap_or_default();
+        let rules: Vec<&str> = lines.collect();
+        let place = opened(part);
+        let (Some((from, to)), false) = (place, rules.is_empty()) else {
+            text += part;
+            continue;
+        };
+        let Some(record) = record(name) else {
+            missing(format!("{name}: not there"));
+            text += part;
+            continue;
+        };
+        let (block, found_nothing) = cut(&record, &rules);
+        found_nothing.iter().for_each(|rule| missing(format!("{name}: no line {rule:?}")));
+        if block.is_empty() {
+            text += part;
+        } else {
+            text += &part[..from];
+            text += &block;
+            text += &part[to..];
+        }
+    }
+    text
+}
+
+/// From where to where the inside of the first block lies, its line ends included.
+fn opened(part: &str) -> Option<(usize, usize)> {
+    let fence = part.find(FENCE)?;
+    let from = fence + part[fence..].find('\n')? + 1;
+    Some((from, from + part[from..].find(FENCE)?))
+}
+
+/// The record's lines that the rules choose, tables with an empty line between, and what found none.
+fn cut(record: &str, rules: &[&str]) -> (String, Vec<String>) {
+    let (mut block, mut found_nothing) = (String::new(), Vec::new());
+    for rule in rules {
+        let mut parts = rule.split('|').map(str::trim);
+        let title = parts.next().unwrap_or_default();
+        let further: Vec<&str> = parts.collect();
+        let mut lines = record.lines().skip_while(|line| !begins(line, title));
+        let Some(first) = lines.next() else {
+            found_nothing.push(title.to_owned());
+            continue;
+        };
+        if !block.is_empty() && !further.is_empty() {
+            block.push('\n');
+        }
+        block += first.trim_end();
+        block.push('\n');
+        let paragraph: Vec<&str> = lines.take_while(|line| !line.trim().is_empty()).collect();
+        for line in paragraph.iter().filter(|line| further.iter().any(|glob| begins(line, glob))) {
+            block += line.trim_end();
+            block.push('\n');
+        }
+        let in_vain = further.iter().filter(|glob| !paragraph.iter().any(|line| begins(line, glob)));
+        found_nothing.extend(in_vain.map(|glob| format!("{title} | {glob}")));
+    }
+    (block, found_nothing)
+}
+
+/// Whether a line begins so, a star being anything.
+fn begins(line: &str, glob: &str) -> bool {
+    let mut pieces = glob.split('*');
+    let Some(mut rest) = pieces.next().and_then(|first| line.strip_prefix(first)) else { return false };
+    for piece in pieces {
+        let Some(at) = rest.find(piece) else { return false };
+        rest = &rest[at + piece.len()..];
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RECORD: &str = "$ umbracast evaluate\nmode   F1\npaper  .80\nours   .94\n\nDetection\nours   .99\n";
+
+    #[test]
+    fn a_block_is_cut_anew_and_the_rest_stays() {
+        let page = "Before.\n<!-- from record/a.txt\n$ umbracast | mode | ours\nDetection | *\n-->\n\
+                    ```text\nours   .50\n```\nAfter.\n<!-- from record/b.txt -->\n```text\nx\n```\n";
+        let new =
+            renewed(page, |name| (name == "record/a.txt").then(|| RECORD.to_owned()), |m| panic!("{m}"));
+        let block =
+            "```text\n$ umbracast evaluate\nmode   F1\nours   .94\n\nDetection\nours   .99\n```\nAfter.";
+        assert!(new.contains(block), "{new}");
+        assert!(new.starts_with("Before.\n<!-- from record/a.txt\n$ umbracast | mode"), "{new}");
+        assert!(new.ends_with("<!-- from record/b.txt -->\n```text\nx\n```\n"), "{new}");
+    }
+
+    #[test]
+    fn what_is_not_found_is_told() {
+        let (block, nothing) = cut(RECORD, &["$ umbracast | hdl", "Tracking"]);
+        assert_eq!((block.as_str(), nothing.len()), ("$ umbracast evaluate\n", 2));
+        assert_eq!(nothing, ["$ umbracast | hdl", "Tracking"]);
+    }
+
+    #[test]
+    fn a_star_is_anything_between() {
+        assert!(begins("side  300 ms  paper       0.1", "side*300 ms*paper  *0."));
+        assert!(!begins("side  300 ms  paper, bound once  0.1", "side*300 ms*paper  *0."));
+        assert!(!begins("other side", "side"));
+    }
+}
