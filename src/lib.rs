@@ -6,7 +6,9 @@
 //! uses only what stands above it.
 //!
 //! ```
-//! use umbracast::{Config, Mode, Pipeline, lidar::Assembler, Health};
+//! use std::time::Duration;
+//!
+//! use umbracast::{Config, Health, Mode, Pipeline, lidar::Assembler};
 //!
 //! let config = Config::for_mode(Mode::Default);
 //! let mut assembler = Assembler::new(&config.site)?;
@@ -17,7 +19,8 @@
 //!     assembler.push(*sensor, packet, &mut health);
 //!     while let Some(frame) = assembler.pop() {
 //!         for link in &pipeline.step(&frame).blockages {
-//!             println!("track {} blocked within 300 ms: {:.2}", link.track, link.p[2]);
+//!             let p = link.p_within(Duration::from_millis(300));
+//!             println!("track {} blocked within 300 ms: {p:.2}", link.track);
 //!         }
 //!     }
 //! }
@@ -30,6 +33,7 @@ pub mod health;
 pub mod site;
 pub mod config;
 pub mod lidar;
+#[doc(hidden)] // What walking bodies have in common, for tracks, casts and their scores; users meet `track::GaitPhase`.
 pub mod gait;
 pub mod detect;
 pub mod track;
