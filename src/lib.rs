@@ -5,6 +5,10 @@
 //! [`pipeline::Pipeline::step`] is that sentence as code. The modules below stand in the same order, and each
 //! uses only what stands above it.
 //!
+//! These pages show what a user needs. Items that only the crates beside this one need (training, scores, the
+//! simulator) are public, hidden here, and may change with any version. The equations behind every stage stand in
+//! `docs/METHODS.md` of the repository.
+//!
 //! ```
 //! use std::time::Duration;
 //!

@@ -34,7 +34,9 @@ use crate::{Error, Health, STEP_NS, Site};
 ///
 /// use umbracast::{Config, Health, lidar::Assembler};
 ///
-/// let (mut assembler, mut health) = (Assembler::new(&Config::default().site)?, Health::default());
+/// let mut site = Config::default().site;
+/// site.sensors.truncate(1); // the others would be waited for
+/// let (mut assembler, mut health) = (Assembler::new(&site)?, Health::default());
 /// let mut frames = 0;
 /// for packet in packets {
 ///     assembler.push(0, &packet, &mut health);
