@@ -33,7 +33,6 @@ cut_deg = 180.0
 range_min_m = 0.5
 range_max_m = 60.0
 range_noise_m = 0.02
-dropout = 0.01
 
 [[site.access_points]]
 name = "far wall"

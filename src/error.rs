@@ -4,6 +4,11 @@
 use std::fmt;
 
 /// What went wrong while something was set up or opened. The message names file, place, expected and found.
+///
+/// ```
+/// let error = umbracast::Config::with_overlay(umbracast::Mode::Default, "sight = 3", "hall.toml").unwrap_err();
+/// assert!(error.to_string().starts_with("hall.toml:1:1: unknown key `sight`"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Error {
     message: String,
@@ -11,11 +16,20 @@ pub struct Error {
 
 impl Error {
     /// An error with its story.
+    ///
+    /// ```
+    /// assert_eq!(umbracast::Error::new("expected a name, found none").to_string(), "expected a name, found none");
+    /// ```
     pub fn new(message: impl Into<String>) -> Self {
         Self { message: message.into() }
     }
 
     /// The same error, with the file or place it happened in put before it.
+    ///
+    /// ```
+    /// let error = umbracast::Error::new("expected a name, found none").within("site.sensors[1]");
+    /// assert_eq!(error.to_string(), "site.sensors[1]: expected a name, found none");
+    /// ```
     #[must_use]
     pub fn within(self, place: impl fmt::Display) -> Self {
         Self { message: format!("{place}: {}", self.message) }

@@ -22,6 +22,13 @@ const HIP_SHARE: f64 = 0.53;
 const FULL_SWAY_HZ: f64 = 0.5;
 
 /// The phase of a gait and how sure it is: a von Mises distribution.
+///
+/// ```
+/// use umbracast::track::GaitPhase;
+///
+/// // Who stands has none.
+/// assert_eq!(GaitPhase::UNKNOWN.concentration, 0.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaitPhase {
     /// Since the right heel touched the floor; a stride is a full turn.
@@ -36,6 +43,7 @@ impl GaitPhase {
 
     /// What an oscillation with its quadrature, each known to `variance`, tells that is largest at the phase
     /// `largest_rad`. The quadrature is minus the sine of the angle since the largest value.
+    #[doc(hidden)] // The tracker calls it.
     pub fn of_wave([value, quadrature]: [f64; 2], variance: f64, largest_rad: f64, speed_mps: f64) -> Self {
         let squared = value * value + quadrature * quadrature;
         if speed_mps < WALKS_FROM_MPS || squared == 0.0 {

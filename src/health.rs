@@ -3,7 +3,18 @@
 use serde::{Deserialize, Serialize};
 
 /// Counters of everything broken that was skipped. All zero on clean input.
+///
+/// ```
+/// use umbracast::{Config, Health, lidar::{Assembler, Packet}};
+///
+/// let mut health = Health::default();
+/// let broken = Packet { time_ns: 0, payload: vec![0; 7] };
+/// Assembler::new(&Config::default().site)?.push(0, &broken, &mut health);
+/// assert_eq!(health.packets_wrong_size, 1);
+/// # Ok::<(), umbracast::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)] // An account that was written before a counter came has none of it.
 pub struct Health {
     /// Packets whose length is not a sensor packet's.
     pub packets_wrong_size: u64,
@@ -27,11 +38,26 @@ pub struct Health {
 
 impl Health {
     /// True when nothing was skipped.
+    ///
+    /// ```
+    /// use umbracast::Health;
+    ///
+    /// assert!(Health::default().is_clean());
+    /// assert!(!Health { clock_jumps: 1, ..Health::default() }.is_clean());
+    /// ```
     pub fn is_clean(&self) -> bool {
         *self == Self::default()
     }
 
     /// Adds another account to this one.
+    ///
+    /// ```
+    /// use umbracast::Health;
+    ///
+    /// let mut day = Health { packets_late: 2, ..Health::default() };
+    /// day.add(&Health { packets_late: 3, ..Health::default() });
+    /// assert_eq!(day.packets_late, 5);
+    /// ```
     pub fn add(&mut self, other: &Self) {
         self.packets_wrong_size += other.packets_wrong_size;
         self.packets_not_understood += other.packets_not_understood;

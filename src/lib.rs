@@ -5,8 +5,14 @@
 //! [`pipeline::Pipeline::step`] is that sentence as code. The modules below stand in the same order, and each
 //! uses only what stands above it.
 //!
+//! These pages show what a user needs. Items that only the crates beside this one need (training, scores, the
+//! simulator) are public, hidden here, and may change with any version. The equations behind every stage stand in
+//! `docs/METHODS.md` of the repository.
+//!
 //! ```
-//! use umbracast::{Config, Mode, Pipeline, lidar::Assembler, Health};
+//! use std::time::Duration;
+//!
+//! use umbracast::{Config, Health, Mode, Pipeline, lidar::Assembler};
 //!
 //! let config = Config::for_mode(Mode::Default);
 //! let mut assembler = Assembler::new(&config.site)?;
@@ -17,7 +23,8 @@
 //!     assembler.push(*sensor, packet, &mut health);
 //!     while let Some(frame) = assembler.pop() {
 //!         for link in &pipeline.step(&frame).blockages {
-//!             println!("track {} blocked within 300 ms: {:.2}", link.track, link.p[2]);
+//!             let p = link.p_within(Duration::from_millis(300));
+//!             println!("track {} blocked within 300 ms: {p:.2}", link.track);
 //!         }
 //!     }
 //! }
@@ -30,6 +37,7 @@ pub mod health;
 pub mod site;
 pub mod config;
 pub mod lidar;
+#[doc(hidden)] // What walking bodies have in common, for tracks, casts and their scores; users meet `track::GaitPhase`.
 pub mod gait;
 pub mod detect;
 pub mod track;

@@ -9,6 +9,11 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Pose;
 
 /// The place that is watched.
+///
+/// ```
+/// let site = umbracast::Config::default().site;
+/// assert_eq!((site.sensors.len(), site.access_points[0].name.as_str()), (2, "side"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Site {
@@ -31,6 +36,11 @@ pub struct Site {
 }
 
 /// A rectangular room centred on the origin.
+///
+/// ```
+/// let site = umbracast::Config::default().site;
+/// assert_eq!((site.hall.length_m, site.hall.height_m), (34.0, 10.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hall {
@@ -43,6 +53,11 @@ pub struct Hall {
 }
 
 /// A round pillar.
+///
+/// ```
+/// let site = umbracast::Config::default().site;
+/// assert_eq!(site.pillars[0].position_m, [11.5, 11.5]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pillar {
@@ -53,6 +68,12 @@ pub struct Pillar {
 }
 
 /// A box on the floor.
+///
+/// ```
+/// let site = umbracast::Config::default().site;
+/// let counter = site.furniture[0];
+/// assert_eq!((counter.position_m, counter.size_m), ([0.0, 15.8], [6.0, 0.8, 1.1]));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Furniture {
@@ -65,6 +86,17 @@ pub struct Furniture {
 }
 
 /// A LiDAR on the wall.
+///
+/// ```
+/// use umbracast::{Config, Mode};
+///
+/// // A model, ranges and rate need not be given: an HDL-32E as it is delivered.
+/// let file = "[[site.sensors]]\nname = \"door\"\nposition_m = [0.0, 0.0, 3.0]\n\
+///             rotation_deg = { yaw = 0.0, pitch = 20.0, roll = 0.0 }";
+/// let config = Config::with_overlay(Mode::Default, file, "hall.toml")?;
+/// assert_eq!((config.site.sensors.len(), config.site.sensors[0].model.as_str()), (1, "hdl-32e"));
+/// # Ok::<(), umbracast::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensor {
@@ -115,6 +147,11 @@ fn noise_m() -> f64 {
 }
 
 /// How simulated sensors fail.
+///
+/// ```
+/// let site = umbracast::Config::default().site;
+/// assert_eq!(site.simulation.dropout, 0.02);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Simulation {
@@ -125,6 +162,11 @@ pub struct Simulation {
 }
 
 /// Yaw, pitch and roll in degrees.
+///
+/// ```
+/// let east = umbracast::Config::default().site.sensors[0].clone();
+/// assert_eq!((east.rotation_deg.yaw, east.rotation_deg.pitch), (180.0, 35.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rotation {
@@ -137,6 +179,11 @@ pub struct Rotation {
 }
 
 /// An access point.
+///
+/// ```
+/// let side = umbracast::site::AccessPoint { name: "side".to_owned(), position_m: [14.0, 0.0, 2.0] };
+/// assert_eq!(side.position().z, 2.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AccessPoint {
@@ -147,6 +194,14 @@ pub struct AccessPoint {
 }
 
 /// Where the UE is, from the body axis.
+///
+/// ```
+/// use umbracast::site::Ue;
+///
+/// // A phone at the ear of somebody, a little left of the axis.
+/// let ear = Ue { forward_m: 0.0, left_m: 0.09, height_share: 0.924 };
+/// assert!((ear.on_body(umbracast::geometry::DVec2::ZERO, 0.0, 1.75).z - 1.617).abs() < 1e-9);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ue {
@@ -160,6 +215,13 @@ pub struct Ue {
 
 impl Ue {
     /// The UE of a body that stands at `position_m`, looks along `heading_rad` and is `height_m` tall.
+    ///
+    /// ```
+    /// use umbracast::geometry::{DVec2, DVec3};
+    ///
+    /// let ue = umbracast::site::Ue { forward_m: 0.3, left_m: 0.0, height_share: 0.5 };
+    /// assert_eq!(ue.on_body(DVec2::new(2.0, 1.0), 0.0, 1.8), DVec3::new(2.3, 1.0, 0.9));
+    /// ```
     pub fn on_body(&self, position_m: glam::DVec2, heading_rad: f64, height_m: f64) -> DVec3 {
         let (sin, cos) = heading_rad.sin_cos();
         DVec3::new(
@@ -174,6 +236,13 @@ impl Ue {
 pub const SENSOR_MODELS: [&str; 3] = ["hdl-32e", "vlp-16", "points"];
 
 /// The model of that name, with or without capitals and dashes: `vlp-16` of `VLP-16` and `vlp16`.
+///
+/// ```
+/// use umbracast::site::sensor_model;
+///
+/// assert_eq!(sensor_model("VLP16"), Some("vlp-16"));
+/// assert_eq!(sensor_model("camera"), None);
+/// ```
 pub fn sensor_model(name: &str) -> Option<&'static str> {
     let letters = |name: &str| name.to_ascii_lowercase().replace(['-', '_', ' '], "");
     SENSOR_MODELS.into_iter().find(|model| letters(model) == letters(name))
@@ -181,6 +250,11 @@ pub fn sensor_model(name: &str) -> Option<&'static str> {
 
 impl Sensor {
     /// The pose of the sensor's frame in the site.
+    ///
+    /// ```
+    /// let east = &umbracast::Config::default().site.sensors[0];
+    /// assert_eq!(east.site_from_sensor().translation_m.to_array(), [16.0, 0.0, 9.0]);
+    /// ```
     pub fn site_from_sensor(&self) -> Pose {
         let Rotation { yaw, pitch, roll } = self.rotation_deg;
         Pose::from_yaw_pitch_roll_deg(DVec3::from_array(self.position_m), yaw, pitch, roll)
@@ -189,6 +263,11 @@ impl Sensor {
 
 impl AccessPoint {
     /// The antenna's place.
+    ///
+    /// ```
+    /// let side = &umbracast::Config::default().site.access_points[0];
+    /// assert_eq!(side.position().to_array(), [14.0, 0.0, 2.0]);
+    /// ```
     pub fn position(&self) -> DVec3 {
         DVec3::from_array(self.position_m)
     }

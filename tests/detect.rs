@@ -16,7 +16,7 @@ fn config(mode: Mode) -> Config {
         format!(
             "[[site.sensors]]\nname = \"s{:+}\"\nmodel = \"points\"\nposition_m = [{:?}, {:?}, {:?}]\n\
              rotation_deg = {{ yaw = 0.0, pitch = 0.0, roll = 0.0 }}\nrate_hz = 10.0\ncut_deg = 180.0\n\
-             range_min_m = 0.5\nrange_max_m = 50.0\nrange_noise_m = 0.0\ndropout = 0.0\n",
+             range_min_m = 0.5\nrange_max_m = 50.0\nrange_noise_m = 0.0\n",
             p.x, p.x, p.y, p.z
         )
     };

@@ -35,7 +35,6 @@ cut_deg = 180.0
 range_min_m = 0.4
 range_max_m = 100.0
 range_noise_m = 0.02
-dropout = 0.0
 "#;
 
 fn cloud(file: &Path, time_ns: i64) -> Vec<SensorPoint> {

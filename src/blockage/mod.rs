@@ -1,21 +1,45 @@
 //! Stage 3: which links will be blocked by a body (paper, section IV-C).
 
+#[doc(hidden)] // The body's numbers, for their fit.
 pub mod body_model;
+#[doc(hidden)] // What a ray meets, for the fit, the ladder and the corpus of rays.
 pub mod body;
+#[doc(hidden)] // For the corpus of rays; `Caster` chooses by the config.
 pub mod algorithm1;
 mod draws;
 mod steps;
+#[doc(hidden)] // What tests and ablations turn.
 pub mod numbers;
+#[doc(hidden)] // Phases of a gait, for the fit of the body.
 pub mod probability;
-pub mod caster;
+mod caster;
 
+#[doc(hidden)] // For its fit.
 pub use body_model::BodyModel;
 pub use caster::Caster;
+#[doc(hidden)] // What tests and ablations turn.
 pub use numbers::Numbers;
 
-use crate::STEPS;
+// Of `core`, which has no clock: the runtime takes its time from the data.
+use core::time::Duration;
+
+use crate::{STEP_NS, STEPS};
 
 /// One link, access point to person, now and in every window.
+///
+/// ```
+/// use umbracast::blockage::Blockage;
+///
+/// /// The first window in which a link is more likely lost than not, seconds.
+/// fn lost_within_s(link: &Blockage) -> Option<f64> {
+///     link.p.iter().position(|p| *p > 0.5).map(|step| (step + 1) as f64 * umbracast::STEP_S)
+/// }
+/// # let link = Blockage {
+/// #     access_point: 0, track: 7, blocked_now: false, p_now: 0.0, blocked: [false; 9],
+/// #     p: [0.0, 0.1, 0.2, 0.6, 0.8, 0.9, 0.9, 0.9, 0.9], onset_s: [None; 3], duration_s: [None; 3],
+/// # };
+/// assert_eq!(lost_within_s(&link), Some(0.4));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blockage {
     /// Which access point of the site.
@@ -36,4 +60,25 @@ pub struct Blockage {
     /// The same of the time until the blockage is over: the one that is, or the first that comes. `None` as well where
     /// none comes with a chance of 10 % or more.
     pub duration_s: [Option<f64>; 3],
+}
+
+impl Blockage {
+    /// The probability that the link is blocked within a time from now: that of the longest window that fits into
+    /// `horizon`, rounded down to whole steps. Less than a step is now, and beyond the last step nothing more is known.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// # let link = umbracast::blockage::Blockage {
+    /// #     access_point: 0, track: 7, blocked_now: false, p_now: 0.05, blocked: [false; 9],
+    /// #     p: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9], onset_s: [None; 3], duration_s: [None; 3],
+    /// # };
+    /// assert_eq!(link.p_within(Duration::from_millis(300)), link.p[2]);
+    /// assert_eq!(link.p_within(Duration::from_millis(399)), link.p[2]);
+    /// assert_eq!(link.p_within(Duration::from_millis(99)), link.p_now);
+    /// assert_eq!(link.p_within(Duration::from_secs(60)), link.p[8]);
+    /// ```
+    pub fn p_within(&self, horizon: Duration) -> f64 {
+        let steps = (horizon.as_nanos() / STEP_NS.unsigned_abs() as u128).min(STEPS as u128) as usize;
+        steps.checked_sub(1).map_or(self.p_now, |window| self.p[window])
+    }
 }

@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::mechanism::Mechanism;
 
 /// See `config/default.toml` for every value and its reason.
+///
+/// ```
+/// assert_eq!(umbracast::Config::default().blockage.samples, 128);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlockageConfig {
@@ -23,6 +27,12 @@ pub struct BlockageConfig {
 }
 
 /// How a link is judged.
+///
+/// ```
+/// use umbracast::{Config, config::BlockageMethod};
+///
+/// assert_eq!(Config::default().blockage.method, BlockageMethod::Probability);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BlockageMethod {
@@ -34,6 +44,12 @@ pub enum BlockageMethod {
 }
 
 /// The two boxes of the paper.
+///
+/// ```
+/// use umbracast::{Config, config::BoxKind};
+///
+/// assert_eq!(Config::default().blockage.person_box, BoxKind::Aabb);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BoxKind {

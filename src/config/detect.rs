@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::mechanism::Mechanism;
 
 /// See `config/default.toml` for every value and its reason.
+///
+/// ```
+/// assert_eq!(umbracast::Config::default().detect.highest_m, 2.4);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DetectConfig {
@@ -23,6 +27,12 @@ pub struct DetectConfig {
 }
 
 /// How the empty scene is remembered.
+///
+/// ```
+/// use umbracast::{Config, config::BackgroundMethod};
+///
+/// assert_eq!(Config::default().detect.background, BackgroundMethod::RangeImage);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BackgroundMethod {
@@ -33,6 +43,12 @@ pub enum BackgroundMethod {
 }
 
 /// How clusters of several people are split.
+///
+/// ```
+/// use umbracast::{Config, config::ClusterMethod};
+///
+/// assert_eq!(Config::default().detect.clusters, ClusterMethod::Evidence);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClusterMethod {
@@ -45,6 +61,12 @@ pub enum ClusterMethod {
 }
 
 /// Where a person stands, given the points.
+///
+/// ```
+/// use umbracast::{Config, config::PositionMethod};
+///
+/// assert_eq!(Config::default().detect.position, PositionMethod::Fitted);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PositionMethod {

@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::mechanism::Mechanism;
 
 /// See `config/default.toml` for every value and its reason.
+///
+/// ```
+/// assert_eq!(umbracast::Config::default().forecast.seed, 1);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ForecastConfig {
@@ -19,6 +23,12 @@ pub struct ForecastConfig {
 }
 
 /// Who foresees.
+///
+/// ```
+/// use umbracast::{Config, config::ForecastMethod};
+///
+/// assert_eq!(Config::default().forecast.method, ForecastMethod::Residual);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForecastMethod {
@@ -31,6 +41,12 @@ pub enum ForecastMethod {
 }
 
 /// What an LSTM step feeds to the next.
+///
+/// ```
+/// use umbracast::{Config, config::Rollout};
+///
+/// assert_eq!(Config::default().forecast.rollout, Rollout::Mean);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rollout {

@@ -3,6 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 /// A part of the default mode that can be left out.
+///
+/// ```
+/// use umbracast::{Config, config::Mechanism};
+///
+/// let no_arms = Config::default().without(Mechanism::Arms);
+/// assert_eq!(no_arms.blockage.without, [Mechanism::Arms]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mechanism {
@@ -71,6 +78,13 @@ impl Mechanism {
     ];
 
     /// The stages whose `without` may name it; none for those that a plainer method takes the place of.
+    ///
+    /// ```
+    /// use umbracast::config::Mechanism;
+    ///
+    /// assert_eq!(Mechanism::Sway.stages(), ["track"]);
+    /// assert!(Mechanism::Residual.stages().is_empty(), "constant velocity takes its place");
+    /// ```
     pub fn stages(self) -> &'static [&'static str] {
         match self {
             Self::RangeModel | Self::CountTest | Self::Residual => &[],
@@ -90,6 +104,10 @@ impl Mechanism {
     }
 
     /// As tables and files call it.
+    ///
+    /// ```
+    /// assert_eq!(umbracast::config::Mechanism::LimbPhase.name(), "limb-phase");
+    /// ```
     pub fn name(self) -> &'static str {
         match self {
             Self::RangeModel => "range-model",

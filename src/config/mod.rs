@@ -28,6 +28,14 @@ const PAPER_TOML: &str = include_str!("../../config/paper.toml");
 const HDL_TOML: &str = include_str!("../../config/hdl.toml");
 
 /// Whose method runs. A mode is a set of values, never a branch.
+///
+/// ```
+/// use umbracast::{Config, Mode, config::TrackMethod};
+///
+/// assert_eq!(Config::for_mode(Mode::Paper).track.method, TrackMethod::Paper);
+/// assert_eq!("hdl".parse::<Mode>()?, Mode::Hdl);
+/// # Ok::<(), umbracast::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
@@ -44,6 +52,10 @@ impl Mode {
     pub const ALL: [Self; 3] = [Self::Hdl, Self::Paper, Self::Default];
 
     /// Its name in files and on the command line.
+    ///
+    /// ```
+    /// assert_eq!(umbracast::Mode::ALL.map(|mode| mode.name()), ["hdl", "paper", "default"]);
+    /// ```
     pub fn name(self) -> &'static str {
         match self {
             Self::Hdl => "hdl",
@@ -65,6 +77,12 @@ impl std::str::FromStr for Mode {
 }
 
 /// Everything the pipeline is told before it starts.
+///
+/// ```
+/// let mut config = umbracast::Config::default();
+/// config.blockage.samples = 256;
+/// assert!(config.to_toml().contains("samples = 256"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
@@ -84,12 +102,29 @@ pub struct Config {
 
 impl Config {
     /// The values of a mode on the default site.
+    ///
+    /// ```
+    /// use umbracast::{Config, Mode};
+    ///
+    /// assert_eq!(Config::for_mode(Mode::Default), Config::default());
+    /// assert_ne!(Config::for_mode(Mode::Hdl).detect, Config::default().detect);
+    /// ```
     pub fn for_mode(mode: Mode) -> Self {
         Self::with_overlay(mode, "", "").expect("the embedded files are proven by a test")
     }
 
     /// The values of a mode with a user's file laid over them. `text` is the file's content, `file` its name
     /// for messages.
+    ///
+    /// ```
+    /// use umbracast::{Config, Mode};
+    ///
+    /// let config = Config::with_overlay(Mode::Default, "[blockage]\nsamples = 64", "mine.toml")?;
+    /// assert_eq!((config.blockage.samples, config.site), (64, Config::default().site));
+    /// let error = Config::with_overlay(Mode::Default, "[blockage]\nsamples = true", "mine.toml").unwrap_err();
+    /// assert!(error.to_string().starts_with("mine.toml:2:11: blockage.samples: expected a whole number"), "{error}");
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Text that is not TOML, a key that does not exist, a value of the wrong kind: with file, line, what was
@@ -119,6 +154,14 @@ impl Config {
 
     /// The configuration that a run wrote beside its output: its mode is the one it names.
     ///
+    /// ```
+    /// use umbracast::{Config, Mode};
+    ///
+    /// let written = Config::for_mode(Mode::Paper).to_toml();
+    /// assert_eq!(Config::of_run(&written, "config.toml")?.mode, Mode::Paper);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`Config::with_overlay`].
     pub fn of_run(text: &str, file: &str) -> Result<Self, Error> {
@@ -129,6 +172,14 @@ impl Config {
 
     /// The site alone of a configuration that a run or a recording holds: the other settings come and go with
     /// versions, and a recording is of use to all of them.
+    ///
+    /// ```
+    /// use umbracast::Config;
+    ///
+    /// let written = Config::default().to_toml();
+    /// assert_eq!(Config::site_of_run(&written, "config.toml")?, Config::default().site);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Config::with_overlay`], of the site.
@@ -141,6 +192,13 @@ impl Config {
 
     /// The same without a mechanism: by a plainer method where there is one, else with the mechanism named in the
     /// stages' `without`.
+    ///
+    /// ```
+    /// use umbracast::{Config, config::{ForecastMethod, Mechanism}};
+    ///
+    /// let plain = Config::default().without(Mechanism::Residual);
+    /// assert_eq!(plain.forecast.method, ForecastMethod::ConstantVelocity);
+    /// ```
     #[must_use]
     pub fn without(&self, mechanism: Mechanism) -> Self {
         let mut config = self.clone();
@@ -168,6 +226,14 @@ impl Config {
     }
 
     /// The same as TOML text, as every run writes it beside its output.
+    ///
+    /// ```
+    /// use umbracast::Config;
+    ///
+    /// let text = Config::default().to_toml();
+    /// assert_eq!(Config::of_run(&text, "config.toml")?, Config::default());
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a configuration is plain data")
     }

@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::mechanism::Mechanism;
 
 /// See `config/default.toml` for every value and its reason.
+///
+/// ```
+/// assert_eq!(umbracast::Config::default().track.coast_max_s, 3.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrackConfig {
@@ -19,6 +23,12 @@ pub struct TrackConfig {
 }
 
 /// Who follows.
+///
+/// ```
+/// use umbracast::{Config, config::TrackMethod};
+///
+/// assert_eq!(Config::default().track.method, TrackMethod::Mixture);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrackMethod {

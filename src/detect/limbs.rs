@@ -16,6 +16,13 @@ const ARMS_UP: std::ops::Range<f64> = 0.40..0.72;
 const POINTS_AT_HALF: f64 = 3.0;
 
 /// Covariance of ahead and left over arms and legs in one frame.
+///
+/// ```
+/// use umbracast::detect::LimbCovariance;
+///
+/// let right_foot_ahead = LimbCovariance { arms_less_legs_m2: 0.012, seen: 0.8 };
+/// assert!(right_foot_ahead.arms_less_legs_m2 > 0.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimbCovariance {
     /// Mean of ahead times left, arms less legs, m^2.
@@ -26,6 +33,7 @@ pub struct LimbCovariance {
 
 impl LimbCovariance {
     /// Of the points of `who`, whose axis stands at `position_m`; nothing of who stands.
+    #[doc(hidden)] // The measurer calls it.
     pub fn of<'a>(points: impl Iterator<Item = &'a Point>, position_m: DVec2, who: &Prior) -> Option<Self> {
         if who.velocity_mps.length() < WALKS_FROM_MPS {
             return None;

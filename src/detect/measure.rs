@@ -53,6 +53,23 @@ pub enum ObbAxes {
 }
 
 /// Turns clusters into detections.
+///
+/// ```
+/// # use umbracast::{Config, geometry::{DVec2, DVec3}, detect::Point};
+/// # // Somebody at the origin, 1.7 m tall.
+/// # let point = |i: u32| {
+/// #     let around = DVec2::from_angle(2.4 * f64::from(i)) * DVec2::new(0.13, 0.25);
+/// #     Point { position_m: around.extend(0.1 + 0.04 * f64::from(i)), time_ns: 0, sensor: 0 }
+/// # };
+/// # let points: Vec<Point> = (0..40).map(point).collect();
+///
+/// use umbracast::detect::Measurer;
+///
+/// let config = Config::default();
+/// let (mut measurer, mut detections) = (Measurer::new(&config.detect, &config.site), Vec::new());
+/// measurer.detections(&points, &[(0..40).collect()], &[], &mut detections);
+/// assert!(detections[0].position_m.length() < 0.3 && detections[0].top_m > 1.6);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Measurer {
     position: PositionMethod,
@@ -65,6 +82,15 @@ pub struct Measurer {
 
 impl Measurer {
     /// Needs the site to know from where each point was seen.
+    ///
+    /// ```
+    /// use umbracast::{Config, detect::Measurer};
+    ///
+    /// let config = Config::default();
+    /// let mut detections = Vec::new();
+    /// Measurer::new(&config.detect, &config.site).detections(&[], &[], &[], &mut detections);
+    /// assert!(detections.is_empty());
+    /// ```
     pub fn new(config: &DetectConfig, site: &Site) -> Self {
         Self {
             position: config.position,
@@ -76,6 +102,24 @@ impl Measurer {
     }
 
     /// One detection a cluster that has a person's size, or lies where a person is expected.
+    ///
+    /// ```
+    /// # use umbracast::{Config, geometry::{DVec2, DVec3}, detect::Point};
+    /// # // Somebody at the origin, 1.7 m tall.
+    /// # let point = |i: u32| {
+    /// #     let around = DVec2::from_angle(2.4 * f64::from(i)) * DVec2::new(0.13, 0.25);
+    /// #     Point { position_m: around.extend(0.1 + 0.04 * f64::from(i)), time_ns: 0, sensor: 0 }
+    /// # };
+    /// # let points: Vec<Point> = (0..40).map(point).collect();
+    ///
+    /// use umbracast::detect::Measurer;
+    ///
+    /// // The lowest ten points are nobody: 0.4 m is no person's height.
+    /// let config = Config::default();
+    /// let mut detections = Vec::new();
+    /// Measurer::new(&config.detect, &config.site).detections(&points, &[(0..10).collect()], &[], &mut detections);
+    /// assert!(detections.is_empty());
+    /// ```
     pub fn detections(
         &mut self,
         points: &[Point],
@@ -121,6 +165,7 @@ impl Measurer {
     }
 
     /// Of points that are one person's, whatever their size; at least one.
+    #[doc(hidden)] // For scores that know whose points they are.
     pub fn detection(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> Detection {
         let n = cluster.len() as f64;
         let of = || cluster.iter().map(|&i| &points[i as usize]);
@@ -157,6 +202,7 @@ impl Measurer {
     }
 
     /// A cluster as the model of the body axis sees it; who walks there is the nearest of `priors`.
+    #[doc(hidden)] // For the fit of the model of the body axis.
     pub fn features(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> AxisFeatures {
         let seen = cluster.iter().map(|&i| &points[i as usize]);
         let mean_m =

@@ -3,27 +3,38 @@
 //! Foreground: the points that do not belong to the empty scene, in the site frame. Clusters: groups of them in
 //! plan view, split and merged until each is one person. Detections: position and boxes of each.
 
-pub mod range_model;
-pub mod voxel;
-pub mod background;
+mod range_model;
+mod voxel;
+mod background;
+#[doc(hidden)] // What the model of the body axis reads, for its fit.
 pub mod features;
-pub mod cluster;
-pub mod dp_means;
-pub mod guided;
-pub mod evidence;
-pub mod split_merge;
+mod cluster;
+mod dp_means;
+mod guided;
+mod evidence;
+mod split_merge;
+#[doc(hidden)] // The model of the body axis, for its fit and for the command that shows it.
 pub mod axis;
-pub mod limbs;
-pub mod measure;
+mod limbs;
+mod measure;
 
 pub use background::Background;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
+#[doc(hidden)] // For the card of the model of the body axis.
+pub use measure::SHIFT_M;
 pub use split_merge::Clusterer;
 
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 
 /// A foreground point.
+///
+/// ```
+/// use umbracast::{detect::Point, geometry::DVec3};
+///
+/// let point = Point { position_m: DVec3::new(1.0, 2.0, 1.5), time_ns: 90_000_000, sensor: 1 };
+/// assert_eq!(point.position_m.truncate().to_array(), [1.0, 2.0]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
     /// In the site frame.
@@ -35,6 +46,14 @@ pub struct Point {
 }
 
 /// Where a person is expected: a track of the last step, predicted to the frame's time.
+///
+/// ```
+/// use umbracast::{Config, track::Tracker};
+///
+/// // The tracker says whom it expects where: nobody, before the first frame.
+/// let config = Config::default();
+/// assert!(Tracker::new(&config.track, &config.site).priors(100_000_000).is_empty());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Predicted ground point of the body axis.
@@ -53,6 +72,22 @@ pub struct Prior {
 pub type Cluster = Vec<u32>;
 
 /// One person in one frame (the paper's D, without identity).
+///
+/// ```
+/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
+/// # let detection = |x_m: f64, time_ns: i64| {
+/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
+/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
+/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
+/// #     Detection {
+/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
+/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
+/// #     }
+/// # };
+///
+/// let found = detection(3.0, 0);
+/// assert_eq!((found.position_m.x, found.aabb.size_m().z), (3.0, 1.7));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
     /// Ground point of the body axis, corrected for the side that was seen where the config says so.

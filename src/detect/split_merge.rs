@@ -31,6 +31,23 @@ const OURS: Radius =
 const ADAPTED: Radius = Radius { radius_m: 0.2, per_range: 0.0, shift_m: 0.0, points_min: 16 };
 
 /// Groups foreground points into people.
+///
+/// ```
+/// # use umbracast::{Config, geometry::{DVec2, DVec3}, detect::Point};
+/// # // Somebody at the origin, 1.7 m tall.
+/// # let point = |i: u32| {
+/// #     let around = DVec2::from_angle(2.4 * f64::from(i)) * DVec2::new(0.13, 0.25);
+/// #     Point { position_m: around.extend(0.1 + 0.04 * f64::from(i)), time_ns: 0, sensor: 0 }
+/// # };
+/// # let points: Vec<Point> = (0..40).map(point).collect();
+///
+/// use umbracast::detect::Clusterer;
+///
+/// let config = Config::default();
+/// let (mut clusterer, mut clusters) = (Clusterer::new(&config.detect, &config.site), Vec::new());
+/// clusterer.clusters(&points, &[], &mut clusters);
+/// assert_eq!(clusters, [(0..40).collect::<Vec<u32>>()], "one person, every point");
+/// ```
 #[derive(Debug, Clone)]
 pub struct Clusterer {
     method: ClusterMethod,
@@ -50,6 +67,15 @@ pub struct Clusterer {
 
 impl Clusterer {
     /// Needs the site to know how far each point is from a sensor.
+    ///
+    /// ```
+    /// use umbracast::{Config, detect::Clusterer};
+    ///
+    /// let config = Config::default();
+    /// let mut clusters = vec![vec![7]];
+    /// Clusterer::new(&config.detect, &config.site).clusters(&[], &[], &mut clusters);
+    /// assert!(clusters.is_empty());
+    /// ```
     pub fn new(config: &DetectConfig, site: &Site) -> Self {
         Self {
             method: config.clusters,
@@ -67,6 +93,24 @@ impl Clusterer {
     }
 
     /// One cluster a person, in an order that does not depend on the order of the points.
+    ///
+    /// ```
+    /// # use umbracast::{Config, geometry::{DVec2, DVec3}, detect::Point};
+    /// # // Somebody at the origin, 1.7 m tall.
+    /// # let point = |i: u32| {
+    /// #     let around = DVec2::from_angle(2.4 * f64::from(i)) * DVec2::new(0.13, 0.25);
+    /// #     Point { position_m: around.extend(0.1 + 0.04 * f64::from(i)), time_ns: 0, sensor: 0 }
+    /// # };
+    /// # let points: Vec<Point> = (0..40).map(point).collect();
+    ///
+    /// use umbracast::detect::Clusterer;
+    ///
+    /// let config = Config::default();
+    /// let two = points.iter().flat_map(|p| [*p, Point { position_m: p.position_m + DVec3::X * 3.0, ..*p }]);
+    /// let mut clusters = Vec::new();
+    /// Clusterer::new(&config.detect, &config.site).clusters(&two.collect::<Vec<_>>(), &[], &mut clusters);
+    /// assert_eq!(clusters.len(), 2);
+    /// ```
     pub fn clusters(&mut self, points: &[Point], priors: &[Prior], clusters: &mut Vec<Cluster>) {
         clusters.clear();
         self.components(points);

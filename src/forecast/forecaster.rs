@@ -14,6 +14,33 @@ use crate::track::{OBSERVED, Observed, Track};
 use crate::{Error, STEP_NS};
 
 /// Foresees.
+///
+/// ```
+/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
+/// # let detection = |x_m: f64, time_ns: i64| {
+/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
+/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
+/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
+/// #     Detection {
+/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
+/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
+/// #     }
+/// # };
+/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
+/// # let config = Config::default();
+/// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
+/// # for k in 0..20 {
+/// #     let frame = frame(k);
+/// #     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
+/// # }
+///
+/// use umbracast::forecast::Forecaster;
+///
+/// let (mut forecaster, mut forecasts) = (Forecaster::new(&config.forecast, None)?, Vec::new());
+/// forecaster.forecast(&tracks, &mut forecasts);
+/// assert_eq!((forecasts.len(), forecasts[0].track), (1, tracks[0].id));
+/// # Ok::<(), umbracast::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Forecaster {
     rollout: Rollout,
@@ -31,6 +58,14 @@ enum Network {
 
 impl Forecaster {
     /// `weights` are needed by the method `lstm` only.
+    ///
+    /// ```
+    /// use umbracast::{Config, Mode, forecast::Forecaster};
+    ///
+    /// assert!(Forecaster::new(&Config::for_mode(Mode::Default).forecast, None).is_ok());
+    /// let error = Forecaster::new(&Config::for_mode(Mode::Paper).forecast, None).unwrap_err();
+    /// assert!(error.to_string().contains("expected its weights"));
+    /// ```
     ///
     /// # Errors
     /// The method needs weights and there are none.
@@ -54,6 +89,34 @@ impl Forecaster {
     }
 
     /// One forecast for each track, in the order of the tracks.
+    ///
+    /// ```
+    /// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
+    /// # let detection = |x_m: f64, time_ns: i64| {
+    /// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
+    /// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
+    /// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
+    /// #     Detection {
+    /// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
+    /// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
+    /// #     }
+    /// # };
+    /// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
+    /// # let config = Config::default();
+    /// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
+    /// # for k in 0..20 {
+    /// #     let frame = frame(k);
+    /// #     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
+    /// # }
+    ///
+    /// use umbracast::forecast::Forecaster;
+    ///
+    /// let mut forecasts = Vec::new();
+    /// Forecaster::new(&config.forecast, None)?.forecast(&tracks, &mut forecasts);
+    /// // The farther ahead, the less is known.
+    /// assert!(forecasts[0].steps[8].xx_m2 > forecasts[0].steps[0].xx_m2);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
     pub fn forecast(&mut self, tracks: &[Track], forecasts: &mut Vec<Forecast>) {
         forecasts.clear();
         if let Network::Residual { residual, neighbours } = &self.network {

@@ -3,6 +3,13 @@
 use crate::geometry::DVec2;
 
 /// Mean and covariance of a position on the floor.
+///
+/// ```
+/// use umbracast::{forecast::Gaussian2, geometry::DVec2};
+///
+/// let there = Gaussian2 { mean_m: DVec2::new(1.0, 2.0), xx_m2: 0.04, xy_m2: 0.0, yy_m2: 0.01 };
+/// assert_eq!((there.xx_m2.sqrt(), there.yy_m2.sqrt()), (0.2, 0.1));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gaussian2 {
     /// Metres.

@@ -28,6 +28,14 @@ pub const SIGMA_SCALE_M: f32 = 0.1;
 pub const RHO_LIMIT: f32 = 0.95;
 
 /// The network's weights, packed once for the forward pass. A clone shares them.
+///
+/// ```
+/// use umbracast::{Config, Mode, forecast::Weights, pipeline::Pipeline};
+///
+/// let weights = Weights::from_safetensors(&std::fs::read("models/paper_lstm.safetensors")?)?;
+/// assert!(Pipeline::new(&Config::for_mode(Mode::Paper), Some(&weights)).is_ok());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone)]
 pub struct Weights {
     network: Arc<Network>,
@@ -46,6 +54,12 @@ impl Weights {
     /// From the bytes of a safetensors file with PyTorch's tensors of f32: `emb.weight` `[E, 2]`, `emb.bias` `[E]`,
     /// `enc.weight_ih` `[4 H, E]`, `enc.weight_hh` `[4 H, H]`, `enc.bias_ih` and `enc.bias_hh` `[4 H]`, `dec.weight`
     /// `[5, H]`, `dec.bias` `[5]`; gates in the order i f g o. The paper has E = 64 and H = 512.
+    ///
+    /// ```
+    /// use umbracast::forecast::Weights;
+    ///
+    /// assert!(Weights::from_safetensors(b"no tensors").unwrap_err().to_string().starts_with("weights: "));
+    /// ```
     ///
     /// # Errors
     /// A tensor that is missing, has another shape or kind, or holds a number that is not finite.
@@ -82,6 +96,7 @@ impl Weights {
     /// The Gaussian of each of the next displacements of every person. `observed_m` has the displacements of the
     /// observation window, oldest first; `next` says for a person (by place in `observed_m`) and a Gaussian which
     /// displacement the next step is fed with.
+    #[doc(hidden)] // `Forecaster` calls it, and the score of a training.
     pub fn roll_out(
         &self,
         observed_m: &[[DVec2; OBSERVED_DISPLACEMENTS]],

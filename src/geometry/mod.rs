@@ -1,8 +1,9 @@
 //! Poses, boxes and the slab test. Metres, radians, right-handed, z up.
 
-pub mod pose;
-pub mod aabb;
-pub mod obb;
+mod pose;
+mod aabb;
+mod obb;
+#[doc(hidden)] // For the truth, the ladder and the benchmark; a user asks the caster.
 pub mod slab;
 
 pub use aabb::Aabb;

@@ -3,6 +3,15 @@
 use glam::{DMat3, DVec3};
 
 /// A rotation and a translation. `site_from_sensor.point(p)` takes a point of the sensor's frame to the site's.
+///
+/// ```
+/// use umbracast::geometry::{DVec3, Pose};
+///
+/// // A sensor 9 m high that looks 35 degrees down along x.
+/// let site_from_sensor = Pose::from_yaw_pitch_roll_deg(DVec3::new(0.0, 0.0, 9.0), 0.0, 35.0, 0.0);
+/// let hit_m = site_from_sensor.point(DVec3::new(10.0, 0.0, 0.0));
+/// assert!((hit_m - DVec3::new(8.19, 0.0, 3.26)).length() < 0.01);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Columns are the source frame's axes, seen in the target frame.
@@ -17,6 +26,13 @@ impl Pose {
 
     /// A pose from a file: yaw, pitch and roll in degrees, applied Z-Y'-X''. Positive pitch looks down (a
     /// positive turn about the y axis takes x towards -z).
+    ///
+    /// ```
+    /// use umbracast::geometry::{DVec3, Pose};
+    ///
+    /// let facing_left = Pose::from_yaw_pitch_roll_deg(DVec3::ZERO, 90.0, 0.0, 0.0);
+    /// assert!(facing_left.point(DVec3::X).abs_diff_eq(DVec3::Y, 1e-12));
+    /// ```
     pub fn from_yaw_pitch_roll_deg(position_m: DVec3, yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> Self {
         let rotation = DMat3::from_rotation_z(yaw_deg.to_radians())
             * DMat3::from_rotation_y(pitch_deg.to_radians())
@@ -25,22 +41,53 @@ impl Pose {
     }
 
     /// A point taken from the source to the target frame.
+    ///
+    /// ```
+    /// use umbracast::geometry::{DVec3, Pose};
+    ///
+    /// let raised = Pose { translation_m: DVec3::new(0.0, 0.0, 3.0), ..Pose::IDENTITY };
+    /// assert_eq!(raised.point(DVec3::X), DVec3::new(1.0, 0.0, 3.0));
+    /// ```
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.rotation * p + self.translation_m
     }
 
     /// A direction taken from the source to the target frame.
+    ///
+    /// ```
+    /// use umbracast::geometry::{DVec3, Pose};
+    ///
+    /// let raised = Pose { translation_m: DVec3::new(0.0, 0.0, 3.0), ..Pose::IDENTITY };
+    /// assert_eq!(raised.direction(DVec3::X), DVec3::X);
+    /// ```
     pub fn direction(&self, v: DVec3) -> DVec3 {
         self.rotation * v
     }
 
     /// This motion after another: `site_from_sensor.after(&sensor_from_body)` is `site_from_body`.
+    ///
+    /// ```
+    /// use umbracast::geometry::{DVec3, Pose};
+    ///
+    /// let site_from_mast = Pose { translation_m: DVec3::new(5.0, 0.0, 0.0), ..Pose::IDENTITY };
+    /// let mast_from_sensor = Pose { translation_m: DVec3::new(0.0, 0.0, 3.0), ..Pose::IDENTITY };
+    /// let site_from_sensor = site_from_mast.after(&mast_from_sensor);
+    /// assert_eq!(site_from_sensor.translation_m, DVec3::new(5.0, 0.0, 3.0));
+    /// ```
     #[must_use]
     pub fn after(&self, first: &Self) -> Self {
         Self { rotation: self.rotation * first.rotation, translation_m: self.point(first.translation_m) }
     }
 
     /// The motion back. The rotation is orthogonal, so it is transposed, never inverted.
+    ///
+    /// ```
+    /// use umbracast::geometry::{DVec3, Pose};
+    ///
+    /// let pose = Pose::from_yaw_pitch_roll_deg(DVec3::new(1.0, -2.0, 3.0), 170.0, 35.0, -5.0);
+    /// let there_and_back = pose.inverse().point(pose.point(DVec3::X));
+    /// assert!(there_and_back.abs_diff_eq(DVec3::X, 1e-12));
+    /// ```
     #[must_use]
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();

@@ -21,6 +21,31 @@ use crate::{Error, Health, STEP_NS, Site};
 /// (every sensor was silent, or the host's clock was set forward) one packet is given up to be sure.
 ///
 /// Memory: two frames beyond those that wait for [`pop`](Self::pop); call it after every push.
+///
+/// ```
+/// # // Packets of an HDL-32E whose every return lies 8 m away, from 0.0 to 0.2 s.
+/// # let packets = (0..360).map(|k| {
+/// #     let columns: Vec<_> = (12 * k..12 * k + 12).map(|i| umbracast::lidar::Column {
+/// #         time_ns: i * 46_080, azimuth_cdeg: (i * 1659 % 3_600_000) as f32 / 100.0, azimuth_rate_cdeg_per_ns: 3.6e-4,
+/// #     }).collect();
+/// #     let model = umbracast::lidar::Model::hdl_32e();
+/// #     umbracast::lidar::packet::encode(&model, &columns, &[8.0; 12 * 32], &[10; 12 * 32], columns[11].time_ns)
+/// # });
+///
+/// use umbracast::{Config, Health, lidar::Assembler};
+///
+/// let mut site = Config::default().site;
+/// site.sensors.truncate(1); // the others would be waited for
+/// let (mut assembler, mut health) = (Assembler::new(&site)?, Health::default());
+/// let mut frames = 0;
+/// for packet in packets {
+///     assembler.push(0, &packet, &mut health);
+///     frames += assembler.pop().into_iter().count();
+/// }
+/// // The second frame is still open: the next packet closes it, or `finish`.
+/// assert_eq!(frames, 1);
+/// # Ok::<(), umbracast::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Assembler {
     sensors: Vec<Intake>,
@@ -65,6 +90,15 @@ struct Intake {
 impl Assembler {
     /// For the sensors of a site.
     ///
+    /// ```
+    /// use umbracast::{Config, lidar::Assembler};
+    ///
+    /// let mut site = Config::default().site;
+    /// assert!(Assembler::new(&site).is_ok());
+    /// site.sensors[0].model = "camera".to_owned();
+    /// assert!(Assembler::new(&site).unwrap_err().to_string().contains("found \"camera\""));
+    /// ```
+    ///
     /// # Errors
     /// A sensor model that is not known.
     pub fn new(site: &Site) -> Result<Self, Error> {
@@ -98,6 +132,22 @@ impl Assembler {
     }
 
     /// Takes one packet of `site.sensors[sensor]`.
+    ///
+    /// ```
+    /// # // A packet of an HDL-32E whose every return lies 8 m away.
+    /// # let columns: Vec<_> = (0..12).map(|i| umbracast::lidar::Column {
+    /// #     time_ns: i * 46_080, azimuth_cdeg: 16.6 * i as f32, azimuth_rate_cdeg_per_ns: 3.6e-4,
+    /// # }).collect();
+    /// # let packet = umbracast::lidar::packet::encode(&umbracast::lidar::Model::hdl_32e(), &columns, &[8.0; 12 * 32], &[10; 12 * 32], 1_000);
+    ///
+    /// use umbracast::{Config, Health, lidar::Assembler};
+    ///
+    /// let (mut assembler, mut health) = (Assembler::new(&Config::default().site)?, Health::default());
+    /// assembler.push(0, &packet, &mut health);
+    /// assembler.push(0, &packet, &mut health);
+    /// assert_eq!(health.packets_duplicate, 1);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
     pub fn push(&mut self, sensor: usize, packet: &Packet, health: &mut Health) {
         let Some(model) = self.sensors.get(sensor).and_then(|s| s.model.clone()) else {
             health.packets_not_understood += 1;
@@ -140,11 +190,35 @@ impl Assembler {
     }
 
     /// The next closed frame.
+    ///
+    /// ```
+    /// use umbracast::{Config, lidar::Assembler};
+    ///
+    /// assert!(Assembler::new(&Config::default().site)?.pop().is_none(), "nothing was pushed");
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
     pub fn pop(&mut self) -> Option<Frame> {
         self.closed.pop_front()
     }
 
     /// At the end of the input: closes what is open, without counting the sensors that these frames lack.
+    ///
+    /// ```
+    /// # // A packet of an HDL-32E whose every return lies 8 m away.
+    /// # let columns: Vec<_> = (0..12).map(|i| umbracast::lidar::Column {
+    /// #     time_ns: i * 46_080, azimuth_cdeg: 16.6 * i as f32, azimuth_rate_cdeg_per_ns: 3.6e-4,
+    /// # }).collect();
+    /// # let packet = umbracast::lidar::packet::encode(&umbracast::lidar::Model::hdl_32e(), &columns, &[8.0; 12 * 32], &[10; 12 * 32], 1_000);
+    ///
+    /// use umbracast::{Config, Health, lidar::Assembler};
+    ///
+    /// let mut assembler = Assembler::new(&Config::default().site)?;
+    /// assembler.push(0, &packet, &mut Health::default());
+    /// assert!(assembler.pop().is_none(), "the frame is open");
+    /// assembler.finish();
+    /// assert_eq!(assembler.pop().map(|frame| frame.time_ns), Some(100_000_000));
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
     pub fn finish(&mut self) {
         while let Some((number, images)) = self.open.pop_first() {
             self.close(number, images, &mut Health::default());

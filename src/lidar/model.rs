@@ -9,6 +9,11 @@ use crate::geometry::DVec3;
 use crate::site::sensor_model;
 
 /// One laser.
+///
+/// ```
+/// let lowest = umbracast::lidar::Model::hdl_32e().beams[0];
+/// assert_eq!((lowest.ring, lowest.elevation_rad.to_degrees().round()), (0, -31.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
     /// Above the horizon of the sensor, radians.
@@ -25,6 +30,12 @@ pub struct Beam {
 
 impl Beam {
     /// A point at `range_m` in the sensor's frame: x ahead at azimuth 0, azimuth clockwise from above.
+    ///
+    /// ```
+    /// let beam = umbracast::lidar::Model::hdl_32e().beams[15]; // level
+    /// let ahead_m = beam.point_m(0_f64.sin_cos(), 8.0);
+    /// assert_eq!(ahead_m.to_array(), [8.0, 0.0, 0.0]);
+    /// ```
     pub fn point_m(&self, azimuth_sin_cos: (f64, f64), range_m: f64) -> DVec3 {
         let ((sin_el, cos_el), (sin_az, cos_az)) = (self.elevation_sin_cos, azimuth_sin_cos);
         DVec3::new(range_m * cos_el * cos_az, -range_m * cos_el * sin_az, range_m * sin_el + self.z_offset_m)
@@ -32,6 +43,11 @@ impl Beam {
 }
 
 /// A spinning sensor.
+///
+/// ```
+/// let model = umbracast::lidar::Model::vlp_16();
+/// assert_eq!((model.name, model.beams.len()), ("vlp-16", 16));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     /// Its name in a site file.
@@ -49,6 +65,14 @@ pub struct Model {
 impl Model {
     /// The model named in a site file.
     ///
+    /// ```
+    /// use umbracast::lidar::Model;
+    ///
+    /// assert_eq!(Model::by_name("HDL-32E")?, Model::hdl_32e());
+    /// assert!(Model::by_name("camera").is_err());
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// A name that is not known, with those that are.
     pub fn by_name(name: &str) -> Result<Self, Error> {
@@ -60,6 +84,10 @@ impl Model {
     }
 
     /// Velodyne HDL-32E.
+    ///
+    /// ```
+    /// assert_eq!(umbracast::lidar::Model::hdl_32e().beams.len(), 32);
+    /// ```
     pub fn hdl_32e() -> Self {
         const ELEVATION_DEG: [f64; 32] = [
             -30.67, -9.33, -29.33, -8.00, -28.00, -6.67, -26.67, -5.33, -25.33, -4.00, -24.00, -2.67, -22.67,
@@ -81,6 +109,10 @@ impl Model {
     }
 
     /// Velodyne VLP-16.
+    ///
+    /// ```
+    /// assert_eq!(umbracast::lidar::Model::vlp_16().columns_per_block, 2);
+    /// ```
     pub fn vlp_16() -> Self {
         const ELEVATION_DEG: [f64; 16] =
             [-15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0, -7.0, 9.0, -5.0, 11.0, -3.0, 13.0, -1.0, 15.0];

@@ -26,6 +26,14 @@ const HOUR_NS: i64 = 3_600_000_000_000;
 pub(super) const TIME_LIMIT_NS: u64 = 1 << 62;
 
 /// A sensor's UDP payload with the time it was received (simulation: sent).
+///
+/// ```
+/// use umbracast::lidar::{Packet, packet::PAYLOAD_BYTES};
+///
+/// // As it comes from a socket: the bytes, and the host's time at which they came.
+/// let packet = Packet { time_ns: 1_700_000_000_000_000_000, payload: vec![0; PAYLOAD_BYTES] };
+/// assert_eq!(packet.payload.len(), 1206);
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Packet {
     /// Host time at reception; settles the hour that the packet's own clock leaves open.
@@ -35,6 +43,7 @@ pub struct Packet {
 }
 
 /// How many columns a whole packet of a sensor holds.
+#[doc(hidden)] // For what sends packets: the simulator and tests.
 pub fn columns_per_packet(model: &Model) -> usize {
     BLOCKS * model.columns_per_block
 }
@@ -48,6 +57,23 @@ pub fn columns_per_packet(model: &Model) -> usize {
 /// Packets with two returns a firing hold each column twice, the last return in the even block and the strongest,
 /// or the second strongest where the last one is the strongest, in the odd one. Of the two the more reflecting is
 /// given.
+///
+/// ```
+/// # // A packet of an HDL-32E whose every return lies 8 m away.
+/// # let columns: Vec<_> = (0..12).map(|i| umbracast::lidar::Column {
+/// #     time_ns: i * 46_080, azimuth_cdeg: 16.6 * i as f32, azimuth_rate_cdeg_per_ns: 3.6e-4,
+/// # }).collect();
+/// # let packet = umbracast::lidar::packet::encode(&umbracast::lidar::Model::hdl_32e(), &columns, &[8.0; 12 * 32], &[10; 12 * 32], 1_000);
+///
+/// use umbracast::{Health, lidar::{Model, packet::decode}};
+///
+/// let mut health = Health::default();
+/// let mut returns = 0;
+/// decode(&Model::hdl_32e(), &packet, &mut health, |_column, range_m, _reflectivity| {
+///     returns += range_m.iter().filter(|&&range_m| range_m > 0.0).count();
+/// });
+/// assert_eq!(returns, 12 * 32);
+/// ```
 pub fn decode(
     model: &Model,
     packet: &Packet,
@@ -98,6 +124,7 @@ pub fn decode(
 /// # Panics
 /// When there is no column or more than a packet holds, or when ranges or reflectivities are not one a column
 /// and beam.
+#[doc(hidden)] // For what sends packets: the simulator and tests.
 pub fn encode(
     model: &Model,
     columns: &[Column],

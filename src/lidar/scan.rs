@@ -9,6 +9,14 @@ use crate::geometry::{DVec3, Pose};
 const TURN_CDEG: i64 = 36_000;
 
 /// All scans of one period. Frame k covers k/10 s to (k+1)/10 s and closes at its end.
+///
+/// ```
+/// use umbracast::lidar::Frame;
+///
+/// // Frame 3 covers the time from 0.3 to 0.4 s and is given at its end.
+/// let frame = Frame { index: 3, time_ns: 400_000_000, scans: Vec::new() };
+/// assert_eq!(frame.time_ns, (frame.index as i64 + 1) * umbracast::STEP_NS);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     /// Counts from 0 in each scene.
@@ -20,6 +28,15 @@ pub struct Frame {
 }
 
 /// What one sensor saw in one period.
+///
+/// ```
+/// use umbracast::{Config, lidar::{Cloud, Scan, SensorPoint}};
+///
+/// let site_from_sensor = Config::default().site.sensors[0].site_from_sensor();
+/// let ahead = SensorPoint { position_m: [14.0, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
+/// let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(vec![ahead]) };
+/// assert!(scan.site_from_sensor.point(umbracast::geometry::DVec3::new(14.0, 0.0, 0.0)).z < 1.0);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
     /// Which sensor of the site.
@@ -31,6 +48,14 @@ pub struct Scan {
 }
 
 /// The two kinds of clouds.
+///
+/// ```
+/// use umbracast::lidar::{Cloud, SensorPoint};
+///
+/// let ahead = SensorPoint { position_m: [14.0, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
+/// let Cloud::Unorganised(points) = Cloud::Unorganised(vec![ahead]) else { unreachable!() };
+/// assert_eq!(points.len(), 1);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cloud {
     /// Beams by columns, as a spinning sensor fires them.
@@ -40,6 +65,17 @@ pub enum Cloud {
 }
 
 /// A revolution as a grid: columns in firing order, each with one range a beam.
+///
+/// ```
+/// # let column = umbracast::lidar::Column { time_ns: 5, azimuth_cdeg: 9000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
+/// # let image = umbracast::lidar::RangeImage {
+/// #     beams: umbracast::lidar::Model::hdl_32e().beams, columns: vec![column], range_m: vec![8.0; 32], reflectivity: vec![10; 32],
+/// # };
+///
+/// // One column of an HDL-32E, every return 8 m away.
+/// let (c, b) = (0, 31);
+/// assert_eq!(image.range_m[c * image.beams.len() + b], 8.0);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RangeImage {
     /// The beams of a column, in firing order.
@@ -53,6 +89,14 @@ pub struct RangeImage {
 }
 
 /// One firing of all beams.
+///
+/// ```
+/// use umbracast::lidar::Column;
+///
+/// // A head that turns ten times a second, to the right of straight ahead.
+/// let column = Column { time_ns: 0, azimuth_cdeg: 9_000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
+/// assert!((column.azimuth_rate_cdeg_per_ns * 1e8 - 36_000.0).abs() < 0.1);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Column {
     /// When the first beam fired.
@@ -64,6 +108,13 @@ pub struct Column {
 }
 
 /// A point of an unorganised cloud.
+///
+/// ```
+/// use umbracast::lidar::SensorPoint;
+///
+/// let point = SensorPoint { position_m: [3.0, 4.0, 0.0], time_ns: 0, reflectivity: 10.0 };
+/// assert_eq!(point.position_m[0].hypot(point.position_m[1]), 5.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorPoint {
     /// In the sensor's frame, metres.
@@ -95,6 +146,16 @@ fn azimuth_sin_cos(azimuth_cdeg: u32) -> (f64, f64) {
 impl RangeImage {
     /// Azimuth of beam `b` in column `c`, hundredths of a degree in [0, 36000), rounded to a whole one as the
     /// manufacturer's decoder does.
+    ///
+    /// ```
+    /// # let column = umbracast::lidar::Column { time_ns: 5, azimuth_cdeg: 9000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
+    /// # let image = umbracast::lidar::RangeImage {
+    /// #     beams: umbracast::lidar::Model::hdl_32e().beams, columns: vec![column], range_m: vec![8.0; 32], reflectivity: vec![10; 32],
+    /// # };
+    ///
+    /// // The last of 32 beams fires 35.7 us after the first: 0.13 degrees later.
+    /// assert_eq!((image.azimuth_cdeg(0, 0), image.azimuth_cdeg(0, 31)), (9000, 9013));
+    /// ```
     pub fn azimuth_cdeg(&self, c: usize, b: usize) -> u32 {
         let column = &self.columns[c];
         let azimuth =
@@ -105,16 +166,36 @@ impl RangeImage {
     }
 
     /// The point of beam `b` in column `c` at `range_m`, in the sensor's frame.
+    ///
+    /// ```
+    /// # let column = umbracast::lidar::Column { time_ns: 5, azimuth_cdeg: 9000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
+    /// # let image = umbracast::lidar::RangeImage {
+    /// #     beams: umbracast::lidar::Model::hdl_32e().beams, columns: vec![column], range_m: vec![8.0; 32], reflectivity: vec![10; 32],
+    /// # };
+    ///
+    /// // Azimuth 90 degrees is to the right: y points to the left.
+    /// assert!((image.point_m(0, 15, 8.0).y + 8.0).abs() < 0.01);
+    /// ```
     pub fn point_m(&self, c: usize, b: usize, range_m: f64) -> DVec3 {
         self.beams[b].point_m(azimuth_sin_cos(self.azimuth_cdeg(c, b)), range_m)
     }
 
     /// The same point, to the last bit, where there are many.
+    #[doc(hidden)] // See `Azimuths`.
     pub fn tabled_point_m(&self, azimuths: &Azimuths, c: usize, b: usize, range_m: f64) -> DVec3 {
         self.beams[b].point_m(azimuths.sin_cos[self.azimuth_cdeg(c, b) as usize], range_m)
     }
 
     /// When beam `b` of column `c` fired.
+    ///
+    /// ```
+    /// # let column = umbracast::lidar::Column { time_ns: 5, azimuth_cdeg: 9000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
+    /// # let image = umbracast::lidar::RangeImage {
+    /// #     beams: umbracast::lidar::Model::hdl_32e().beams, columns: vec![column], range_m: vec![8.0; 32], reflectivity: vec![10; 32],
+    /// # };
+    ///
+    /// assert_eq!(image.time_ns(0, 31), 5 + 31 * 1152);
+    /// ```
     pub fn time_ns(&self, c: usize, b: usize) -> i64 {
         self.columns[c].time_ns + i64::from(self.beams[b].fire_offset_ns)
     }

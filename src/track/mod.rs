@@ -2,30 +2,63 @@
 //!
 //! [`mixture`] is our tracker, [`paper`] that of the paper's authors; the method chooses.
 
-pub mod gaussian;
+mod gaussian;
+#[doc(hidden)] // Assignments, for scores that match tracks with people.
 pub mod association;
+#[doc(hidden)] // What tests and ablations turn.
 pub mod numbers;
 mod sway;
-pub mod kalman;
+mod kalman;
 mod limb_phase;
+#[doc(hidden)] // For fits that need to know who is in free sight.
 pub mod visibility;
 mod height;
+#[doc(hidden)] // Extents, for the fit of its numbers.
 pub mod width;
 mod followed;
 mod person;
-pub mod mixture;
-pub mod paper;
+mod mixture;
+mod paper;
 
+pub use crate::gait::GaitPhase;
 pub use followed::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
+#[doc(hidden)] // Tests turn its numbers; `Tracker` chooses by the config.
 pub use mixture::MixtureTracker;
+#[doc(hidden)] // What tests and ablations turn.
 pub use numbers::Numbers;
-pub use paper::{PaperTracker, Variant};
+use paper::{PaperTracker, Variant};
 
 use crate::config::{TrackConfig, TrackMethod};
 use crate::detect::{Detection, Prior};
 use crate::{Frame, Site};
 
 /// Follows people by the method of the config.
+///
+/// ```
+/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
+/// # let detection = |x_m: f64, time_ns: i64| {
+/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
+/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
+/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
+/// #     Detection {
+/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
+/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
+/// #     }
+/// # };
+/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
+/// # let config = Config::default();
+///
+/// use umbracast::track::Tracker;
+///
+/// // Somebody walks along x, 0.12 m a frame.
+/// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
+/// for k in 0..20 {
+///     let frame = frame(k);
+///     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
+/// }
+/// assert_eq!(tracks.len(), 1);
+/// assert!(tracks[0].confirmed && (tracks[0].velocity_mps.x - 1.2).abs() < 0.1);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Tracker(Method);
 
@@ -37,6 +70,13 @@ enum Method {
 
 impl Tracker {
     /// Needs the site to know what each sensor can see.
+    ///
+    /// ```
+    /// use umbracast::{Config, Mode, track::Tracker};
+    ///
+    /// let paper = Config::for_mode(Mode::Paper);
+    /// assert!(Tracker::new(&paper.track, &paper.site).priors(0).is_empty());
+    /// ```
     pub fn new(config: &TrackConfig, site: &Site) -> Self {
         Self(match config.method {
             TrackMethod::Mixture => Method::Mixture(Box::new(MixtureTracker::new(config, site))),
@@ -46,6 +86,31 @@ impl Tracker {
     }
 
     /// Last step's tracks predicted to `time_ns`; none by the paper's method, whose detection asks for none.
+    ///
+    /// ```
+    /// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
+    /// # let detection = |x_m: f64, time_ns: i64| {
+    /// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
+    /// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
+    /// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
+    /// #     Detection {
+    /// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
+    /// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
+    /// #     }
+    /// # };
+    /// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
+    /// # let config = Config::default();
+    ///
+    /// use umbracast::track::Tracker;
+    ///
+    /// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
+    /// for k in 0..20 {
+    ///     let frame = frame(k);
+    ///     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
+    /// }
+    /// let expected = &tracker.priors(frame(20).time_ns)[0];
+    /// assert!((expected.position_m.x - 0.12 * 20.0).abs() < 0.05 && expected.confirmed);
+    /// ```
     pub fn priors(&self, time_ns: i64) -> Vec<Prior> {
         match &self.0 {
             Method::Mixture(tracker) => tracker.priors(time_ns),
@@ -55,6 +120,29 @@ impl Tracker {
 
     /// Takes a frame's detections; `tracks` is every track alive at the frame's time, in order of `id`. A frame
     /// that is not later than the last one changes nothing.
+    ///
+    /// ```
+    /// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
+    /// # let detection = |x_m: f64, time_ns: i64| {
+    /// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
+    /// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
+    /// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
+    /// #     Detection {
+    /// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
+    /// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
+    /// #     }
+    /// # };
+    /// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
+    /// # let config = Config::default();
+    ///
+    /// use umbracast::track::Tracker;
+    ///
+    /// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
+    /// tracker.update(&frame(0), &[detection(1.0, frame(0).time_ns)], &mut tracks);
+    /// assert!(!tracks[0].confirmed, "one sighting is not enough");
+    /// tracker.update(&frame(1), &[detection(1.0, frame(1).time_ns)], &mut tracks);
+    /// assert!(tracks[0].confirmed);
+    /// ```
     pub fn update(&mut self, frame: &Frame, detections: &[Detection], tracks: &mut Vec<Track>) {
         match &mut self.0 {
             Method::Mixture(tracker) => tracker.update(frame, detections, tracks),

@@ -1,7 +1,7 @@
 //! The main figures of several reports side by side, read back from their `scores.json`.
 
 use serde::{Deserialize, Serialize};
-use umbracast::{Error, Mode};
+use umbracast::{Error, Health, Mode};
 
 use super::tables::{Table, number};
 use crate::run::pooled::Estimate;
@@ -90,11 +90,6 @@ struct Stage1 {
     velocity_nees: Estimate,
     displacement_m: Vec<Estimate>,
     health: Health,
-}
-
-#[derive(Deserialize)]
-struct Health {
-    sensors_missing: u64,
 }
 
 /// The rows of one report, in its order of groups and modes.
@@ -220,7 +215,7 @@ mod tests {
             run.links.push(link_row(frame, 0, frame >= 27));
         }
         let config = Config::for_mode(Mode::Default);
-        let health = umbracast::Health { sensors_missing: 12, ..umbracast::Health::default() };
+        let health = Health { sensors_missing: 12, ..Health::default() };
         let run = ModeRun { config: &config, rows: &run, health };
         let scene = score_scene(0, "orca-03", &truth, &[run], None, None).unwrap();
         let json = to_json(&pool(&[&scene], &["side".to_owned()]));

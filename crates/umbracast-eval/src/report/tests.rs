@@ -56,7 +56,7 @@ fn the_same_scores_give_the_same_files() {
     assert_eq!(&written[0].0[2][1..4], b"PNG");
     let page = &written[0].1;
     assert_eq!(page.matches("<svg").count(), page.matches("</svg>").count());
-    assert!(page.contains("umbracast evaluate --out &lt;here&gt;") && page.contains("acceleration_psd"));
+    assert!(page.contains("umbracast evaluate --out &lt;here&gt;") && page.contains("clutter_per_m2"));
 }
 
 /// Nothing that a browser would load or run; a name space is a name.
