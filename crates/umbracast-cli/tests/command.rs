@@ -189,7 +189,7 @@ fn the_networks_that_ship_are_known() {
 fn what_changes_nothing_and_who_walks_through_walls_is_told() {
     let folder = folder("told");
     let (trajectories, sim) = (folder.join("crossing.csv"), folder.join("sim"));
-    fs::write(&trajectories, format!("{CROSSING}0.0,3,14.0,0.0,\n3.0,3,19.0,0.0,\n")).expect("writes");
+    fs::write(&trajectories, format!("{CROSSING}0.0,3,14.0,0.0,\n3.0,3,48.0,0.0,\n")).expect("writes");
     let said = done(&[
         "simulate",
         "--trajectories",
