@@ -43,7 +43,7 @@ fn drawn(kept: &Kept, walkers: &[Walker], (start_s, end_s): (f64, f64)) -> Strin
     svg += &canvas.moving(walkers);
     svg += &canvas.fixtures();
     // Writing to a String cannot fail.
-    let _ = write!(svg, "{}</svg>\n", canvas.legend());
+    let _ = writeln!(svg, "{}</svg>", canvas.legend());
     svg
 }
 
