@@ -8,8 +8,8 @@ use umbracast::{Error, Site};
 use umbracast_eval::run::chain::{People, SceneSpec};
 use umbracast_io::bvh;
 use umbracast_io::trajectories::{self, Options};
+use umbracast_sim::body::Bodies;
 use umbracast_sim::body::Gait;
-use umbracast_sim::body::kind::Bodies;
 use umbracast_sim::crowd::replay::{Recorded, replay};
 
 use crate::args::{BodyArgs, Replay};

@@ -3,10 +3,11 @@
 //! Exit codes: 0 done, 1 failed, 2 wrong arguments, 3 done but data was lost or skipped (counted and named).
 
 mod args;
+mod ending;
 mod setup;
-mod progress;
 mod say;
 mod run_json;
+mod progress;
 mod crowds;
 mod flags;
 mod matches;
@@ -18,15 +19,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches};
 
 use args::{Cli, Command};
-
-/// How a command that did not fail ended.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Ending {
-    /// Everything was used.
-    Done,
-    /// Something was lost or skipped; says what.
-    DataLost(String),
-}
+use ending::Ending;
 
 fn main() -> ExitCode {
     let given = Cli::command().get_matches();

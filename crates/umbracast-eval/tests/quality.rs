@@ -5,7 +5,7 @@ use umbracast::{Config, Mode};
 use umbracast_eval::run::chain::{People, SceneSpec, Spec, run};
 use umbracast_eval::run::pooled::{Group, score};
 use umbracast_eval::run::scene_score::Predictor;
-use umbracast_sim::body::kind::Bodies;
+use umbracast_sim::body::Bodies;
 use umbracast_sim::crowd::{Preset, circle_crossing};
 
 /// Within 300 ms, from the access point at the side.

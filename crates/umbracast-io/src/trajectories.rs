@@ -9,6 +9,8 @@
 //! | CSV of PedPy and Madras | columns `frame,id,x/m,y/m[,z/m]` | the slope of `t/s`, which is rounded, over `frame`, or `fps` to be given |
 //! | PeTrack | `id frame x y [z]`, blanks or tabs, `#` comments | `# framerate:` or `fps` to be given |
 
+mod options;
+mod cells;
 mod tabular;
 
 use std::collections::BTreeMap;
@@ -16,6 +18,9 @@ use std::path::Path;
 
 use serde::Deserialize;
 use umbracast::Error;
+
+use cells::{Row, at_line, missing_rate, number, rate, seconds, shorten, whole};
+pub use options::{Options, Unit};
 
 /// Faster than people run: a wrong unit or rate.
 const MOST_MPS: f64 = 12.0;
@@ -35,66 +40,6 @@ pub struct RecordedPerson {
     pub samples: Vec<[f64; 3]>,
     /// Standing height where the file tells it.
     pub height_m: Option<f64>,
-}
-
-/// Unit of length of a PeTrack file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
-    /// Metres.
-    Metre,
-    /// Centimetres.
-    Centimetre,
-}
-
-impl Unit {
-    /// As it is written.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Metre => "m",
-            Self::Centimetre => "cm",
-        }
-    }
-}
-
-/// What a file may leave open. What is given here goes before what the file says.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Options {
-    /// Frames per second of one frame number (TrajNet++: of a person's rows).
-    pub fps: Option<f64>,
-    /// Of x, y and z in PeTrack text; metres if nobody says.
-    pub unit: Option<Unit>,
-}
-
-/// One row, whatever the format.
-struct Row {
-    line: usize,
-    id: i64,
-    /// Seconds, or a frame number still to be divided by the rate.
-    time: f64,
-    x_m: f64,
-    y_m: f64,
-    height_m: Option<f64>,
-}
-
-impl Unit {
-    fn metres(self) -> f64 {
-        match self {
-            Self::Metre => 1.0,
-            Self::Centimetre => 0.01,
-        }
-    }
-}
-
-impl std::str::FromStr for Unit {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self, Error> {
-        match name {
-            "m" => Ok(Self::Metre),
-            "cm" => Ok(Self::Centimetre),
-            _ => Err(Error::new(format!("unit: expected m or cm, found {name:?}"))),
-        }
-    }
 }
 
 /// Reads a file of recorded people, in the order of their ids.
@@ -162,43 +107,6 @@ fn read_text(path: &Path) -> Result<String, Error> {
         Ok(text) => text,
         Err(e) => e.into_bytes().into_iter().map(char::from).collect(),
     })
-}
-
-fn at_line(line: usize, story: impl std::fmt::Display) -> Error {
-    Error::new(format!("line {line}: {story}"))
-}
-
-/// A finite number.
-fn number(text: &str, what: &str, line: usize) -> Result<f64, Error> {
-    let value = text.trim().parse().ok().filter(|v: &f64| v.is_finite());
-    value.ok_or_else(|| at_line(line, format!("{what}: expected a number, found {text:?}")))
-}
-
-/// A whole number, which some programs write with a decimal point.
-fn whole(text: &str, what: &str, line: usize) -> Result<i64, Error> {
-    let value = number(text, what, line)?;
-    // Beyond 2^53 neighbours are no longer told apart.
-    if value.fract() != 0.0 || value.abs() > 9.0e15 {
-        return Err(at_line(line, format!("{what}: expected a whole number, found {text:?}")));
-    }
-    Ok(value as i64)
-}
-
-/// A rate that can divide.
-fn rate(fps: f64, place: &str) -> Result<f64, Error> {
-    if fps.is_finite() && fps > 0.0 {
-        return Ok(fps);
-    }
-    Err(Error::new(format!("{place}: expected frames per second above 0, found {fps}")))
-}
-
-fn missing_rate(found: &str) -> Error {
-    Error::new(format!("expected frames per second, found {found}: give them (--fps)"))
-}
-
-fn seconds(mut rows: Vec<Row>, fps: f64) -> Vec<Row> {
-    rows.iter_mut().for_each(|row| row.time /= fps);
-    rows
 }
 
 #[derive(Deserialize)]
@@ -390,9 +298,4 @@ fn plausible(of_person: &[Row]) -> Result<(), Error> {
             pair[0].line
         ),
     ))
-}
-
-/// The beginning of a line, for an error.
-fn shorten(line: &str) -> String {
-    format!("{:?}", line.chars().take(60).collect::<String>())
 }

@@ -4,7 +4,7 @@ use rand::Rng;
 use umbracast::lidar::Packet;
 use umbracast::{Error, STEP_NS, Site};
 
-use crate::body::kind::Bodies;
+use crate::body::Bodies;
 use crate::body::{PersonState, Walker};
 use crate::crowd::{Crowd, Trajectory};
 use crate::random::stream;

@@ -12,10 +12,11 @@ use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::Preset;
 
 use crate::args::{Ablate, BodyArgs, Common, Replay};
+use crate::ending::Ending;
 use crate::input::Input;
 use crate::progress::bar;
 use crate::run_json::Stopwatch;
-use crate::{Ending, crowds, say, setup};
+use crate::{crowds, say, setup};
 
 /// People of a drawn scene.
 const PEOPLE: usize = 10;

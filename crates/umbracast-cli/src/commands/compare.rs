@@ -4,7 +4,8 @@ use umbracast::Error;
 use umbracast_eval::report::compare;
 
 use crate::args::{Common, Compare};
-use crate::{Ending, say, setup};
+use crate::ending::Ending;
+use crate::{say, setup};
 
 /// Reads `scores.json` of every report.
 pub fn run(args: &Compare, common: &Common) -> Result<Ending, Error> {

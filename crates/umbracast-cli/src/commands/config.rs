@@ -3,7 +3,8 @@
 use umbracast::config::DEFAULT_TOML;
 use umbracast::{Config, Error};
 
-use crate::{Ending, args, say, setup};
+use crate::ending::Ending;
+use crate::{args, say, setup};
 
 /// Prints or checks.
 pub fn run(args: &args::Config) -> Result<Ending, Error> {

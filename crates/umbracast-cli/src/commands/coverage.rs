@@ -5,7 +5,8 @@ use umbracast_eval::coverage::{self, Options};
 use umbracast_io::tables;
 
 use crate::args::{Common, Coverage};
-use crate::{Ending, say, setup};
+use crate::ending::Ending;
+use crate::{say, setup};
 
 /// Surveys the floor; the summary to stdout, table and floor plan into a folder where one is given.
 pub fn run(args: &Coverage, common: &Common) -> Result<Ending, Error> {

@@ -5,8 +5,9 @@ use umbracast_eval::run::chain;
 
 use crate::args::{Common, Demo};
 use crate::commands::evaluate;
+use crate::ending::Ending;
+use crate::say;
 use crate::setup::{self, TEST_SEED};
-use crate::{Ending, say};
 
 /// Simulates one test scene in memory and reports on it.
 pub fn run(args: &Demo, common: &Common) -> Result<Ending, Error> {

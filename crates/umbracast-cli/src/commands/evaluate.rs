@@ -16,10 +16,11 @@ use umbracast_io::rows::{LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
 use umbracast_io::tables;
 
 use crate::args::{Common, Evaluate};
+use crate::ending::Ending;
 use crate::progress::bar;
 use crate::run_json::Frames;
 use crate::setup::{self, TEST_SEED};
-use crate::{Ending, crowds, matches, say};
+use crate::{crowds, matches, say};
 
 /// Scores what the arguments name.
 pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {

@@ -15,7 +15,8 @@ use umbracast_io::recording::{Entry, RecordingReader};
 use umbracast_io::tables;
 
 use crate::args::{Common, Inspect};
-use crate::{Ending, say, setup};
+use crate::ending::Ending;
+use crate::{say, setup};
 
 /// What was found in a file: lines of name and value, and what was lost.
 #[derive(Default)]

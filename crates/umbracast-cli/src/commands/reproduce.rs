@@ -12,10 +12,11 @@ use umbracast_eval::run::experiment::{Experiment, Shard};
 use umbracast_eval::run::pooled;
 
 use crate::args::{Common, Replay, Reproduce};
+use crate::ending::Ending;
 use crate::progress::SceneClock;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
-use crate::{Ending, crowds, say};
+use crate::{crowds, say};
 
 /// Scenes of `--quick`.
 const QUICK_SCENES: u32 = 40;

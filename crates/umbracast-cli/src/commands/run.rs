@@ -10,10 +10,11 @@ use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::tables::TableWriter;
 
 use crate::args::{Common, Run};
+use crate::ending::Ending;
 use crate::input::{self, Input};
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch, ranges};
-use crate::{Ending, setup};
+use crate::setup;
 
 /// What came out of one scene.
 #[derive(Debug, Default)]

@@ -16,10 +16,11 @@ use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
 
 use crate::args::{Common, Simulate};
+use crate::ending::Ending;
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
-use crate::{Ending, crowds, input, say};
+use crate::{crowds, input, say};
 
 /// Simulates every scene, several at a time; tables are written in the order of the scenes.
 pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {

@@ -12,9 +12,10 @@ use umbracast_train::thresholds::tune_thresholds;
 use umbracast_train::width::fit_width;
 
 use crate::args::{Common, Fitted, Train, TrainBody, TrainLstm, TrainResidual, TrainScenes};
+use crate::ending::Ending;
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
-use crate::{Ending, crowds, say, setup};
+use crate::{crowds, say, setup};
 
 /// Writes a fitted file and its card, or prints lines for the configuration.
 pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {

@@ -8,7 +8,7 @@ use umbracast::geometry::{DVec2, DVec3};
 use umbracast::site::Sensor;
 
 use super::{Coverage, Place};
-use crate::report::html::escaped;
+use crate::report::markup::escaped;
 use crate::run::chain::CIRCLE_M;
 
 /// The longer side of the hall, pixels.

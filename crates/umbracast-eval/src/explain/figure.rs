@@ -2,7 +2,7 @@
 
 use umbracast::{Error, STEPS};
 
-use crate::report::figures::{BLACK, BLUE, GREEN, GREY, LIGHT, ORANGE, PURPLE, axes, series};
+use crate::report::figure::{BLACK, BLUE, GREEN, GREY, LIGHT, ORANGE, PURPLE, axes, series};
 use crate::report::plot::{Drawing, Mark, Panel, draw_grid};
 use crate::report::published::{AT_300_MS, BASE_RATE_AT_300_MS, DISPLACEMENT_M};
 

@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use umbracast::STEPS;
 use umbracast_io::rows::{LinkRow, TrackRow};
 
-use super::Kept;
-use super::animation_svg::Canvas;
+use super::animation_svg::{Canvas, LinkState, Walker};
+use super::context::Kept;
 use super::floor;
 use crate::score::matching::match_scene;
 use crate::score::scene::{Matching, TruthIndex};
@@ -19,29 +19,6 @@ const LONGEST_S: f64 = 10.0;
 const BYTES_MAX: usize = 300_000;
 /// Between two places of a person, seconds; the player draws a straight line between them. The second is for crowds.
 const STEPS_S: [f64; 3] = [0.2, 0.4, 0.8];
-
-/// What is shown of a link at an instant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LinkState {
-    /// The person is not in the scene or has arrived, or hall and furniture block the link.
-    Hidden,
-    /// In sight, and predicted to stay so.
-    InSight,
-    /// In sight, and predicted to be blocked within the longest window.
-    Predicted,
-    /// Blocked by another person, truly.
-    Blocked,
-}
-
-/// The person's way and the links, at the instants shown.
-pub struct Walker {
-    /// Where the person is at each step, metres; `None` while not in the scene.
-    pub places_m: Vec<Option<(f64, f64)>>,
-    /// From there to where the forecast ends, metres; zero without a track.
-    pub ways_m: Vec<(f64, f64)>,
-    /// By access point: what is shown from which time on, seconds from the start.
-    pub links: Vec<Vec<(f64, LinkState)>>,
-}
 
 /// The animation, or `None` where the scene holds nobody, or too many for one picture.
 pub fn svg(kept: &Kept) -> Option<String> {
@@ -66,7 +43,7 @@ fn drawn(kept: &Kept, walkers: &[Walker], (start_s, end_s): (f64, f64)) -> Strin
     svg += &canvas.moving(walkers);
     svg += &canvas.fixtures();
     // Writing to a String cannot fail.
-    let _ = write!(svg, "{}</svg>\n", canvas.legend());
+    let _ = writeln!(svg, "{}</svg>", canvas.legend());
     svg
 }
 

@@ -5,9 +5,8 @@ use std::fmt::Write as _;
 
 use umbracast::Site;
 
-use super::animation::{LinkState, Walker};
 use super::floor::{self, Window};
-use super::html::escaped;
+use super::markup::escaped;
 
 /// Of the card, pixels.
 const WIDTH: f64 = 600.0;
@@ -47,6 +46,29 @@ const STYLE: &str = "
 #umbracast-animation .lidar { fill: #eceff2; stroke: #15181c; }
 }
 ";
+
+/// What is shown of a link at an instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LinkState {
+    /// The person is not in the scene or has arrived, or hall and furniture block the link.
+    Hidden,
+    /// In sight, and predicted to stay so.
+    InSight,
+    /// In sight, and predicted to be blocked within the longest window.
+    Predicted,
+    /// Blocked by another person, truly.
+    Blocked,
+}
+
+/// The person's way and the links, at the instants shown.
+pub struct Walker {
+    /// Where the person is at each step, metres; `None` while not in the scene.
+    pub places_m: Vec<Option<(f64, f64)>>,
+    /// From there to where the forecast ends, metres; zero without a track.
+    pub ways_m: Vec<(f64, f64)>,
+    /// By access point: what is shown from which time on, seconds from the start.
+    pub links: Vec<Vec<(f64, LinkState)>>,
+}
 
 /// Colour, width and dashes of a link. The colours read on both backgrounds; the dashes tell them apart without.
 fn look(state: LinkState) -> (&'static str, &'static str, &'static str) {

@@ -2,10 +2,12 @@
 
 use std::fmt::Write as _;
 
-use super::figures::Figure;
+use super::context::Context;
+use super::figure::Figure;
+use super::markup::escaped;
 use super::plot::Mark;
+use super::published;
 use super::tables::Table;
-use super::{Context, published};
 use crate::run::pooled::{Group, Scores};
 use crate::run::scene_score::Predictor;
 use umbracast::Mode;
@@ -267,8 +269,4 @@ fn tabulated(table: &Table, first: bool) -> String {
         let _ = writeln!(text, "<p class=\"note\">{}</p>", escaped(&table.note));
     }
     text + "</details>\n"
-}
-
-pub(crate) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -6,54 +6,23 @@ pub mod compare;
 mod long_table;
 mod ladder_table;
 pub(crate) mod plot;
-pub(crate) mod figures;
+pub(crate) mod figure;
+mod context;
 mod floor;
 mod one_scene;
-mod animation;
+mod figures;
+pub(crate) mod markup;
 mod animation_svg;
-pub(crate) mod html;
+mod animation;
+mod html;
 
 use std::path::Path;
 
 use umbracast::{Config, Error, Mode, Site};
 
 use crate::run::pooled::{Group, Scores};
-use crate::score::scene::{SceneRun, SceneTruth};
+pub use context::{Context, Kept};
 use tables::Table;
-
-/// What a report is made of, beside the scores.
-#[derive(Debug, Clone, Copy)]
-pub struct Context<'a> {
-    /// The configuration of each mode.
-    pub configs: &'a [Config],
-    /// The command line that makes the same report.
-    pub command: &'a str,
-    /// The scene that is shown by itself.
-    pub kept: Option<Kept<'a>>,
-    /// What a reader must know of how it was made, a paragraph each.
-    pub notes: &'a [String],
-}
-
-impl Context<'_> {
-    fn site(&self) -> Option<&Site> {
-        self.configs.first().map(|config| &config.site)
-    }
-}
-
-/// One scene of one mode, for the figures that show an instant and a link.
-#[derive(Debug, Clone, Copy)]
-pub struct Kept<'a> {
-    /// Its name in captions: preset and seed.
-    pub label: &'a str,
-    /// Whose run it is.
-    pub mode: Mode,
-    /// Where it took place.
-    pub site: &'a Site,
-    /// What was so.
-    pub truth: &'a SceneTruth,
-    /// What we said.
-    pub run: &'a SceneRun,
-}
 
 /// Writes into a directory, which is made where it is not there: `report.html`; its tables as text, `report.txt`;
 /// every score as `scores.json` and `scores.csv`; each figure as `NAME.svg` and `NAME.png`; and some seconds of the

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use umbracast::{Error, STEPS, Site};
 use umbracast_io::rows::{LinkRow, TrackRow};
 
-use super::Kept;
-use super::figures::{BLACK, BLUE, Figure, GOLD, GREEN, GREY, LIGHT, PURPLE, RED, Sizes, axes, series};
+use super::context::Kept;
+use super::figure::{BLACK, BLUE, Figure, GOLD, GREEN, GREY, LIGHT, PURPLE, RED, Sizes, axes, series};
 use super::floor::{self, Window};
 use super::plot::{Mark, Panel};
 use crate::score::instances::instances;

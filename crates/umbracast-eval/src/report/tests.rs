@@ -4,6 +4,7 @@ use super::*;
 use crate::run::pooled::pool;
 use crate::run::scene_score::{ModeRun, score_scene};
 use crate::score::hand_made::{link_row, track_row, truth_of};
+use crate::score::scene::{SceneRun, SceneTruth};
 use umbracast::Health;
 
 /// Three people who stand still; the link of the first is blocked from frame 30 on and we say so in time.

@@ -8,7 +8,7 @@ use umbracast::forecast::Weights;
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
 use umbracast_io::rows;
-use umbracast_sim::body::kind::Bodies;
+use umbracast_sim::body::Bodies;
 use umbracast_sim::crowd::{self, Crowd, Preset};
 use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use umbracast::Error;
 
-use super::{PcdCloud, PcdEncoding, PcdField, PcdKind};
+use super::cloud::{PcdCloud, PcdEncoding, PcdField, PcdKind};
 
 /// What the header says.
 pub struct Header {

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use csv::Writer;
 use umbracast::Error;
 
-use super::{Cell, Row, Values};
+use super::cells::{Cell, Row};
+use super::values::Values;
 
 /// An open CSV file.
 #[derive(Debug)]

@@ -5,6 +5,7 @@
 //! of them, reads as well. Same rows, same bytes.
 
 mod cells;
+mod values;
 mod parquet_file;
 mod csv_file;
 
@@ -16,6 +17,7 @@ pub use cells::{Cell, Name, Row};
 use csv_file::CsvFile;
 use parquet_file::ParquetFile;
 pub use parquet_file::TableSummary;
+pub use values::Values;
 
 /// Rows held back until they are written together.
 const ROW_GROUP: usize = 65_536;
@@ -90,36 +92,6 @@ pub fn write<R: Row>(directory: &Path, access_points: &[String], csv: bool, rows
     let mut writer = TableWriter::create(directory, access_points, csv)?;
     writer.write(rows)?;
     writer.finish()
-}
-
-/// A column of a table whose columns depend on the site.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Values {
-    /// Measures.
-    F64(Vec<f64>),
-    /// Measures, null where there is none.
-    MaybeF64(Vec<Option<f64>>),
-    /// Counts.
-    U32(Vec<u32>),
-    /// Yes or no.
-    Bool(Vec<bool>),
-}
-
-impl Values {
-    /// Rows.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::F64(v) => v.len(),
-            Self::MaybeF64(v) => v.len(),
-            Self::U32(v) => v.len(),
-            Self::Bool(v) => v.len(),
-        }
-    }
-
-    /// True without a row.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
 }
 
 /// Writes `directory/TABLE.parquet` and `directory/TABLE.csv` with columns that are known at run time only.

@@ -16,7 +16,8 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use umbracast::Error;
 
-use super::{Cell, Row, Values};
+use super::cells::{Cell, Row};
+use super::values::Values;
 
 /// An open Parquet file.
 pub struct ParquetFile {

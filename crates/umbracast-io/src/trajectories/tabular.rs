@@ -3,7 +3,8 @@
 use csv::StringRecord;
 use umbracast::Error;
 
-use super::{Options, Row, at_line, missing_rate, number, rate, seconds, shorten, whole};
+use super::cells::{Row, at_line, missing_rate, number, rate, seconds, shorten, whole};
+use super::options::Options;
 
 /// The rows of either kind of columns.
 pub fn rows(text: &str, options: Options) -> Result<Vec<Row>, Error> {

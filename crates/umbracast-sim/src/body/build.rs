@@ -91,6 +91,10 @@ const CHILD_SPREAD: f64 = 0.045;
 const SHOE_M: f64 = 0.025;
 /// Trousers and a shirt stand off the skin (shoulder breadth +10 mm indoors).
 const CLOTH_M: f64 = 0.005;
+/// The ball of the foot, where toes bend, as a share of the sole's length from the heel.
+pub const BALL_SHARE: f64 = 0.75;
+/// The ankle joint, from the heel.
+pub const ANKLE_SHARE: f64 = 0.25;
 
 impl Build {
     /// Draws a body; `height_m`, with shoes, where it is known.

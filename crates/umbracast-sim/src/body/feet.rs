@@ -4,11 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use umbracast::geometry::{DVec2, DVec3};
 
-use super::build::Build;
+use super::build::{ANKLE_SHARE, BALL_SHARE, Build};
 use super::gait;
-use super::shape::{ANKLE_SHARE, BALL_SHARE};
 use super::skeleton::FootPose;
-use super::walk::{Instant, Walk, roll};
 
 /// Where a foot stands flat, from contact to toe-off.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,29 +50,13 @@ pub fn print(
     }
 }
 
-/// Both feet at an instant, left and right.
-pub fn poses(walk: &Walk, instant: &Instant, build: &Build) -> [FootPose; 2] {
-    [true, false].map(|left| {
-        let [current, next] = walk.prints_of(left, instant.phase);
-        let stood = instant.phase - current.contact;
-        let amount = roll(instant, build);
-        if stood <= current.stance_share {
-            standing_on(&current, stood / current.stance_share, amount, build)
-        } else {
-            let air = (next.contact - current.contact - current.stance_share).max(1e-6);
-            let progress = ((stood - current.stance_share) / air).min(1.0);
-            swinging(&current, &next, progress, amount, build)
-        }
-    })
-}
-
 /// Both feet of a body that stands at rest at the origin, looking along x.
 pub fn at_rest(build: &Build) -> [FootPose; 2] {
     [1, 0].map(|contact| standing_on(&print(build, contact, DVec2::ZERO, 0.0, 0.0), 0.2, 0.0, build))
 }
 
 /// A foot on its print: it lands on the heel, lies flat, then rises about the ball with the toes on the floor.
-fn standing_on(print: &Footprint, progress: f64, amount: f64, build: &Build) -> FootPose {
+pub fn standing_on(print: &Footprint, progress: f64, amount: f64, build: &Build) -> FootPose {
     let pitch_rad = amount * gait::stance_pitch_rad(progress);
     let sole = build.sole_m();
     let pivot_m = if pitch_rad > 0.0 { 0.0 } else { BALL_SHARE * sole };
@@ -89,7 +71,7 @@ fn standing_on(print: &Footprint, progress: f64, amount: f64, build: &Build) -> 
 }
 
 /// A foot in the air between two prints, its lowest point always above the floor.
-fn swinging(from: &Footprint, to: &Footprint, progress: f64, amount: f64, build: &Build) -> FootPose {
+pub fn swinging(from: &Footprint, to: &Footprint, progress: f64, amount: f64, build: &Build) -> FootPose {
     let (start, end) = (standing_on(from, 1.0, amount, build), standing_on(to, 0.0, amount, build));
     let u = progress;
     let way = swing_way(u, amount);

@@ -5,7 +5,9 @@ use std::ops::Range;
 
 use umbracast::geometry::{Aabb, DVec2, DVec3};
 
+use super::kind::Kind;
 use super::*;
+use crate::crowd::Trajectory;
 
 const STEP_NS: i64 = 10_000_000;
 const FOREARMS: [usize; 2] = [5, 6];

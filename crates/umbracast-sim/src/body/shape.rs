@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use umbracast::geometry::DVec3;
 
-use super::build::Build;
+use super::build::{ANKLE_SHARE, BALL_SHARE, Build};
 use super::loft::{self, Along, Ring, rounded, smooth};
 use super::skeleton::Bone;
 
@@ -322,8 +322,3 @@ fn foot(b: &Build, side: f64) -> Vec<Ring> {
     })
     .to_vec()
 }
-
-/// The ball of the foot, where toes bend, as a share of the sole's length from the heel.
-pub const BALL_SHARE: f64 = 0.75;
-/// The ankle joint, from the heel.
-pub const ANKLE_SHARE: f64 = 0.25;

@@ -2,7 +2,7 @@
 
 use umbracast::geometry::{DMat3, DVec2, DVec3};
 
-use super::build::Build;
+use super::build::{ANKLE_SHARE, BALL_SHARE, Build};
 use super::gait::UpperBody;
 
 /// What carries the surface.
@@ -249,5 +249,5 @@ fn turned(upper: DVec3, lower: DVec3, hinge: DVec3) -> DMat3 {
 
 /// Where toes bend: the ball of the foot, on the floor.
 fn ball_rest(build: &Build, y_m: f64) -> DVec3 {
-    DVec3::new((super::shape::BALL_SHARE - super::shape::ANKLE_SHARE) * build.sole_m(), y_m, 0.0)
+    DVec3::new((BALL_SHARE - ANKLE_SHARE) * build.sole_m(), y_m, 0.0)
 }

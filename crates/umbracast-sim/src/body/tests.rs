@@ -1,9 +1,11 @@
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::OnceLock;
 
 use umbracast::geometry::{Aabb, DVec2, DVec3};
 
 use super::*;
+use crate::crowd::Trajectory;
 
 const STEP_NS: i64 = 10_000_000;
 

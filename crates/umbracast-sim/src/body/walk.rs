@@ -13,7 +13,7 @@ use umbracast::geometry::DVec2;
 use super::build::Build;
 use super::feet::{self, Footprint};
 use super::gait::{self, STRIDE};
-use super::skeleton::PelvisPose;
+use super::skeleton::{FootPose, PelvisPose};
 use crate::crowd::Trajectory;
 
 const STEP_NS: i64 = 10_000_000;
@@ -192,7 +192,7 @@ impl Walk {
                 let here = self.instants[i];
                 let upper = upper_body(&here, build);
                 let pelvis = PelvisPose::new(positions[i], here.heading_rad, &upper, 0.0);
-                let feet = feet::poses(self, &here, build);
+                let feet = foot_poses(self, &here, build);
                 let limit = |side: f64, ankle: umbracast::geometry::DVec3| {
                     let hip = pelvis.hip_m(build, side);
                     let across2 = hip.truncate().distance_squared(ankle.truncate());
@@ -222,8 +222,24 @@ pub fn upper_body(instant: &Instant, build: &Build) -> gait::UpperBody {
     gait::upper_body(instant.phase.rem_euclid(1.0), relative_speed)
 }
 
+/// Both feet at an instant, left and right.
+pub fn foot_poses(walk: &Walk, instant: &Instant, build: &Build) -> [FootPose; 2] {
+    [true, false].map(|left| {
+        let [current, next] = walk.prints_of(left, instant.phase);
+        let stood = instant.phase - current.contact;
+        let amount = roll(instant, build);
+        if stood <= current.stance_share {
+            feet::standing_on(&current, stood / current.stance_share, amount, build)
+        } else {
+            let air = (next.contact - current.contact - current.stance_share).max(1e-6);
+            let progress = ((stood - current.stance_share) / air).min(1.0);
+            feet::swinging(&current, &next, progress, amount, build)
+        }
+    })
+}
+
 /// How much of the foot's roll is there: all of it in strides of 1.4 m, none while standing.
-pub fn roll(instant: &Instant, build: &Build) -> f64 {
+fn roll(instant: &Instant, build: &Build) -> f64 {
     let stride_m = STRIDE * (instant.speed_mps * build.stature_m).sqrt();
     (stride_m / 1.4).min(1.0) * (instant.speed_mps / STANDING_MPS).min(1.0)
 }

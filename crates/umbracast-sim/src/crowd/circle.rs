@@ -1,32 +1,19 @@
 //! The paper's scene: people start on a circle and walk to the opposite point, driven by ORCA.
 
 use glam::Vec2;
-use rand::{Rng, RngExt};
 use umbracast::geometry::DVec2;
 
+use super::crossing::{ARRIVED_M, MOST_ATTEMPTS, MOST_STEPS, SAMPLE_STEPS, STEP_S, parameters, scatter};
+use super::mixed;
 use super::orca::{Agent, Orca, Parameters};
-use super::{Crowd, Preset, Trajectory, mixed};
+use super::preset::Preset;
+use super::trajectory::{Crowd, STEP_NS, Trajectory};
 use crate::random::stream;
 
-/// One simulated step: 10 ms.
-pub(super) const STEP_NS: i64 = 10_000_000;
-/// One step as ORCA takes it.
-pub(super) const STEP_S: f32 = 0.01;
-/// A person has arrived when nearer to the goal.
-pub(super) const ARRIVED_M: f32 = 1.0;
-/// A scene in which somebody walks longer is dropped.
-pub(super) const MOST_STEPS: usize = 6000;
-/// Steps from one 10 Hz sample to the next.
-pub(super) const SAMPLE_STEPS: usize = 10;
-/// After so many dropped scenes the last one stands, whatever its faults.
-pub(super) const MOST_ATTEMPTS: u64 = 100;
 /// Preferred speed of everybody.
 const PREFERRED_MPS: f32 = 1.0;
 /// Between the body axes of a pair: people who walk hand in hand or talk.
 const PAIR_GAP_M: f64 = 0.5;
-/// Start points lie on the circle within this, on each axis.
-const START_NOISE_M: f32 = 0.5;
-
 /// A scene of people who cross a circle. A scene in which not all arrive or somebody turns back at once is
 /// dropped and drawn anew.
 ///
@@ -48,54 +35,6 @@ pub fn circle_crossing(preset: Preset, people: usize, radius_m: f64, seed: u64) 
         attempt += 1;
         if acceptable(&crowd) || attempt == MOST_ATTEMPTS {
             return crowd;
-        }
-    }
-}
-
-/// What the generator's two parameter sets have in common: 10 neighbours, 5 s for obstacles, no limit of
-/// acceleration.
-pub(super) fn parameters(
-    neighbor_distance_m: f32,
-    horizon_s: f32,
-    radius_m: f32,
-    max_speed_mps: f32,
-) -> Parameters {
-    Parameters {
-        neighbor_distance_m,
-        max_neighbors: 10,
-        horizon_s,
-        obstacle_horizon_s: 5.0,
-        radius_m,
-        max_speed_mps,
-        max_acceleration_mps2: f32::INFINITY,
-    }
-}
-
-/// Adds points on a noisy circle until there are `count`; `spacing_m(i, j)` is the least distance of two.
-pub(super) fn scatter(
-    points: &mut Vec<Vec2>,
-    count: usize,
-    radius_m: f32,
-    spacing_m: impl Fn(usize, usize) -> f32,
-    rng: &mut impl Rng,
-) {
-    let (mut shrink, mut refused) = (1.0, 0);
-    while points.len() < count {
-        let angle = rng.random_range(0.0..std::f32::consts::TAU);
-        let noise = Vec2::new(
-            rng.random_range(-START_NOISE_M..START_NOISE_M),
-            rng.random_range(-START_NOISE_M..START_NOISE_M),
-        );
-        let point = Vec2::from_angle(angle) * radius_m + noise;
-        let this = points.len();
-        if points.iter().enumerate().all(|(i, other)| other.distance(point) >= shrink * spacing_m(i, this)) {
-            points.push(point);
-            continue;
-        }
-        refused += 1;
-        // No place left.
-        if refused % 1000 == 0 {
-            shrink *= 0.9;
         }
     }
 }

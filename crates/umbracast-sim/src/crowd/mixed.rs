@@ -9,11 +9,9 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, Normal};
 use umbracast::geometry::DVec2;
 
-use super::circle::{
-    ARRIVED_M, MOST_ATTEMPTS, MOST_STEPS, SAMPLE_STEPS, STEP_NS, STEP_S, parameters, scatter,
-};
+use super::crossing::{ARRIVED_M, MOST_ATTEMPTS, MOST_STEPS, SAMPLE_STEPS, STEP_S, parameters, scatter};
 use super::orca::{Agent, Orca, Parameters};
-use super::{Crowd, Trajectory};
+use super::trajectory::{Crowd, STEP_NS, Trajectory};
 use crate::random::stream;
 
 /// Preferred walking speeds of adults: mean, standard deviation, and the limits outside which none is drawn

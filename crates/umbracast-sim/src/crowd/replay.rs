@@ -3,8 +3,7 @@
 use umbracast::Error;
 use umbracast::geometry::DVec2;
 
-use super::circle::STEP_NS;
-use super::{Crowd, Trajectory};
+use super::trajectory::{Crowd, STEP_NS, Trajectory};
 
 /// The kernel is cut off here, in standard deviations.
 const REACH: f64 = 4.0;

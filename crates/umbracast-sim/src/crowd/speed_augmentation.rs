@@ -6,8 +6,7 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use super::circle::STEP_NS;
-use super::{Crowd, Trajectory};
+use super::trajectory::{Crowd, STEP_NS, Trajectory};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use umbracast::geometry::DVec2;

@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::Agent;
+use super::agent::Agent;
 
 /// Agents in a cell, if they stood evenly.
 const AGENTS_PER_CELL: f32 = 3.0;

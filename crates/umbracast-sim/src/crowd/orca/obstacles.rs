@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::Agent;
+use super::agent::Agent;
 use super::velocity::{HalfPlane, tangents};
 
 /// Lines that clear an edge by less still count as covering it.

@@ -1,0 +1,156 @@
+//! A body on its way: its state and its mesh at any time.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use rand::RngExt;
+use umbracast::geometry::{DVec2, DVec3};
+
+use super::build::Build;
+use super::kind::Kind;
+use super::recorded::Gait;
+use super::shape::{Shape, Surface};
+use super::skeleton::{Holds, PelvisPose, Pose};
+use super::walk::{self, Instant, Walk};
+use super::{feet, gait, things};
+use crate::crowd::Trajectory;
+use crate::random::stream;
+
+/// Where a person is and how he stands, at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PersonState {
+    /// Ground point of the body axis.
+    pub position_m: DVec2,
+    /// Its velocity.
+    pub velocity_mps: DVec2,
+    /// The trunk's, held while standing.
+    pub heading_rad: f64,
+    /// Standing height with shoes; of who sits, the height of the head's top.
+    pub height_m: f64,
+}
+
+/// A body drawn at random, walking along a trajectory: pose and mesh at any time.
+#[derive(Debug, Clone)]
+pub struct Walker {
+    /// Whose.
+    pub trajectory: Trajectory,
+    /// Its measures.
+    pub build: Build,
+    shape: Shape,
+    pub(super) walk: Walk,
+    holds: Holds,
+    /// Height of the hip joints of who sits.
+    seat_m: Option<f64>,
+    /// In place of the published gait.
+    gait: Option<Arc<Gait>>,
+    /// Standing (or sitting) upright at the origin, looking along x.
+    upright: Pose,
+}
+
+impl Walker {
+    /// Draws a body (sex, height, build, proportions) from `seed` and lets it walk along the trajectory.
+    pub fn new(trajectory: Trajectory, seed: u64) -> Self {
+        Self::of_kind(trajectory, seed, Kind::Plain)
+    }
+
+    /// The same for a kind of body. Children have heights of their own.
+    pub fn of_kind(trajectory: Trajectory, seed: u64, kind: Kind) -> Self {
+        let build = match kind {
+            Kind::Child => Build::draw_child(seed),
+            _ => Build::draw(seed, trajectory.height_m),
+        };
+        let things = things::of(kind, &build, seed);
+        let first_phase: f64 = stream(seed, "phase", 0).random();
+        let walk = Walk::plan(&trajectory, &build, first_phase);
+        let still = gait::upper_body(0.0, 0.0);
+        let (hips_m, feet) = match things.seat_m {
+            Some(seat_m) => (seat_m, things::feet_on_rests(&build, DVec2::ZERO, 0.0)),
+            None => (build.hip_height_m() - 0.006, feet::at_rest(&build)),
+        };
+        let pelvis = PelvisPose::new(DVec2::ZERO, 0.0, &still, hips_m);
+        let upright = Pose::new(&build, 0.0, &still, &pelvis, &feet, &things.holds);
+        let shape = Shape::new(&build, things.parts);
+        Self {
+            shape,
+            trajectory,
+            build,
+            walk,
+            holds: things.holds,
+            seat_m: things.seat_m,
+            gait: None,
+            upright,
+        }
+    }
+
+    /// The same body, moving as somebody who was recorded.
+    #[must_use]
+    pub fn with_gait(mut self, gait: Arc<Gait>) -> Self {
+        self.walk.keep_pace(gait.stride_m(&self.build));
+        self.gait = Some(gait);
+        self
+    }
+
+    /// The person's state, or `None` while not in the scene.
+    pub fn state_at(&self, time_ns: i64) -> Option<PersonState> {
+        let (position_m, velocity_mps) = self.trajectory.at(time_ns)?;
+        let heading_rad = (self.walk.at(time_ns).heading_rad + PI).rem_euclid(TAU) - PI;
+        Some(PersonState { position_m, velocity_mps, heading_rad, height_m: self.height_m() })
+    }
+
+    fn height_m(&self) -> f64 {
+        self.build.height_m() - self.seat_m.map_or(0.0, |seat_m| self.build.hip_height_m() - seat_m)
+    }
+
+    /// Writes the vertices of the walking body in the site frame; false (and nothing written) while the person
+    /// is not in the scene.
+    pub fn mesh_at(&self, time_ns: i64, vertices: &mut Vec<DVec3>) -> bool {
+        vertices.clear();
+        let Some((pose, _)) = self.pose_at(time_ns) else { return false };
+        self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+        true
+    }
+
+    /// The same body standing upright, arms hanging, at any place: what the ladder of oracles casts.
+    pub fn upright_mesh(&self, position_m: DVec2, heading_rad: f64, vertices: &mut Vec<DVec3>) {
+        let pose = self.upright.moved(DVec2::ZERO, heading_rad, position_m);
+        self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+    }
+
+    /// The walking mesh of `time_ns` moved so that its axis stands at `position_m` with `heading_rad`. Nothing
+    /// is written while the person is not in the scene.
+    pub fn mesh_moved(&self, time_ns: i64, position_m: DVec2, heading_rad: f64, vertices: &mut Vec<DVec3>) {
+        vertices.clear();
+        let Some((pose, state)) = self.pose_at(time_ns) else { return };
+        let pose = pose.moved(state.position_m, heading_rad - state.heading_rad, position_m);
+        self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+    }
+
+    /// How the vertices of every mesh that this walker makes hang together.
+    pub fn surface(&self) -> &Surface {
+        self.shape.surface()
+    }
+
+    fn pose_at(&self, time_ns: i64) -> Option<(Pose, PersonState)> {
+        let state = self.state_at(time_ns)?;
+        let instant = self.walk.at(time_ns);
+        if let Some(seat_m) = self.seat_m {
+            return Some((self.seated(seat_m, &instant, &state), state));
+        }
+        if let Some(gait) = &self.gait {
+            let Instant { heading_rad, speed_mps, phase, .. } = instant;
+            return Some((gait.pose(&self.build, state.position_m, heading_rad, phase, speed_mps), state));
+        }
+        let upper = walk::upper_body(&instant, &self.build);
+        let pelvis = PelvisPose::new(state.position_m, instant.heading_rad, &upper, instant.hip_height_m);
+        let feet = walk::foot_poses(&self.walk, &instant, &self.build);
+        Some((Pose::new(&self.build, instant.heading_rad, &upper, &pelvis, &feet, &self.holds), state))
+    }
+
+    /// Who sits rolls along, still.
+    fn seated(&self, seat_m: f64, instant: &Instant, state: &PersonState) -> Pose {
+        let (heading_rad, still) = (instant.heading_rad, gait::upper_body(0.0, 0.0));
+        let pelvis = PelvisPose::new(state.position_m, heading_rad, &still, seat_m);
+        let feet = things::feet_on_rests(&self.build, state.position_m, heading_rad);
+        Pose::new(&self.build, heading_rad, &still, &pelvis, &feet, &self.holds)
+    }
+}
