@@ -203,7 +203,7 @@ fn what_changes_nothing_and_who_walks_through_walls_is_told() {
     ]);
     assert!(said.contains("note: --fps has no effect on") && said.contains("column t_s"), "{said}");
     assert!(said.contains("note: --people has no effect with --trajectories"), "{said}");
-    assert!(said.contains("of 3 people 1 leave the hall"), "{said}");
+    assert!(said.contains("of 3 people 2 leave the hall"), "{said}");
 }
 
 #[test]
