@@ -85,7 +85,7 @@ impl Stages {
     /// # Errors
     /// A setting that cannot work.
     pub fn new(config: &Config, empty: &[Frame]) -> Result<Self, Error> {
-        let mut background = Background::new(&config.detect, &config.site)?;
+        let mut background = Background::new(&config.detect, &config.site);
         empty.iter().for_each(|frame| background.learn_empty(frame));
         Ok(Self {
             background,
