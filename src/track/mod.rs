@@ -1,6 +1,6 @@
 //! Stage 1, second half: detections of frame after frame joined to tracks (paper, section IV-A).
 //!
-//! [`mixture`] is our tracker, [`paper`] that of the paper's authors; the method chooses.
+//! `mixture.rs` is our tracker, `paper.rs` that of the paper's authors; the method chooses.
 
 mod gaussian;
 #[doc(hidden)] // Assignments, for scores that match tracks with people.
