@@ -9,22 +9,15 @@ use crate::{Config, Error, Frame, Health};
 /// Everything the stages made of one frame.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, lidar::{Cloud, Scan, SensorPoint}};
-/// # let config = Config::default();
-/// # // One ray of a sensor that looks 35 degrees down: the floor, and somebody before it.
-/// # let frame = |k: u64, range_m: f32| {
-/// #     let point = SensorPoint { position_m: [range_m, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
-/// #     let site_from_sensor = config.site.sensors[0].site_from_sensor();
-/// #     let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(vec![point]) };
-/// #     Frame { index: k, time_ns: (k as i64 + 1) * umbracast::STEP_NS, scans: vec![scan] }
-/// # };
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let config = umbracast::Config::default();
 /// use umbracast::Pipeline;
 ///
 /// let mut pipeline = Pipeline::new(&config, None)?;
-/// pipeline.learn_empty(&frame(0, 15.5));
+/// pipeline.learn_empty(&ray(0, 15.5));
 /// // What a step gives is overwritten by the next one: a clone may be kept.
-/// let kept = pipeline.step(&frame(1, 14.0)).clone();
+/// let kept = pipeline.step(&ray(1, 14.0)).clone();
 /// assert_eq!((kept.frame, kept.foreground.len(), kept.tracks.len()), (1, 1, 0));
 /// # Ok::<(), umbracast::Error>(())
 /// ```
@@ -71,22 +64,15 @@ impl Outcome {
 /// serves many recordings.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, lidar::{Cloud, Scan, SensorPoint}};
-/// # let config = Config::default();
-/// # // One ray of a sensor that looks 35 degrees down: the floor, and somebody before it.
-/// # let frame = |k: u64, range_m: f32| {
-/// #     let point = SensorPoint { position_m: [range_m, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
-/// #     let site_from_sensor = config.site.sensors[0].site_from_sensor();
-/// #     let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(vec![point]) };
-/// #     Frame { index: k, time_ns: (k as i64 + 1) * umbracast::STEP_NS, scans: vec![scan] }
-/// # };
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let config = umbracast::Config::default();
 /// use umbracast::Pipeline;
 ///
 /// let mut pipeline = Pipeline::new(&config, None)?;
-/// pipeline.learn_empty(&frame(0, 15.5));
+/// pipeline.learn_empty(&ray(0, 15.5));
 /// for k in 1..4 {
-///     let outcome = pipeline.step(&frame(k, 14.0));
+///     let outcome = pipeline.step(&ray(k, 14.0));
 ///     assert_eq!(outcome.foreground.len(), 1);
 /// }
 /// # Ok::<(), umbracast::Error>(())
@@ -129,21 +115,14 @@ impl Pipeline {
     /// Learns the empty scene from a frame without people. Without any, the background is learned on the way.
     ///
     /// ```
-    /// # use umbracast::{Config, Frame, lidar::{Cloud, Scan, SensorPoint}};
-    /// # let config = Config::default();
-    /// # // One ray of a sensor that looks 35 degrees down: the floor, and somebody before it.
-    /// # let frame = |k: u64, range_m: f32| {
-    /// #     let point = SensorPoint { position_m: [range_m, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
-    /// #     let site_from_sensor = config.site.sensors[0].site_from_sensor();
-    /// #     let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(vec![point]) };
-    /// #     Frame { index: k, time_ns: (k as i64 + 1) * umbracast::STEP_NS, scans: vec![scan] }
-    /// # };
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
     /// use umbracast::Pipeline;
     ///
     /// let mut pipeline = Pipeline::new(&config, None)?;
-    /// pipeline.learn_empty(&frame(0, 15.5));
-    /// assert!(pipeline.step(&frame(1, 15.5)).foreground.is_empty());
+    /// pipeline.learn_empty(&ray(0, 15.5));
+    /// assert!(pipeline.step(&ray(1, 15.5)).foreground.is_empty());
     /// # Ok::<(), umbracast::Error>(())
     /// ```
     pub fn learn_empty(&mut self, frame: &Frame) {
@@ -153,22 +132,15 @@ impl Pipeline {
     /// One frame through all stages.
     ///
     /// ```
-    /// # use umbracast::{Config, Frame, lidar::{Cloud, Scan, SensorPoint}};
-    /// # let config = Config::default();
-    /// # // One ray of a sensor that looks 35 degrees down: the floor, and somebody before it.
-    /// # let frame = |k: u64, range_m: f32| {
-    /// #     let point = SensorPoint { position_m: [range_m, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
-    /// #     let site_from_sensor = config.site.sensors[0].site_from_sensor();
-    /// #     let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(vec![point]) };
-    /// #     Frame { index: k, time_ns: (k as i64 + 1) * umbracast::STEP_NS, scans: vec![scan] }
-    /// # };
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
     /// use umbracast::Pipeline;
     ///
     /// let mut pipeline = Pipeline::new(&config, None)?;
-    /// assert_eq!(pipeline.step(&frame(5, 15.5)).frame, 5);
+    /// assert_eq!(pipeline.step(&ray(5, 15.5)).frame, 5);
     /// // A frame that is not later than the last one is counted and gives nothing.
-    /// assert_eq!(pipeline.step(&frame(4, 15.5)).health.frames_out_of_order, 1);
+    /// assert_eq!(pipeline.step(&ray(4, 15.5)).health.frames_out_of_order, 1);
     /// # Ok::<(), umbracast::Error>(())
     /// ```
     pub fn step(&mut self, frame: &Frame) -> &Outcome {

@@ -15,25 +15,11 @@ use crate::{STEPS, Site};
 /// Stage 3 with what it needs to know.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-/// # let detection = |x_m: f64, time_ns: i64| {
-/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-/// #     Detection {
-/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-/// #     }
-/// # };
-/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-/// # let config = Config::default();
-/// # let (mut tracker, mut tracks, mut forecasts) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new(), Vec::new());
-/// # for k in 0..20 {
-/// #     let time_ns = frame(k).time_ns;
-/// #     tracker.update(&frame(k), &[detection(0.0, time_ns), detection(4.0, time_ns)], &mut tracks);
-/// # }
-/// # umbracast::forecast::Forecaster::new(&config.forecast, None)?.forecast(&tracks, &mut forecasts);
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let config = umbracast::Config::default();
+/// # let tracks = two_people();
+/// # let forecasts = forecasts_of(&tracks);
 /// use umbracast::blockage::Caster;
 ///
 /// // Two people stand in line with the access point `side`, at 10 and 14 m: the farther one is hidden.
@@ -42,7 +28,6 @@ use crate::{STEPS, Site};
 /// let of_side = |track: u64| blockages.iter().find(|link| link.access_point == 0 && link.track == track);
 /// assert!(of_side(0).is_some_and(|link| link.blocked_now));
 /// assert!(of_side(1).is_some_and(|link| !link.blocked_now));
-/// # Ok::<(), umbracast::Error>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Caster {
@@ -88,31 +73,16 @@ impl Caster {
     /// `tracks[i]`.
     ///
     /// ```
-    /// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-    /// # let detection = |x_m: f64, time_ns: i64| {
-    /// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-    /// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-    /// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-    /// #     Detection {
-    /// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-    /// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-    /// #     }
-    /// # };
-    /// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-    /// # let config = Config::default();
-    /// # let (mut tracker, mut tracks, mut forecasts) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new(), Vec::new());
-    /// # for k in 0..20 {
-    /// #     let time_ns = frame(k).time_ns;
-    /// #     tracker.update(&frame(k), &[detection(0.0, time_ns), detection(4.0, time_ns)], &mut tracks);
-    /// # }
-    /// # umbracast::forecast::Forecaster::new(&config.forecast, None)?.forecast(&tracks, &mut forecasts);
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
+    /// # let tracks = two_people();
+    /// # let forecasts = forecasts_of(&tracks);
     /// use umbracast::blockage::Caster;
     ///
     /// let mut blockages = Vec::new();
     /// Caster::new(&config.blockage, &config.site).cast(&tracks, &forecasts, &mut blockages);
     /// assert_eq!(blockages.len(), config.site.access_points.len() * tracks.len());
-    /// # Ok::<(), umbracast::Error>(())
     /// ```
     pub fn cast(&mut self, tracks: &[Track], forecasts: &[Forecast], blockages: &mut Vec<Blockage>) {
         blockages.clear();

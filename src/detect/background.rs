@@ -34,22 +34,15 @@ const MAP_REVOLUTIONS: u32 = 20;
 /// What the empty scene looks like to each sensor.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, lidar::{Cloud, Scan, SensorPoint}};
-/// # let config = Config::default();
-/// # // One ray of a sensor that looks 35 degrees down: the floor, and somebody before it.
-/// # let frame = |k: u64, range_m: f32| {
-/// #     let point = SensorPoint { position_m: [range_m, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
-/// #     let site_from_sensor = config.site.sensors[0].site_from_sensor();
-/// #     let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(vec![point]) };
-/// #     Frame { index: k, time_ns: (k as i64 + 1) * umbracast::STEP_NS, scans: vec![scan] }
-/// # };
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let config = umbracast::Config::default();
 /// use umbracast::{Health, detect::Background};
 ///
 /// let mut background = Background::new(&config.detect, &config.site);
-/// background.learn_empty(&frame(0, 15.5));
+/// background.learn_empty(&ray(0, 15.5));
 /// let mut points = Vec::new();
-/// background.foreground(&frame(1, 14.0), &[], &mut Health::default(), &mut points);
+/// background.foreground(&ray(1, 14.0), &[], &mut Health::default(), &mut points);
 /// assert_eq!(points.len(), 1);
 /// assert!((points[0].position_m.z - 0.97).abs() < 0.01);
 /// ```
@@ -136,22 +129,15 @@ impl Background {
     /// Learns from a frame without people (the paper's global map).
     ///
     /// ```
-    /// # use umbracast::{Config, Frame, lidar::{Cloud, Scan, SensorPoint}};
-    /// # let config = Config::default();
-    /// # // One ray of a sensor that looks 35 degrees down: the floor, and somebody before it.
-    /// # let frame = |k: u64, range_m: f32| {
-    /// #     let point = SensorPoint { position_m: [range_m, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
-    /// #     let site_from_sensor = config.site.sensors[0].site_from_sensor();
-    /// #     let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(vec![point]) };
-    /// #     Frame { index: k, time_ns: (k as i64 + 1) * umbracast::STEP_NS, scans: vec![scan] }
-    /// # };
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
     /// use umbracast::{Health, detect::Background};
     ///
     /// let mut background = Background::new(&config.detect, &config.site);
-    /// background.learn_empty(&frame(0, 15.5));
+    /// background.learn_empty(&ray(0, 15.5));
     /// let mut points = Vec::new();
-    /// background.foreground(&frame(1, 15.5), &[], &mut Health::default(), &mut points);
+    /// background.foreground(&ray(1, 15.5), &[], &mut Health::default(), &mut points);
     /// assert!(points.is_empty(), "nothing is new");
     /// ```
     pub fn learn_empty(&mut self, frame: &Frame) {
@@ -176,21 +162,14 @@ impl Background {
     /// on the way, but not where a person is expected.
     ///
     /// ```
-    /// # use umbracast::{Config, Frame, lidar::{Cloud, Scan, SensorPoint}};
-    /// # let config = Config::default();
-    /// # // One ray of a sensor that looks 35 degrees down: the floor, and somebody before it.
-    /// # let frame = |k: u64, range_m: f32| {
-    /// #     let point = SensorPoint { position_m: [range_m, 0.0, 0.0], time_ns: 0, reflectivity: 10.0 };
-    /// #     let site_from_sensor = config.site.sensors[0].site_from_sensor();
-    /// #     let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(vec![point]) };
-    /// #     Frame { index: k, time_ns: (k as i64 + 1) * umbracast::STEP_NS, scans: vec![scan] }
-    /// # };
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
     /// use umbracast::{Health, detect::Background};
     ///
     /// // Nothing was learned before: of the first revolution nothing is new.
     /// let (mut background, mut points) = (Background::new(&config.detect, &config.site), Vec::new());
-    /// background.foreground(&frame(0, 15.5), &[], &mut Health::default(), &mut points);
+    /// background.foreground(&ray(0, 15.5), &[], &mut Health::default(), &mut points);
     /// assert!(points.is_empty());
     /// ```
     pub fn foreground(

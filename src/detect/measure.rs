@@ -55,14 +55,10 @@ pub enum ObbAxes {
 /// Turns clusters into detections.
 ///
 /// ```
-/// # use umbracast::{Config, geometry::{DVec2, DVec3}, detect::Point};
-/// # // Somebody at the origin, 1.7 m tall.
-/// # let point = |i: u32| {
-/// #     let around = DVec2::from_angle(2.4 * f64::from(i)) * DVec2::new(0.13, 0.25);
-/// #     Point { position_m: around.extend(0.1 + 0.04 * f64::from(i)), time_ns: 0, sensor: 0 }
-/// # };
-/// # let points: Vec<Point> = (0..40).map(point).collect();
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # use umbracast::Config;
+/// # let points = somebody();
 /// use umbracast::detect::Measurer;
 ///
 /// let config = Config::default();
@@ -104,14 +100,10 @@ impl Measurer {
     /// One detection a cluster that has a person's size, or lies where a person is expected.
     ///
     /// ```
-    /// # use umbracast::{Config, geometry::{DVec2, DVec3}, detect::Point};
-    /// # // Somebody at the origin, 1.7 m tall.
-    /// # let point = |i: u32| {
-    /// #     let around = DVec2::from_angle(2.4 * f64::from(i)) * DVec2::new(0.13, 0.25);
-    /// #     Point { position_m: around.extend(0.1 + 0.04 * f64::from(i)), time_ns: 0, sensor: 0 }
-    /// # };
-    /// # let points: Vec<Point> = (0..40).map(point).collect();
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # use umbracast::Config;
+    /// # let points = somebody();
     /// use umbracast::detect::Measurer;
     ///
     /// // The lowest ten points are nobody: 0.4 m is no person's height.

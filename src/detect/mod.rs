@@ -74,17 +74,8 @@ pub type Cluster = Vec<u32>;
 /// One person in one frame (the paper's D, without identity).
 ///
 /// ```
-/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-/// # let detection = |x_m: f64, time_ns: i64| {
-/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-/// #     Detection {
-/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-/// #     }
-/// # };
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
 /// let found = detection(3.0, 0);
 /// assert_eq!((found.position_m.x, found.aabb.size_m().z), (3.0, 1.7));
 /// ```

@@ -33,14 +33,10 @@ const ADAPTED: Radius = Radius { radius_m: 0.2, per_range: 0.0, shift_m: 0.0, po
 /// Groups foreground points into people.
 ///
 /// ```
-/// # use umbracast::{Config, geometry::{DVec2, DVec3}, detect::Point};
-/// # // Somebody at the origin, 1.7 m tall.
-/// # let point = |i: u32| {
-/// #     let around = DVec2::from_angle(2.4 * f64::from(i)) * DVec2::new(0.13, 0.25);
-/// #     Point { position_m: around.extend(0.1 + 0.04 * f64::from(i)), time_ns: 0, sensor: 0 }
-/// # };
-/// # let points: Vec<Point> = (0..40).map(point).collect();
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # use umbracast::Config;
+/// # let points = somebody();
 /// use umbracast::detect::Clusterer;
 ///
 /// let config = Config::default();
@@ -95,14 +91,10 @@ impl Clusterer {
     /// One cluster a person, in an order that does not depend on the order of the points.
     ///
     /// ```
-    /// # use umbracast::{Config, geometry::{DVec2, DVec3}, detect::Point};
-    /// # // Somebody at the origin, 1.7 m tall.
-    /// # let point = |i: u32| {
-    /// #     let around = DVec2::from_angle(2.4 * f64::from(i)) * DVec2::new(0.13, 0.25);
-    /// #     Point { position_m: around.extend(0.1 + 0.04 * f64::from(i)), time_ns: 0, sensor: 0 }
-    /// # };
-    /// # let points: Vec<Point> = (0..40).map(point).collect();
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # use umbracast::{Config, detect::Point, geometry::DVec3};
+    /// # let points = somebody();
     /// use umbracast::detect::Clusterer;
     ///
     /// let config = Config::default();

@@ -16,24 +16,10 @@ use crate::{Error, STEP_NS};
 /// Foresees.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-/// # let detection = |x_m: f64, time_ns: i64| {
-/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-/// #     Detection {
-/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-/// #     }
-/// # };
-/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-/// # let config = Config::default();
-/// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
-/// # for k in 0..20 {
-/// #     let frame = frame(k);
-/// #     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
-/// # }
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let config = umbracast::Config::default();
+/// # let tracks = walker();
 /// use umbracast::forecast::Forecaster;
 ///
 /// let (mut forecaster, mut forecasts) = (Forecaster::new(&config.forecast, None)?, Vec::new());
@@ -91,24 +77,10 @@ impl Forecaster {
     /// One forecast for each track, in the order of the tracks.
     ///
     /// ```
-    /// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-    /// # let detection = |x_m: f64, time_ns: i64| {
-    /// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-    /// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-    /// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-    /// #     Detection {
-    /// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-    /// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-    /// #     }
-    /// # };
-    /// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-    /// # let config = Config::default();
-    /// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
-    /// # for k in 0..20 {
-    /// #     let frame = frame(k);
-    /// #     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
-    /// # }
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
+    /// # let tracks = walker();
     /// use umbracast::forecast::Forecaster;
     ///
     /// let mut forecasts = Vec::new();

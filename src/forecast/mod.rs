@@ -24,30 +24,13 @@ use crate::STEPS;
 /// The next second of one track.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-/// # let detection = |x_m: f64, time_ns: i64| {
-/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-/// #     Detection {
-/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-/// #     }
-/// # };
-/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-/// # let config = Config::default();
-/// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
-/// # for k in 0..20 {
-/// #     let frame = frame(k);
-/// #     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
-/// # }
-///
-/// # let mut forecasts = Vec::new();
-/// # umbracast::forecast::Forecaster::new(&config.forecast, None)?.forecast(&tracks, &mut forecasts);
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let tracks = walker();
+/// # let forecasts = forecasts_of(&tracks);
 /// // How much farther somebody is in 900 ms who walks 1.2 m/s.
 /// let way_m = forecasts[0].steps[8].mean_m - tracks[0].position_m;
 /// assert!((0.8..1.3).contains(&way_m.x), "{way_m}");
-/// # Ok::<(), umbracast::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forecast {
@@ -65,32 +48,15 @@ pub struct Forecast {
 /// only; with it this is the filter's.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-/// # let detection = |x_m: f64, time_ns: i64| {
-/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-/// #     Detection {
-/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-/// #     }
-/// # };
-/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-/// # let config = Config::default();
-/// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
-/// # for k in 0..20 {
-/// #     let frame = frame(k);
-/// #     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
-/// # }
-///
-/// # let mut forecasts = Vec::new();
-/// # umbracast::forecast::Forecaster::new(&config.forecast, None)?.forecast(&tracks, &mut forecasts);
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let tracks = walker();
+/// # let forecasts = forecasts_of(&tracks);
 /// // Step h is the marginal at its time: P_pp + 2 t P_pv + t^2 P_vv + q t^3 / 3.
 /// let (joint, t_s) = (&forecasts[0].coupling, 0.3);
 /// let [p, v, both] = [joint.state[0][0], joint.state[2][2], joint.state[0][2]];
 /// let xx_m2 = p + 2.0 * t_s * both + t_s * t_s * v + joint.acceleration_psd_m2ps3[0][0] * t_s.powi(3) / 3.0;
 /// assert!((forecasts[0].steps[2].xx_m2 - xx_m2).abs() < 1e-9);
-/// # Ok::<(), umbracast::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coupling {

@@ -23,15 +23,9 @@ use crate::{Error, Health, STEP_NS, Site};
 /// Memory: two frames beyond those that wait for [`pop`](Self::pop); call it after every push.
 ///
 /// ```
-/// # // Packets of an HDL-32E whose every return lies 8 m away, from 0.0 to 0.2 s.
-/// # let packets = (0..360).map(|k| {
-/// #     let columns: Vec<_> = (12 * k..12 * k + 12).map(|i| umbracast::lidar::Column {
-/// #         time_ns: i * 46_080, azimuth_cdeg: (i * 1659 % 3_600_000) as f32 / 100.0, azimuth_rate_cdeg_per_ns: 3.6e-4,
-/// #     }).collect();
-/// #     let model = umbracast::lidar::Model::hdl_32e();
-/// #     umbracast::lidar::packet::encode(&model, &columns, &[8.0; 12 * 32], &[10; 12 * 32], columns[11].time_ns)
-/// # });
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let packets = packets(360);
 /// use umbracast::{Config, Health, lidar::Assembler};
 ///
 /// let mut site = Config::default().site;
@@ -134,12 +128,9 @@ impl Assembler {
     /// Takes one packet of `site.sensors[sensor]`.
     ///
     /// ```
-    /// # // A packet of an HDL-32E whose every return lies 8 m away.
-    /// # let columns: Vec<_> = (0..12).map(|i| umbracast::lidar::Column {
-    /// #     time_ns: i * 46_080, azimuth_cdeg: 16.6 * i as f32, azimuth_rate_cdeg_per_ns: 3.6e-4,
-    /// # }).collect();
-    /// # let packet = umbracast::lidar::packet::encode(&umbracast::lidar::Model::hdl_32e(), &columns, &[8.0; 12 * 32], &[10; 12 * 32], 1_000);
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let packet = packets(1).remove(0);
     /// use umbracast::{Config, Health, lidar::Assembler};
     ///
     /// let (mut assembler, mut health) = (Assembler::new(&Config::default().site)?, Health::default());
@@ -204,12 +195,9 @@ impl Assembler {
     /// At the end of the input: closes what is open, without counting the sensors that these frames lack.
     ///
     /// ```
-    /// # // A packet of an HDL-32E whose every return lies 8 m away.
-    /// # let columns: Vec<_> = (0..12).map(|i| umbracast::lidar::Column {
-    /// #     time_ns: i * 46_080, azimuth_cdeg: 16.6 * i as f32, azimuth_rate_cdeg_per_ns: 3.6e-4,
-    /// # }).collect();
-    /// # let packet = umbracast::lidar::packet::encode(&umbracast::lidar::Model::hdl_32e(), &columns, &[8.0; 12 * 32], &[10; 12 * 32], 1_000);
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let packet = packets(1).remove(0);
     /// use umbracast::{Config, Health, lidar::Assembler};
     ///
     /// let mut assembler = Assembler::new(&Config::default().site)?;

@@ -59,12 +59,9 @@ pub fn columns_per_packet(model: &Model) -> usize {
 /// given.
 ///
 /// ```
-/// # // A packet of an HDL-32E whose every return lies 8 m away.
-/// # let columns: Vec<_> = (0..12).map(|i| umbracast::lidar::Column {
-/// #     time_ns: i * 46_080, azimuth_cdeg: 16.6 * i as f32, azimuth_rate_cdeg_per_ns: 3.6e-4,
-/// # }).collect();
-/// # let packet = umbracast::lidar::packet::encode(&umbracast::lidar::Model::hdl_32e(), &columns, &[8.0; 12 * 32], &[10; 12 * 32], 1_000);
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let packet = packets(1).remove(0);
 /// use umbracast::{Health, lidar::{Model, packet::decode}};
 ///
 /// let mut health = Health::default();

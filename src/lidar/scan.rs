@@ -67,11 +67,9 @@ pub enum Cloud {
 /// A revolution as a grid: columns in firing order, each with one range a beam.
 ///
 /// ```
-/// # let column = umbracast::lidar::Column { time_ns: 5, azimuth_cdeg: 9000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
-/// # let image = umbracast::lidar::RangeImage {
-/// #     beams: umbracast::lidar::Model::hdl_32e().beams, columns: vec![column], range_m: vec![8.0; 32], reflectivity: vec![10; 32],
-/// # };
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let image = image();
 /// // One column of an HDL-32E, every return 8 m away.
 /// let (c, b) = (0, 31);
 /// assert_eq!(image.range_m[c * image.beams.len() + b], 8.0);
@@ -148,11 +146,9 @@ impl RangeImage {
     /// manufacturer's decoder does.
     ///
     /// ```
-    /// # let column = umbracast::lidar::Column { time_ns: 5, azimuth_cdeg: 9000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
-    /// # let image = umbracast::lidar::RangeImage {
-    /// #     beams: umbracast::lidar::Model::hdl_32e().beams, columns: vec![column], range_m: vec![8.0; 32], reflectivity: vec![10; 32],
-    /// # };
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let image = image();
     /// // The last of 32 beams fires 35.7 us after the first: 0.13 degrees later.
     /// assert_eq!((image.azimuth_cdeg(0, 0), image.azimuth_cdeg(0, 31)), (9000, 9013));
     /// ```
@@ -168,11 +164,9 @@ impl RangeImage {
     /// The point of beam `b` in column `c` at `range_m`, in the sensor's frame.
     ///
     /// ```
-    /// # let column = umbracast::lidar::Column { time_ns: 5, azimuth_cdeg: 9000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
-    /// # let image = umbracast::lidar::RangeImage {
-    /// #     beams: umbracast::lidar::Model::hdl_32e().beams, columns: vec![column], range_m: vec![8.0; 32], reflectivity: vec![10; 32],
-    /// # };
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let image = image();
     /// // Azimuth 90 degrees is to the right: y points to the left.
     /// assert!((image.point_m(0, 15, 8.0).y + 8.0).abs() < 0.01);
     /// ```
@@ -189,11 +183,9 @@ impl RangeImage {
     /// When beam `b` of column `c` fired.
     ///
     /// ```
-    /// # let column = umbracast::lidar::Column { time_ns: 5, azimuth_cdeg: 9000.0, azimuth_rate_cdeg_per_ns: 3.6e-4 };
-    /// # let image = umbracast::lidar::RangeImage {
-    /// #     beams: umbracast::lidar::Model::hdl_32e().beams, columns: vec![column], range_m: vec![8.0; 32], reflectivity: vec![10; 32],
-    /// # };
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let image = image();
     /// assert_eq!(image.time_ns(0, 31), 5 + 31 * 1152);
     /// ```
     pub fn time_ns(&self, c: usize, b: usize) -> i64 {

@@ -20,19 +20,9 @@ pub const WIDTH_SCALE_SIGMA: f64 = width::PRIOR_SIGMA;
 /// One person followed over time, at the frame's instant.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-/// # let detection = |x_m: f64, time_ns: i64| {
-/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-/// #     Detection {
-/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-/// #     }
-/// # };
-/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-/// # let config = Config::default();
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let config = umbracast::Config::default();
 /// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
 /// # tracker.update(&frame(0), &[detection(1.0, frame(0).time_ns)], &mut tracks);
 /// for track in tracks.iter().filter(|track| !track.confirmed) {
@@ -81,19 +71,9 @@ pub struct Track {
 /// A track's state at a frame of the observation window, as the filter held it then.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-/// # let detection = |x_m: f64, time_ns: i64| {
-/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-/// #     Detection {
-/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-/// #     }
-/// # };
-/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-/// # let config = Config::default();
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let config = umbracast::Config::default();
 /// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
 /// # tracker.update(&frame(0), &[detection(1.0, frame(0).time_ns)], &mut tracks);
 /// let now = tracks[0].observed.back().expect("a track was seen at least once");

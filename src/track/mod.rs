@@ -35,19 +35,9 @@ use crate::{Frame, Site};
 /// Follows people by the method of the config.
 ///
 /// ```
-/// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-/// # let detection = |x_m: f64, time_ns: i64| {
-/// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-/// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-/// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-/// #     Detection {
-/// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-/// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-/// #     }
-/// # };
-/// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-/// # let config = Config::default();
-///
+/// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+/// # use people::*;
+/// # let config = umbracast::Config::default();
 /// use umbracast::track::Tracker;
 ///
 /// // Somebody walks along x, 0.12 m a frame.
@@ -88,19 +78,9 @@ impl Tracker {
     /// Last step's tracks predicted to `time_ns`; none by the paper's method, whose detection asks for none.
     ///
     /// ```
-    /// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-    /// # let detection = |x_m: f64, time_ns: i64| {
-    /// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-    /// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-    /// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-    /// #     Detection {
-    /// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-    /// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-    /// #     }
-    /// # };
-    /// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-    /// # let config = Config::default();
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
     /// use umbracast::track::Tracker;
     ///
     /// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
@@ -122,19 +102,9 @@ impl Tracker {
     /// that is not later than the last one changes nothing.
     ///
     /// ```
-    /// # use umbracast::{Config, Frame, geometry::{Aabb, DVec2, DVec3, Obb}, detect::Detection};
-    /// # let detection = |x_m: f64, time_ns: i64| {
-    /// #     let half_m = DVec3::new(0.2, 0.2, 0.85);
-    /// #     let middle_m = DVec3::new(x_m, 0.0, 0.85);
-    /// #     let aabb = Aabb { min_m: middle_m - half_m, max_m: middle_m + half_m };
-    /// #     Detection {
-    /// #         position_m: DVec2::new(x_m, 0.0), covariance_m2: Some([[4e-4, 0.0], [0.0, 4e-4]]), z_m: 0.9, time_ns, points: 40,
-    /// #         full_body: true, top_m: 1.7, limbs: None, aabb, obb: Obb::from_aabb(&aabb),
-    /// #     }
-    /// # };
-    /// # let frame = |k: i64| Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() };
-    /// # let config = Config::default();
-    ///
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
     /// use umbracast::track::Tracker;
     ///
     /// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
