@@ -2,7 +2,8 @@
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use umbracast::Config;
-use umbracast_bench::{Recording, Stages, pipeline};
+use umbracast_bench::simulated::crossing;
+use umbracast_bench::{Stages, pipeline};
 
 /// The last of these is measured.
 const FRAMES: usize = 21;
@@ -21,7 +22,7 @@ const STAGES: [Stage; 6] = [
 fn stages(criterion: &mut Criterion) {
     for people in [10, 40] {
         let config = Config::default();
-        let hall = Recording::new(&config.site, people, FRAMES).expect("the default site is simulated");
+        let hall = crossing(&config.site, people, 12.5, FRAMES).expect("the default site is simulated");
         let (before, frame) = (&hall.frames[..FRAMES - 1], &hall.frames[FRAMES - 1]);
         let mut stages = Stages::new(&config, &hall.empty).expect("the defaults work");
         before.iter().for_each(|frame| stages.step(frame));

@@ -3,48 +3,12 @@
 use umbracast::blockage::{Blockage, Caster};
 use umbracast::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point, Prior};
 use umbracast::forecast::{Forecast, Forecaster};
-use umbracast::lidar::{Assembler, Packet};
 use umbracast::track::{Track, Tracker};
-use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
-use umbracast_sim::crowd::{Preset, circle_crossing};
-use umbracast_sim::scene::Scene;
+use umbracast::{Config, Error, Frame, Health, Pipeline};
 
-const SEED: u64 = 100_000;
-const EMPTY_FRAMES: u64 = 20;
-
-/// The hall without people, and with people who cross a circle.
-pub struct Recording {
-    /// Without.
-    pub empty: Vec<Frame>,
-    /// With.
-    pub frames: Vec<Frame>,
-}
-
-impl Recording {
-    /// So many people and frames.
-    ///
-    /// # Errors
-    /// A sensor that cannot be simulated.
-    pub fn new(site: &Site, people: usize, frames: usize) -> Result<Self, Error> {
-        let mut scene = Scene::new(circle_crossing(Preset::Orca03, people, 12.5, SEED), site, SEED)?;
-        let packets = std::iter::from_fn(|| scene.next_frame()).take(frames).map(|frame| frame.packets);
-        let frames = assembled(site, packets)?;
-        Ok(Self { empty: assembled(site, Scene::empty(site, SEED, EMPTY_FRAMES)?)?, frames })
-    }
-}
-
-fn assembled(site: &Site, frames: impl IntoIterator<Item = Vec<Vec<Packet>>>) -> Result<Vec<Frame>, Error> {
-    let (mut assembler, mut health) = (Assembler::new(site)?, Health::default());
-    for of_sensors in frames {
-        let sensors = of_sensors.into_iter().enumerate();
-        let mut arriving: Vec<(usize, Packet)> =
-            sensors.flat_map(|(sensor, packets)| packets.into_iter().map(move |p| (sensor, p))).collect();
-        arriving.sort_by_key(|(_, packet)| packet.time_ns);
-        arriving.iter().for_each(|(sensor, packet)| assembler.push(*sensor, packet, &mut health));
-    }
-    assembler.finish();
-    Ok(std::iter::from_fn(|| assembler.pop()).collect())
-}
+/// The hall with people that the examples have too.
+#[path = "../../examples/simulated/mod.rs"]
+pub mod simulated;
 
 /// The stages of a pipeline one by one, with what each was given and gave: `Pipeline::step` laid open.
 #[derive(Clone)]

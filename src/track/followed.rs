@@ -2,17 +2,18 @@
 
 use std::collections::VecDeque;
 
+use super::gaussian::State;
 use super::width;
-use crate::gait::GaitPhase;
+use crate::gait::{GaitPhase, WALKS_FROM_MPS};
 use crate::geometry::{Aabb, DVec2, Obb};
 
 /// Positions of the observation window: 10 frames (paper, section V-B).
 pub const OBSERVED: usize = 10;
 /// Variance of a heading that may be any: even over a turn.
-pub(super) const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
+const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
 /// How fast who stands may turn away from the last heading: 40 degrees (one sigma) in a second. A guess: nothing
 /// that is measured here tells it.
-pub(super) const STANDING_TURN_RAD2PS: f64 = 0.5;
+const STANDING_TURN_RAD2PS: f64 = 0.5;
 
 /// One standard deviation of the width scale of adults of whom nothing is known.
 pub const WIDTH_SCALE_SIGMA: f64 = width::PRIOR_SIGMA;
@@ -87,6 +88,34 @@ pub struct Observed {
     pub position_m: DVec2,
     /// Velocity.
     pub velocity_mps: DVec2,
+}
+
+/// Where a trunk faces, counter-clockwise from +x.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Heading {
+    pub(super) mean_rad: f64,
+    variance_rad2: f64,
+}
+
+impl Heading {
+    /// Of who has never walked.
+    pub(super) const ANY: Self = Self { mean_rad: 0.0, variance_rad2: ANY_HEADING_RAD2 };
+
+    /// The heading follows the velocity of who walks; who stands may turn on the spot.
+    pub(super) fn follow(&mut self, state: &State, step_s: f64) {
+        let v = state.velocity_mps();
+        if v.length() > WALKS_FROM_MPS {
+            self.mean_rad = v.y.atan2(v.x);
+            self.variance_rad2 = state.heading_variance_rad2();
+        } else {
+            self.variance_rad2 += STANDING_TURN_RAD2PS * step_s;
+        }
+        self.variance_rad2 = self.variance_rad2.min(ANY_HEADING_RAD2);
+    }
+
+    pub(super) fn sigma_rad(&self) -> f64 {
+        self.variance_rad2.sqrt()
+    }
 }
 
 /// The observation window of a track.

@@ -80,7 +80,7 @@ impl MixtureTracker {
         self.people.retain(|person| !person.is_dead(&self.numbers, frame.time_ns));
         self.give_birth(frame.time_ns, &given, &detections);
         tracks.clear();
-        tracks.extend(self.people.iter_mut().map(|person| person.track(frame.time_ns)));
+        tracks.extend(self.people.iter_mut().map(|person| person.track(frame.time_ns, step_s)));
     }
 
     /// Who can be seen, how well, and with what chance of a detection of one's own.

@@ -6,13 +6,11 @@
 #![allow(non_snake_case)]
 
 use super::association::{FORBIDDEN, greedy, in_order, optimal};
-use super::followed::{
-    ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, WIDTH_SCALE_SIGMA, seconds,
-};
+use super::followed::{Heading, Observations, Track, WIDTH_SCALE_SIGMA, seconds};
 use super::gaussian::State;
 use crate::Frame;
 use crate::detect::Detection;
-use crate::gait::{GaitPhase, WALKS_FROM_MPS};
+use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 
 /// Added to the variances of position and velocity in each step, however long.
@@ -61,8 +59,7 @@ struct Person {
     v_mps: DVec3,
     P: [[f64; 2]; 2],
     points: u32,
-    heading_rad: f64,
-    heading_variance_rad2: f64,
+    heading: Heading,
     top_m: f64,
     /// The last detection's boxes, moved so that its position is at the origin.
     aabb: Aabb,
@@ -147,8 +144,7 @@ impl Person {
             v_mps: DVec3::ZERO,
             P: [[BORN, 0.0], [0.0, BORN]],
             points: 0,
-            heading_rad: 0.0,
-            heading_variance_rad2: ANY_HEADING_RAD2,
+            heading: Heading::ANY,
             top_m: 0.0,
             aabb: Aabb::EMPTY,
             obb: Obb::from_aabb(&Aabb::EMPTY),
@@ -203,21 +199,15 @@ impl Person {
     fn track(&mut self, time_ns: i64, step_s: f64) -> Track {
         let state = self.state();
         let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
-        if velocity_mps.length() > WALKS_FROM_MPS {
-            self.heading_rad = velocity_mps.to_angle();
-            self.heading_variance_rad2 = state.heading_variance_rad2().min(ANY_HEADING_RAD2);
-        } else {
-            let turned = self.heading_variance_rad2 + STANDING_TURN_RAD2PS * step_s;
-            self.heading_variance_rad2 = turned.min(ANY_HEADING_RAD2);
-        }
+        self.heading.follow(&state, step_s);
         self.observed.push(time_ns, position_m, velocity_mps);
         Track {
             id: self.id,
             position_m,
             velocity_mps,
             covariance: state.P,
-            heading_rad: self.heading_rad,
-            heading_sigma_rad: self.heading_variance_rad2.sqrt(),
+            heading_rad: self.heading.mean_rad,
+            heading_sigma_rad: self.heading.sigma_rad(),
             height_m: self.top_m,
             height_sigma_m: 0.0,
             width_scale: 1.0,

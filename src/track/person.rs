@@ -1,7 +1,7 @@
 //! One person followed: filter, height, heading, boxes, and how sure it is that somebody is there.
 
-use super::followed::{ANY_HEADING_RAD2, Observations, STANDING_TURN_RAD2PS, Track, seconds};
-use super::gaussian::{Mat2, State, largest_sigma, plus, round};
+use super::followed::{Heading, Observations, Track, seconds};
+use super::gaussian::{Mat2, largest_sigma, plus, round};
 use super::height::Height;
 use super::kalman::Filter;
 use super::limb_phase::LimbPhase;
@@ -9,7 +9,6 @@ use super::numbers::Numbers;
 use super::visibility::{Body, BodyView};
 use super::width::BodyWidth;
 use crate::detect::{Detection, Prior};
-use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 /// Nobody is believed in more firmly than this, so that a track that should be seen dies within frames.
@@ -58,10 +57,7 @@ pub(super) struct Person {
     born_ns: i64,
     last_match_ns: i64,
     points: u32,
-    heading_rad: f64,
-    heading_variance_rad2: f64,
-    /// When the track was last given out.
-    given_ns: i64,
+    heading: Heading,
     height: Height,
     width: BodyWidth,
     /// Averaged extent along x and y.
@@ -84,9 +80,7 @@ impl Person {
             born_ns: time_ns,
             last_match_ns: time_ns,
             points: 0,
-            heading_rad: 0.0,
-            heading_variance_rad2: ANY_HEADING_RAD2,
-            given_ns: time_ns,
+            heading: Heading::ANY,
             height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
             width: BodyWidth::default(),
             extent_m: DVec2::splat(WIDTH_M),
@@ -106,7 +100,7 @@ impl Person {
         self.filter.state().velocity_mps().length()
     }
 
-    /// The frame's detection of this person, `after_s` after the last frame; the filter stands at it.
+    /// The frame's detection of this person, `step_s` after the last frame; the filter stands at it.
     pub(super) fn matched(
         &mut self,
         numbers: &Numbers,
@@ -156,12 +150,11 @@ impl Person {
         }
     }
 
-    /// The track at the frame's time, where the filter stands.
-    pub(super) fn track(&mut self, time_ns: i64) -> Track {
+    /// The track at the frame's time, `step_s` after the last frame; the filter stands there.
+    pub(super) fn track(&mut self, time_ns: i64, step_s: f64) -> Track {
         let state = self.filter.state();
         let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
-        self.turn(&state, seconds(self.given_ns, time_ns));
-        self.given_ns = time_ns;
+        self.heading.follow(&state, step_s);
         self.observed.push(time_ns, position_m, velocity_mps);
         let (aabb, obb) = self.boxes(position_m);
         let (width_scale, width_scale_sigma) = self.width.scale();
@@ -170,8 +163,8 @@ impl Person {
             position_m,
             velocity_mps,
             covariance: state.P,
-            heading_rad: self.heading_rad,
-            heading_sigma_rad: self.heading_variance_rad2.sqrt(),
+            heading_rad: self.heading.mean_rad,
+            heading_sigma_rad: self.heading.sigma_rad(),
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
             width_scale,
@@ -182,18 +175,6 @@ impl Person {
             aabb,
             obb,
             observed: self.observed.0.clone(),
-        }
-    }
-
-    /// The heading follows the velocity of who walks; who stands may turn on the spot.
-    fn turn(&mut self, state: &State, step_s: f64) {
-        let v = state.velocity_mps();
-        if v.length() > WALKS_FROM_MPS {
-            self.heading_rad = v.y.atan2(v.x);
-            self.heading_variance_rad2 = state.heading_variance_rad2().min(ANY_HEADING_RAD2);
-        } else {
-            self.heading_variance_rad2 =
-                (self.heading_variance_rad2 + STANDING_TURN_RAD2PS * step_s).min(ANY_HEADING_RAD2);
         }
     }
 
@@ -217,7 +198,7 @@ impl Person {
         let half_m = (0.5 * self.extent_m).extend(0.5 * self.height.mean_m());
         let center_m = position_m.extend(half_m.z);
         let aabb = Aabb { min_m: center_m - half_m, max_m: center_m + half_m };
-        let site_from_box = DMat3::from_rotation_z(self.heading_rad);
+        let site_from_box = DMat3::from_rotation_z(self.heading.mean_rad);
         // Shoulders are twice as wide as a trunk is deep; the plan area is what was seen.
         let depth_m = (0.5 * half_m.x * half_m.y).sqrt();
         let half_m = DVec3::new(depth_m, 2.0 * depth_m, half_m.z);

@@ -81,7 +81,7 @@ pub fn run(words: &[&str]) -> Result<()> {
     }
     let jobs = named(&names)?;
     let commit = commit(flags.contains(&"--dirty"))?;
-    let umbracast = built(&root(), &target(), &[])?;
+    let umbracast = built(&root(), &target())?;
     for job in jobs {
         let missing = match job.needs {
             Needs::Data => data().is_none().then_some("UMBRACAST_DATA"),

@@ -83,14 +83,14 @@ fn version_at(revision: &str, folder: &Path) -> Result<Version> {
     if !umbracast.exists() {
         // A build folder of its own: cargo tells path packages apart by their place within the workspace, which is the
         // same in both trees.
-        let built = built(&tree, &folder.join("build"), &[])?;
+        let built = built(&tree, &folder.join("build"))?;
         fs::copy(&built, &umbracast).map_err(|e| format!("{}: {e}", built.display()))?;
     }
     Ok(Version { umbracast, tree, out: folder.join("then") })
 }
 
 fn version_here(folder: &Path) -> Result<Version> {
-    Ok(Version { umbracast: built(&root(), &target(), &[])?, tree: root(), out: folder.join("now") })
+    Ok(Version { umbracast: built(&root(), &target())?, tree: root(), out: folder.join("now") })
 }
 
 /// Simulates a case and runs every mode on it, into an empty folder.

@@ -34,9 +34,9 @@ pub fn output(folder: &Path, program: &str, arguments: &[&str]) -> Result<String
 }
 
 /// The command `umbracast`, built from the sources in `folder`.
-pub fn built(folder: &Path, target: &Path, features: &[&str]) -> Result<PathBuf> {
+pub fn built(folder: &Path, target: &Path) -> Result<PathBuf> {
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--release", "--quiet", "--package", "umbracast-cli"]).args(features);
+    cargo.args(["build", "--release", "--quiet", "--package", "umbracast-cli"]);
     // The sources decide with which compiler they are built, not the one that this program was built with.
     cargo.env_remove("RUSTUP_TOOLCHAIN").env("CARGO_TARGET_DIR", target).current_dir(folder);
     let status = cargo.status().map_err(|e| format!("cargo: {e}"))?;

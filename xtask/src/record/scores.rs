@@ -1,10 +1,11 @@
 //! What the modes score, and the paper's experiment.
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 
 use super::book::Book;
 use super::keep;
-use crate::tools::{Result, argument, built, root, target};
+use crate::tools::{Result, argument, root};
 
 /// The default mode on 100 test scenes.
 pub fn headline(book: &mut Book) -> Result<()> {
@@ -63,13 +64,21 @@ pub fn reproduce_quick(book: &mut Book) -> Result<()> {
 /// The paper's experiment whole, training first: an hour on two cores. `REPRODUCE` names a folder in which an earlier
 /// try is gone on with.
 pub fn reproduce(book: &mut Book) -> Result<()> {
-    let out = std::env::var_os("REPRODUCE").map_or_else(|| book.scratch("reproduce"), Into::into);
-    built(&root(), &target(), &["--features", "train"])?;
-    let place = out.display().to_string();
-    book.command("date; time umbracast reproduce --train --out /tmp/reproduce");
-    let said =
-        book.bash(&root(), &format!("date; time umbracast reproduce --train --out {place} --quiet"))?;
-    book.line(&said.replace(&place, "/tmp/reproduce"));
+    let out = std::env::var_os("REPRODUCE").map_or_else(|| book.scratch("reproduce"), PathBuf::from);
+    let trained = book.scratch("trained");
+    let weights = trained.join("paper_lstm.safetensors");
+    let recorded = |text: &str| text.replace(&*out.to_string_lossy(), "/tmp/reproduce");
+    for line in [
+        format!(
+            "cargo run --release --quiet --manifest-path train/Cargo.toml -- --quiet --out {}",
+            trained.display()
+        ),
+        format!("time umbracast reproduce --weights {} --out {} --quiet", weights.display(), out.display()),
+    ] {
+        book.command(&recorded(&line));
+        let said = book.bash(&root(), &line)?;
+        book.line(&recorded(&said));
+    }
     keep(book, &out.join("boxes.svg"), "reproduce-boxes.svg")
 }
 

@@ -3,25 +3,24 @@
 //! A variant's score is set beside the whole's on the same scenes, so the intervals are of the difference, by
 //! bootstrap over recordings.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use rayon::prelude::*;
 use umbracast::config::Mechanism;
 use umbracast::{Config, Error, Frame, Pipeline};
-use umbracast_io::rows::{PeopleRow, TrackRow};
+use umbracast_io::rows::PeopleRow;
 
-use crate::oracle::replaced;
 use crate::run::chain::{Chain, Lane, SceneSpec, Spec};
+use crate::run::scene_score::displacement;
 use crate::score::bootstrap::{Bootstrap, Pooled, interval, quantile};
 use crate::score::counts::Counts;
 use crate::score::displacement::Displacement;
 use crate::score::instances::instances;
 use crate::score::labels;
-use crate::score::link_counts::{ECE_BINS, LinkCounts, WindowCounts};
+use crate::score::link_counts::{Bin, ECE_BINS, WindowCounts, calibration_error};
 use crate::score::links::Said;
 use crate::score::matching::match_scene;
-use crate::score::scene::{Matching, SceneRun, SceneTruth, TruthIndex};
+use crate::score::scene::{SceneRun, SceneTruth, TruthIndex};
 use crate::score::stage1::Stage1;
 
 mod table;
@@ -102,7 +101,7 @@ impl Figure {
         match self {
             Self::F1 => sums.all.f1(),
             Self::OnsetF1 => sums.onset.f1(),
-            Self::Ece => sums.ece(),
+            Self::Ece => calibration_error(&sums.bins, sums.all.total()),
             Self::Mota => sums.stage1.mota(),
             Self::Idf1 => sums.stage1.idf1(),
             Self::PositionM => sums.stage1.position_rmse_m(),
@@ -150,56 +149,39 @@ struct Sums {
     recording: u64,
     all: Counts,
     onset: Counts,
-    /// Of each bin of the calibration error: instances, probabilities added, blocked.
-    bins: [(u64, f64, u64); ECE_BINS],
+    bins: [Bin; ECE_BINS],
     stage1: Stage1,
     displacement: Displacement,
 }
 
 impl Sums {
-    fn of(truth: &SceneTruth, run: &SceneRun, access_points: u32) -> Self {
+    fn of(truth: &SceneTruth, run: &SceneRun) -> Self {
         let index = TruthIndex::new(truth);
         let instances = instances(&index);
         let matching = match_scene(&truth.people, &run.tracks);
         let predictions = Said::by_run(run).of_tracks(&instances, &matching);
-        let first = LinkCounts::each(&instances, &predictions, access_points).into_iter().next();
-        let WindowCounts { all, onset, bins, .. } = first.unwrap_or_default().windows[WINDOW - 1].clone();
+        // Instances stand in the order of the access points.
+        let first = instances.partition_point(|instance| instance.access_point == 0);
+        let WindowCounts { all, onset, bins, .. } =
+            WindowCounts::of(&instances[..first], &predictions[..first], WINDOW);
         Self {
             recording: index.recording(),
             all,
             onset,
-            bins: bins.map(|bin| (bin.count, bin.p_sum, bin.blocked)),
+            bins,
             stage1: Stage1::of(&truth.people, &run.tracks),
-            displacement: displacement(&index, &matching, run),
+            displacement: displacement(&index, run, &matching),
         }
     }
-
-    fn ece(&self) -> Option<f64> {
-        let gaps: f64 = self.bins.iter().map(|(_, p_sum, blocked)| (p_sum - *blocked as f64).abs()).sum();
-        (self.all.total() > 0).then(|| gaps / self.all.total() as f64)
-    }
-}
-
-fn displacement(index: &TruthIndex, matching: &Matching, run: &SceneRun) -> Displacement {
-    let rows: BTreeMap<(u64, u64), &TrackRow> =
-        run.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
-    Displacement::of(index, |frame, person| {
-        let track = matching.get(&(frame, person))?;
-        rows.get(&(frame, *track)).map(|row| replaced::forecast_of(row))
-    })
 }
 
 impl Pooled for Sums {
     fn plus(&self, other: &Self, times: u64) -> Self {
-        let bin = |i: usize| {
-            let (a, b) = (self.bins[i], other.bins[i]);
-            (a.0 + times * b.0, a.1 + times as f64 * b.1, a.2 + times * b.2)
-        };
         Self {
             recording: other.recording,
             all: self.all.plus(&other.all, times),
             onset: self.onset.plus(&other.onset, times),
-            bins: std::array::from_fn(bin),
+            bins: std::array::from_fn(|i| self.bins[i].plus(&other.bins[i], times)),
             stage1: self.stage1.plus(&other.stage1, times),
             displacement: self.displacement.plus(&other.displacement, times),
         }
@@ -278,13 +260,11 @@ fn simulated(
     progress: &(impl Fn() + Sync),
 ) -> Result<Tried, Error> {
     let variants = configs.len();
-    let access_points = configs[0].site.access_points.len() as u32;
     let spec = Spec { configs, weights: None, scenes: scenes.to_vec(), keep: None, ladder: false };
     let chain = Chain::new(&spec)?;
     let scene = |index: usize| -> Result<_, Error> {
         let played = chain.play(index, &|_| {}, clock)?;
-        let of_lane =
-            |lane: &Lane| (Sums::of(&played.truth, &lane.rows, access_points), seconds(&lane.times));
+        let of_lane = |lane: &Lane| (Sums::of(&played.truth, &lane.rows), seconds(&lane.times));
         let tried: (Vec<Sums>, Vec<Vec<f64>>) = played.lanes.iter().map(of_lane).unzip();
         progress();
         Ok(tried)

@@ -18,7 +18,7 @@ use crate::score::instances::instances;
 use crate::score::link_counts::{LinkCounts, Prediction};
 use crate::score::links::{Said, never, persistence_of_truth};
 use crate::score::matching::match_scene;
-use crate::score::scene::{SceneRun, SceneTruth, TruthIndex};
+use crate::score::scene::{Matching, SceneRun, SceneTruth, TruthIndex};
 use crate::score::stage1::Stage1;
 use crate::score::times::Times;
 
@@ -171,16 +171,10 @@ pub fn score_scene(
         if let Some(walkers) = walkers {
             add(mode, Predictor::TrueBody, of_tracks(true_bodies(rows, &matching, walkers, &config.site)));
         }
-        let forecasts: BTreeMap<(u64, u64), &TrackRow> =
-            rows.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
-        let forecast = |frame, person| {
-            let track = matching.get(&(frame, person))?;
-            forecasts.get(&(frame, *track)).map(|row| replaced::forecast_of(row))
-        };
         modes.push(ModeSums {
             mode: config.mode,
             stage1: Stage1::of(&truth.people, &rows.tracks),
-            displacement: Displacement::of(&index, forecast),
+            displacement: displacement(&index, rows, &matching),
             times: Times::each(&index, &instances, rows, &matching, site_access_points),
             health: *health,
         });
@@ -194,6 +188,16 @@ pub fn score_scene(
         constant_velocity: Displacement::of(&index, carried_on),
         said,
         modes,
+    })
+}
+
+/// Of the forecasts that a run made of each person's track.
+pub(crate) fn displacement(index: &TruthIndex, run: &SceneRun, matching: &Matching) -> Displacement {
+    let rows: BTreeMap<(u64, u64), &TrackRow> =
+        run.tracks.iter().map(|row| ((row.frame, row.track), row)).collect();
+    Displacement::of(index, |frame, person| {
+        let track = matching.get(&(frame, person))?;
+        rows.get(&(frame, *track)).map(|row| replaced::forecast_of(row))
     })
 }
 

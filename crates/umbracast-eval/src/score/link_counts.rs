@@ -54,6 +54,16 @@ pub struct Bin {
     pub blocked: u64,
 }
 
+impl Pooled for Bin {
+    fn plus(&self, other: &Self, times: u64) -> Self {
+        Self {
+            count: self.count + times * other.count,
+            p_sum: self.p_sum + times as f64 * other.p_sum,
+            blocked: self.blocked + times * other.blocked,
+        }
+    }
+}
+
 /// Everything that was said for one window of one access point.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct WindowCounts {
@@ -100,9 +110,7 @@ impl WindowCounts {
             pooled.onset = pooled.onset.plus(&scene.onset, 1);
             pooled.brier_sum += scene.brier_sum;
             for (bin, more) in pooled.bins.iter_mut().zip(&scene.bins) {
-                bin.count += more.count;
-                bin.p_sum += more.p_sum;
-                bin.blocked += more.blocked;
+                *bin = bin.plus(more, 1);
             }
             pooled.ranking.extend_from_slice(&scene.ranking);
         }
@@ -117,8 +125,7 @@ impl WindowCounts {
 
     /// Expected calibration error: over the bins, |mean probability - share blocked| weighted by count.
     pub fn ece(&self) -> Option<f64> {
-        let gap = |bin: &Bin| (bin.p_sum - bin.blocked as f64).abs();
-        (self.all.total() > 0).then(|| self.bins.iter().map(gap).sum::<f64>() / self.all.total() as f64)
+        calibration_error(&self.bins, self.all.total())
     }
 
     /// Area under the precision-recall curve as average precision: the sum over falling thresholds of precision
@@ -133,6 +140,12 @@ impl WindowCounts {
         }
         (positives > 0).then(|| area / positives as f64)
     }
+}
+
+/// [`WindowCounts::ece`] of so many instances in these bins; `None` over nothing.
+pub fn calibration_error(bins: &[Bin], instances: u64) -> Option<f64> {
+    let gap = |bin: &Bin| (bin.p_sum - bin.blocked as f64).abs();
+    (instances > 0).then(|| bins.iter().map(gap).sum::<f64>() / instances as f64)
 }
 
 /// Only the bins that hold something, with their places: a yes-or-no answer fills two of the fifteen.
