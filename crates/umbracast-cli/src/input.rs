@@ -100,6 +100,61 @@ pub fn recordings(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(files)
 }
 
+/// The site on which all inputs were recorded; none where none says so. Captures and clouds never say.
+///
+/// # Errors
+/// Recordings of different sites, or one beside input that names none.
+pub fn recorded_site(inputs: &[Input]) -> Result<Option<Site>, Error> {
+    let mut first: Option<Site> = None;
+    for input in inputs {
+        let site = input.site()?;
+        if let (Some(first), Some(site)) = (&first, &site)
+            && site != first
+        {
+            let (expected, found) = (&first.name, &site.name);
+            let story =
+                format!("site: expected {expected:?} as in the first recording, found another, {found:?}");
+            return Err(Error::new(story).within(input));
+        }
+        first = first.or(site);
+    }
+    let silent = inputs.iter().find(|input| !matches!(input, Input::Recording(_)));
+    if let (Some(site), Some(silent)) = (&first, silent) {
+        let story = format!(
+            "expected --site, or recordings alone: a recording among the inputs names its site, {:?}, these name none",
+            site.name
+        );
+        return Err(Error::new(story).within(silent));
+    }
+    Ok(first)
+}
+
+/// The recording without people that `simulate` wrote beside this one, if it did.
+pub fn empty_beside(input: &Input) -> Option<PathBuf> {
+    let Input::Recording(file) = input else { return None };
+    Some(file.parent().unwrap_or(Path::new(".")).join(EMPTY)).filter(|path| path.is_file())
+}
+
+/// The frames of the hall without people, in any form that input may have, and what was lost of them.
+///
+/// # Errors
+/// More than one scene, and whatever [`Input::frames`] fails with.
+pub fn empty_frames(
+    path: &Path,
+    config: &Config,
+    health: &mut Health,
+) -> Result<(Vec<Frame>, Option<String>), Error> {
+    let [empty] = &scenes(std::slice::from_ref(&path.to_owned()))?[..] else {
+        return Err(Error::new("expected one scene without people, found several").within(path.display()));
+    };
+    let mut frames = Vec::new();
+    let lost = empty.frames(&config.site, health, |frame| {
+        frames.push(frame.clone());
+        Ok(())
+    })?;
+    Ok((frames, lost))
+}
+
 impl std::fmt::Display for Input {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (first, more) = match self {
@@ -139,18 +194,51 @@ impl Input {
         mut sink: impl FnMut(&Frame) -> Result<(), Error>,
     ) -> Result<Option<String>, Error> {
         match self {
-            Self::Recording(file) => recording(file, site, health, &mut sink),
+            Self::Recording(file) => {
+                assembled(site, health, &mut sink, |packets| recorded_packets(file, site, packets))
+            }
             Self::Clouds(files) => clouds(files, site, health, &mut sink),
-            Self::Captures(files) => captures(files, site, health, &mut sink),
+            Self::Captures(files) => {
+                assembled(site, health, &mut sink, |packets| captured_packets(files, site, packets))
+            }
+        }
+    }
+
+    /// Gives every packet to `sink`, with its sensor's place in the site, in the order in which they came. Says what
+    /// was lost at the end of a damaged file.
+    ///
+    /// # Errors
+    /// Clouds, which have no packets; otherwise as [`Self::frames`].
+    pub fn packets(
+        &self,
+        site: &Site,
+        mut sink: impl FnMut(usize, Packet) -> Result<(), Error>,
+    ) -> Result<Option<String>, Error> {
+        match self {
+            Self::Recording(file) => recorded_packets(file, site, &mut sink),
+            Self::Captures(files) => captured_packets(files, site, &mut sink),
+            Self::Clouds(files) => {
+                Err(Error::new("expected packets, found clouds").within(files[0].display()))
+            }
         }
     }
 }
 
 type Sink<'a> = &'a mut dyn FnMut(&Frame) -> Result<(), Error>;
+type PacketSink<'a> = &'a mut dyn FnMut(usize, Packet) -> Result<(), Error>;
 
-fn recording(file: &Path, site: &Site, health: &mut Health, sink: Sink) -> Result<Option<String>, Error> {
+/// The packets of all sensors in the order in which they came: a recording keeps a list for each sensor and frame.
+fn recorded_packets(file: &Path, site: &Site, sink: PacketSink) -> Result<Option<String>, Error> {
     let mut reader = RecordingReader::open(file)?;
-    let mut assembler = Assembler::new(site)?;
+    // One list a sensor; a sensor's next list begins the next frame.
+    let mut lists: Vec<(usize, Vec<Packet>)> = Vec::new();
+    let mut give = |lists: &mut Vec<(usize, Vec<Packet>)>| {
+        let of_sensor =
+            |(sensor, packets): (usize, Vec<Packet>)| packets.into_iter().map(move |p| (sensor, p));
+        let mut all: Vec<(usize, Packet)> = lists.drain(..).flat_map(of_sensor).collect();
+        all.sort_by_key(|(_, packet)| packet.time_ns);
+        all.into_iter().try_for_each(|(sensor, packet)| sink(sensor, packet))
+    };
     while let Some(entry) = reader.next_entry()? {
         let Entry::Packets(name, packets) = entry else { continue };
         let Some(sensor) = site.sensors.iter().position(|sensor| sensor.name == name) else {
@@ -158,12 +246,30 @@ fn recording(file: &Path, site: &Site, health: &mut Health, sink: Sink) -> Resul
             let story = format!("sensor {name:?}: expected one of the site's, {}", known.join(", "));
             return Err(Error::new(story).within(file.display()));
         };
-        packets.iter().for_each(|packet| assembler.push(sensor, packet, health));
-        drain(&mut assembler, sink)?;
+        if lists.iter().any(|(other, _)| *other == sensor) {
+            give(&mut lists)?;
+        }
+        lists.push((sensor, packets));
     }
+    give(&mut lists)?;
+    Ok(reader.lost().map(str::to_owned))
+}
+
+/// Packets through an assembler, frames to the sink.
+fn assembled(
+    site: &Site,
+    health: &mut Health,
+    sink: Sink,
+    packets: impl FnOnce(PacketSink) -> Result<Option<String>, Error>,
+) -> Result<Option<String>, Error> {
+    let mut assembler = Assembler::new(site)?;
+    let lost = packets(&mut |sensor, packet| {
+        assembler.push(sensor, &packet, health);
+        drain(&mut assembler, sink)
+    })?;
     assembler.finish();
     drain(&mut assembler, sink)?;
-    Ok(reader.lost().map(str::to_owned))
+    Ok(lost)
 }
 
 fn drain(assembler: &mut Assembler, sink: Sink) -> Result<(), Error> {
@@ -199,12 +305,7 @@ fn clouds(files: &[PathBuf], site: &Site, health: &mut Health, sink: Sink) -> Re
     Ok(None)
 }
 
-fn captures(
-    files: &[PathBuf],
-    site: &Site,
-    health: &mut Health,
-    sink: Sink,
-) -> Result<Option<String>, Error> {
+fn captured_packets(files: &[PathBuf], site: &Site, sink: PacketSink) -> Result<Option<String>, Error> {
     if files.len() != site.sensors.len() {
         let (expected, found) = (site.sensors.len(), files.len());
         return Err(Error::new(format!(
@@ -219,7 +320,6 @@ fn captures(
             PcapReader::new(BufReader::new(open), &file.display().to_string())
         })
         .collect::<Result<Vec<_>, Error>>()?;
-    let mut assembler = Assembler::new(site)?;
     let mut next: Vec<Option<Packet>> = readers.iter_mut().map(next_packet).collect();
     // The packets of all sensors in the order of their times.
     while let Some(sensor) = (0..next.len())
@@ -227,13 +327,10 @@ fn captures(
         .min_by_key(|&sensor| next[sensor].as_ref().map(|packet| packet.time_ns))
     {
         if let Some(packet) = next[sensor].take() {
-            assembler.push(sensor, &packet, health);
+            sink(sensor, packet)?;
         }
         next[sensor] = next_packet(&mut readers[sensor]);
-        drain(&mut assembler, sink)?;
     }
-    assembler.finish();
-    drain(&mut assembler, sink)?;
     let cut = files.iter().zip(&readers).find(|(_, reader)| reader.truncated());
     Ok(cut.map(|(file, _)| format!("{}: ends within a record", file.display())))
 }

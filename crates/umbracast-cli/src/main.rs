@@ -12,6 +12,8 @@ mod crowds;
 mod flags;
 mod matches;
 mod input;
+mod page;
+mod signal;
 mod commands;
 
 use std::process::ExitCode;
@@ -31,6 +33,9 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo::run(&args, &cli.common),
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Run(args) => commands::run::run(&args, &cli.common),
+        Command::Live(args) => commands::live::run(&args, &cli.common),
+        Command::View(args) => commands::view::run(&args, &cli.common),
+        Command::Replay(args) => commands::replay::run(&args, &cli.common),
         Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),
         Command::Compare(args) => commands::compare::run(&args, &cli.common),
         Command::Ablate(args) => commands::ablate::run(&args, &cli.common),

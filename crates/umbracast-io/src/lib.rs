@@ -8,5 +8,6 @@ pub mod cdr;
 pub mod messages;
 pub mod recording;
 pub mod tables;
+pub mod wire;
 pub mod trajectories;
 pub mod bvh;

@@ -1,4 +1,6 @@
-//! The messages of a recording: names, definitions as ROS 2 prints them, and their CDR.
+//! The messages of a recording: names, definitions as ROS 2 prints them, and their CDR. Those of rows are in `wire`.
+
+use std::borrow::Cow;
 
 use umbracast::Site;
 use umbracast::geometry::Pose;
@@ -11,12 +13,18 @@ use crate::rows::{PeopleLinkRow, PeopleRow};
 pub const PACKET_BYTES: usize = 1206;
 
 /// A message type: its name and its definition with those it is made of.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Schema {
     /// As `package/msg/Type`.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// In the concatenated form of ROS 2 bags.
-    pub definition: &'static str,
+    pub definition: Cow<'static, str>,
+}
+
+impl Schema {
+    const fn new(name: &'static str, definition: &'static str) -> Self {
+        Self { name: Cow::Borrowed(name), definition: Cow::Borrowed(definition) }
+    }
 }
 
 /// A definition with `std_msgs/Header` behind it.
@@ -32,23 +40,26 @@ macro_rules! with_header {
     };
 }
 
+/// What stands behind every definition with a header.
+pub(crate) const HEADER_DEFINITIONS: &str = with_header!("");
+
 /// The configuration, the first message of a recording.
-pub const CONFIG: Schema = Schema { name: "std_msgs/msg/String", definition: "string data\n" };
+pub const CONFIG: Schema = Schema::new("std_msgs/msg/String", "string data\n");
 
 /// One sensor's packets of one frame.
-pub const SCAN: Schema = Schema {
-    name: "velodyne_msgs/msg/VelodyneScan",
-    definition: with_header!(
+pub const SCAN: Schema = Schema::new(
+    "velodyne_msgs/msg/VelodyneScan",
+    with_header!(
         "std_msgs/Header header\nVelodynePacket[] packets\n\
          ================================================================================\n\
          MSG: velodyne_msgs/VelodynePacket\nbuiltin_interfaces/Time stamp\nuint8[1206] data\n"
     ),
-};
+);
 
 /// Poses of the sensors.
-pub const TRANSFORMS: Schema = Schema {
-    name: "tf2_msgs/msg/TFMessage",
-    definition: with_header!(
+pub const TRANSFORMS: Schema = Schema::new(
+    "tf2_msgs/msg/TFMessage",
+    with_header!(
         "geometry_msgs/TransformStamped[] transforms\n\
          ================================================================================\n\
          MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\nTransform transform\n\
@@ -59,12 +70,12 @@ pub const TRANSFORMS: Schema = Schema {
          ================================================================================\n\
          MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
     ),
-};
+);
 
 /// A sensor's points of one frame.
-pub const CLOUD: Schema = Schema {
-    name: "sensor_msgs/msg/PointCloud2",
-    definition: with_header!(
+pub const CLOUD: Schema = Schema::new(
+    "sensor_msgs/msg/PointCloud2",
+    with_header!(
         "std_msgs/Header header\nuint32 height\nuint32 width\nPointField[] fields\nbool is_bigendian\n\
          uint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n\
          ================================================================================\n\
@@ -72,31 +83,31 @@ pub const CLOUD: Schema = Schema {
          uint8 INT32=5\nuint8 UINT32=6\nuint8 FLOAT32=7\nuint8 FLOAT64=8\nstring name\nuint32 offset\n\
          uint8 datatype\nuint32 count\n"
     ),
-};
+);
 
 /// Truth: everybody in one frame.
-pub const PEOPLE: Schema = Schema {
-    name: "umbracast_msgs/msg/People",
-    definition: with_header!(
+pub const PEOPLE: Schema = Schema::new(
+    "umbracast_msgs/msg/People",
+    with_header!(
         "# Everybody in the scene at the end of a frame.\n\
          std_msgs/Header header\nuint64 frame\nPerson[] people\n\
          ================================================================================\n\
          MSG: umbracast_msgs/Person\nuint32 person\nfloat64 x_m\nfloat64 y_m\nfloat64 vx_mps\nfloat64 vy_mps\n\
          float64 heading_rad\nfloat64 height_m\nbool arrived\nuint32 returns\n"
     ),
-};
+);
 
 /// Truth: every link in one frame.
-pub const LINKS: Schema = Schema {
-    name: "umbracast_msgs/msg/Links",
-    definition: with_header!(
+pub const LINKS: Schema = Schema::new(
+    "umbracast_msgs/msg/Links",
+    with_header!(
         "# Every link at the end of a frame.\n\
          std_msgs/Header header\nuint64 frame\nLink[] links\n\
          ================================================================================\n\
          MSG: umbracast_msgs/Link\nstring access_point\nuint32 person\nbool blocked\nbool static_blocked\n\
          uint8 UNKNOWN=2\nuint8 self_blocked # 0 no, 1 yes, 2 while the UE is inside the body\n"
     ),
-};
+);
 
 /// `std_msgs/String`
 pub fn text(value: &str) -> Vec<u8> {

@@ -8,6 +8,7 @@
 //! | `/NAME/packets` | `velodyne_msgs/msg/VelodyneScan`, one a frame and sensor |
 //! | `/NAME/points` | `sensor_msgs/msg/PointCloud2` |
 //! | `/truth/people`, `/truth/links` | `umbracast_msgs/msg/People`, `umbracast_msgs/msg/Links` |
+//! | `/umbracast/detections`, `/umbracast/tracks`, `/umbracast/blockages` | what a live run made of them: see [`crate::wire`] |
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -20,6 +21,7 @@ use umbracast::{Error, Site};
 
 use crate::messages::{self, Schema};
 use crate::rows::{PeopleLinkRow, PeopleRow};
+use crate::wire::{self, WireRow};
 
 const CONFIG_TOPIC: &str = "/umbracast/config";
 
@@ -32,8 +34,8 @@ pub struct RecordingWriter {
     packets: Vec<u16>,
     /// By sensor; none where no clouds are asked for.
     points: Vec<u16>,
-    people: u16,
-    links: u16,
+    /// Of every topic that was written to after the beginning.
+    others: BTreeMap<String, u16>,
     sequence: u32,
 }
 
@@ -43,10 +45,29 @@ impl RecordingWriter {
     /// # Errors
     /// A file that cannot be written.
     pub fn create(path: &Path, config_toml: &str, site: &Site, clouds: bool) -> Result<Self, Error> {
+        Self::create_with(mcap::WriteOptions::new(), path, config_toml, site, clouds)
+    }
+
+    /// The same for what goes on until it is stopped or killed: a chunk is held in memory until it is whole, so that
+    /// the file never ends in half of one that says it is whole.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn create_live(path: &Path, config_toml: &str, site: &Site) -> Result<Self, Error> {
+        Self::create_with(mcap::WriteOptions::new().disable_seeking(true), path, config_toml, site, false)
+    }
+
+    fn create_with(
+        options: mcap::WriteOptions,
+        path: &Path,
+        config_toml: &str,
+        site: &Site,
+        clouds: bool,
+    ) -> Result<Self, Error> {
         let fail = |e: &dyn std::fmt::Display| Error::new(e.to_string()).within(path.display());
         let file = BufWriter::new(File::create(path).map_err(|e| fail(&e))?);
         // Packets hardly compress (a sixth), and a reader then needs no codec.
-        let mut mcap = mcap::WriteOptions::new()
+        let mut mcap = options
             .compression(None)
             .profile("ros2")
             .library(concat!("umbracast ", env!("CARGO_PKG_VERSION")))
@@ -54,7 +75,7 @@ impl RecordingWriter {
             .map_err(|e| fail(&e))?;
         let mut channel = |topic: &str, schema: &Schema| -> Result<u16, Error> {
             let id = mcap
-                .add_schema(schema.name, "ros2msg", schema.definition.as_bytes())
+                .add_schema(&schema.name, "ros2msg", schema.definition.as_bytes())
                 .map_err(|e| fail(&e))?;
             mcap.add_channel(id, topic, "cdr", &BTreeMap::new()).map_err(|e| fail(&e))
         };
@@ -71,12 +92,12 @@ impl RecordingWriter {
             .filter(|_| clouds)
             .map(|sensor| channel(&format!("/{}/points", sensor.name), &messages::CLOUD))
             .collect::<Result<_, _>>()?;
-        let people = channel("/truth/people", &messages::PEOPLE)?;
-        let links = channel("/truth/links", &messages::LINKS)?;
         let path = path.to_owned();
-        let mut writer = Self { path, mcap, site: site.clone(), packets, points, people, links, sequence: 0 };
+        let (site, others) = (site.clone(), BTreeMap::new());
+        let mut writer = Self { path, mcap, site, packets, points, others, sequence: 0 };
         writer.put(config, 0, &messages::text(config_toml))?;
-        writer.put(transforms, 0, &messages::transforms(site))?;
+        let poses = messages::transforms(&writer.site);
+        writer.put(transforms, 0, &poses)?;
         Ok(writer)
     }
 
@@ -120,8 +141,39 @@ impl RecordingWriter {
         people: &[PeopleRow],
         links: &[PeopleLinkRow],
     ) -> Result<(), Error> {
-        self.put(self.people, time_ns, &messages::people(time_ns, frame, people))?;
-        self.put(self.links, time_ns, &messages::links(time_ns, frame, links, &self.site))
+        let (people, links) =
+            (messages::people(time_ns, frame, people), messages::links(time_ns, frame, links, &self.site));
+        self.put_on("/truth/people", &messages::PEOPLE, time_ns, &people)?;
+        self.put_on("/truth/links", &messages::LINKS, time_ns, &links)
+    }
+
+    /// What a run made of one frame.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_rows<R: WireRow>(&mut self, time_ns: i64, frame: u64, rows: &[R]) -> Result<(), Error> {
+        let names: Vec<String> = self.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+        let message = wire::encode(time_ns, frame, rows, &names);
+        match self.others.get(R::TOPIC) {
+            Some(&channel) => self.put(channel, time_ns, &message),
+            None => self.put_on(R::TOPIC, &wire::schema::<R>(), time_ns, &message),
+        }
+    }
+
+    /// A word, on a topic of its own.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_text(&mut self, topic: &str, time_ns: i64, text: &str) -> Result<(), Error> {
+        self.put_on(topic, &messages::CONFIG, time_ns, &messages::text(text))
+    }
+
+    /// Ends the chunk and hands it to the system: what stands before this survives the program.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn flush(&mut self) -> Result<(), Error> {
+        self.mcap.flush().map_err(|e| Error::new(e.to_string()).within(self.path.display()))
     }
 
     /// Writes the index and the end of the file.
@@ -131,6 +183,24 @@ impl RecordingWriter {
     pub fn finish(mut self) -> Result<(), Error> {
         self.mcap.finish().map_err(|e| Error::new(e.to_string()).within(self.path.display()))?;
         Ok(())
+    }
+
+    /// A message on a topic that is made when it is first written to.
+    fn put_on(&mut self, topic: &str, schema: &Schema, time_ns: i64, message: &[u8]) -> Result<(), Error> {
+        let channel = match self.others.get(topic) {
+            Some(&channel) => channel,
+            None => {
+                let fail = |e: mcap::McapError| Error::new(e.to_string()).within(self.path.display());
+                let id = self
+                    .mcap
+                    .add_schema(&schema.name, "ros2msg", schema.definition.as_bytes())
+                    .map_err(fail)?;
+                let channel = self.mcap.add_channel(id, topic, "cdr", &BTreeMap::new()).map_err(fail)?;
+                self.others.insert(topic.to_owned(), channel);
+                channel
+            }
+        };
+        self.put(channel, time_ns, message)
     }
 
     fn put(&mut self, channel_id: u16, time_ns: i64, message: &[u8]) -> Result<(), Error> {
@@ -151,8 +221,8 @@ pub enum Entry {
     Config(String),
     /// Packets of the sensor of this name.
     Packets(String, Vec<Packet>),
-    /// Anything else: topic, type, bytes.
-    Other(String, String, usize),
+    /// Anything else: topic, type, message.
+    Other(String, String, Vec<u8>),
 }
 
 /// Reads a recording from its beginning, one message at a time.
@@ -217,7 +287,7 @@ impl RecordingReader {
                 return Entry::Packets(sensor.to_owned(), packets);
             }
         }
-        Entry::Other(topic.clone(), kind, message.data.len())
+        Entry::Other(topic.clone(), kind, message.data.to_vec())
     }
 }
 

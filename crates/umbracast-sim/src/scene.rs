@@ -103,6 +103,13 @@ impl Scene {
         self
     }
 
+    /// The same scene from frame `index` on, as if what was before had been seen by nobody. Before the first frame.
+    #[must_use]
+    pub fn starting_at(mut self, index: u64) -> Self {
+        self.next = index;
+        self
+    }
+
     /// The packets of `frames` revolutions in the hall without people: one list a frame, in it one a sensor.
     ///
     /// # Errors

@@ -1,10 +1,10 @@
 //! `run`: recorded input through the pipeline; detections, tracks and links to tables.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use umbracast::forecast::Weights;
-use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
+use umbracast::{Config, Error, Frame, Health, Pipeline};
 use umbracast_eval::score::scene::SceneRun;
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::tables::TableWriter;
@@ -69,7 +69,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let mut config = setup::config(args.mode, args.site.site.as_deref())?;
     // A recording brings its site with it; a file given goes before it.
     if args.site.site.is_none() {
-        config.site = recorded_site(&inputs)?.unwrap_or(config.site);
+        config.site = input::recorded_site(&inputs)?.unwrap_or(config.site);
     }
     let weights = setup::weights(args.weights.as_deref())?;
     let (mut health, mut lost) = (Health::default(), Vec::new());
@@ -168,32 +168,6 @@ fn counts(health: &Health) -> String {
     counts.map(|(name, count)| format!("{name}: {count}")).collect::<Vec<_>>().join(", ")
 }
 
-/// The site on which all inputs were recorded; none where none says so. Captures and clouds never say.
-fn recorded_site(inputs: &[Input]) -> Result<Option<Site>, Error> {
-    let mut first: Option<Site> = None;
-    for input in inputs {
-        let site = input.site()?;
-        if let (Some(first), Some(site)) = (&first, &site)
-            && site != first
-        {
-            let (expected, found) = (&first.name, &site.name);
-            let story =
-                format!("site: expected {expected:?} as in the first recording, found another, {found:?}");
-            return Err(Error::new(story).within(input));
-        }
-        first = first.or(site);
-    }
-    let silent = inputs.iter().find(|input| !matches!(input, Input::Recording(_)));
-    if let (Some(site), Some(silent)) = (&first, silent) {
-        let story = format!(
-            "expected --site, or recordings alone: a recording among the inputs names its site, {:?}, these name none",
-            site.name
-        );
-        return Err(Error::new(story).within(silent));
-    }
-    Ok(first)
-}
-
 /// A recording's own number, so that its rows meet its truth; else its place among the inputs.
 fn number_of(place: usize, input: &Input) -> u32 {
     input::scene_number(input).unwrap_or(place as u32)
@@ -236,20 +210,9 @@ fn empty_frames(
     health: &mut Health,
     lost: &mut Vec<String>,
 ) -> Result<Vec<Frame>, Error> {
-    let beside = || -> Option<PathBuf> {
-        let Input::Recording(file) = first else { return None };
-        Some(file.parent().unwrap_or(Path::new(".")).join(input::EMPTY)).filter(|path| path.is_file())
-    };
-    let Some(file) = args.empty.clone().or_else(beside).filter(|_| !args.no_empty) else {
-        return Ok(Vec::new());
-    };
-    let [empty] = &input::scenes(std::slice::from_ref(&file))?[..] else {
-        return Err(Error::new("expected one scene without people, found several").within(file.display()));
-    };
-    let mut frames = Vec::new();
-    lost.extend(empty.frames(&config.site, health, |frame| {
-        frames.push(frame.clone());
-        Ok(())
-    })?);
+    let given = args.empty.clone().or_else(|| input::empty_beside(first));
+    let Some(path) = given.filter(|_| !args.no_empty) else { return Ok(Vec::new()) };
+    let (frames, told) = input::empty_frames(&path, config, health)?;
+    lost.extend(told);
     Ok(frames)
 }

@@ -20,12 +20,12 @@ const PAIR_GAP_M: f64 = 0.5;
 /// Where the circle is too small for so many people, they start nearer to each other than the preset says; if
 /// no scene out of a hundred will do, the last one stands, with `arrived_ns` empty for those who did not arrive.
 pub fn circle_crossing(preset: Preset, people: usize, radius_m: f64, seed: u64) -> Crowd {
-    let (parameters, spacing_m) = match preset {
-        Preset::Orca03 => (parameters(10.0, 5.0, 0.3, 1.0), 0.8),
-        Preset::Orca06 => (parameters(4.0, 4.0, 0.6, 1.5), 2.0),
+    match preset {
+        Preset::Orca03 | Preset::Orca06 => {}
         Preset::Mixed => return mixed::crowd(people, radius_m, seed),
         Preset::Pairs => return mixed::pairs(people.div_ceil(2), PAIR_GAP_M, radius_m, seed),
-    };
+    }
+    let (parameters, spacing_m) = setting(preset);
     let mut attempt = 0;
     loop {
         let mut rng = stream(seed, "circle starts", attempt);
@@ -36,6 +36,14 @@ pub fn circle_crossing(preset: Preset, people: usize, radius_m: f64, seed: u64) 
         if acceptable(&crowd) || attempt == MOST_ATTEMPTS {
             return crowd;
         }
+    }
+}
+
+/// How people of a preset avoid one another, and how far apart they start, metres.
+pub(super) fn setting(preset: Preset) -> (Parameters, f32) {
+    match preset {
+        Preset::Orca06 => (parameters(4.0, 4.0, 0.6, 1.5), 2.0),
+        Preset::Orca03 | Preset::Mixed | Preset::Pairs => (parameters(10.0, 5.0, 0.3, 1.0), 0.8),
     }
 }
 

@@ -6,6 +6,7 @@ pub mod orca;
 mod crossing;
 pub mod mixed;
 pub mod circle;
+mod strolling;
 mod speed_augmentation;
 pub mod replay;
 
@@ -14,4 +15,5 @@ pub use mixed::pairs;
 pub use preset::Preset;
 pub use replay::{Recorded, replay};
 pub use speed_augmentation::speed_augmented;
+pub use strolling::strolling;
 pub use trajectory::{Crowd, Trajectory};

@@ -31,6 +31,19 @@ pub struct Crowd {
     pub duration_ns: i64,
 }
 
+impl Crowd {
+    /// The same people so much later.
+    #[must_use]
+    pub fn later(mut self, by_ns: i64) -> Self {
+        for way in &mut self.trajectories {
+            way.start_ns += by_ns;
+            way.arrived_ns = way.arrived_ns.map(|arrived_ns| arrived_ns + by_ns);
+        }
+        self.duration_ns += by_ns;
+        self
+    }
+}
+
 impl Trajectory {
     /// Ways from time 0 in steps of 10 ms, with the time of arrival of each.
     pub(super) fn from_steps(

@@ -9,6 +9,10 @@ use umbracast_io::trajectories::Unit;
 use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::Preset;
 
+mod live;
+
+pub use live::{Live, PageArgs, RecordArgs, ReplayPackets, View};
+
 /// Sees people with LiDARs, foresees where they walk, and tells which radio links they are about to block.
 #[derive(Debug, Parser)]
 #[command(name = "umbracast", version, after_help = "Without a command: demo.")]
@@ -44,6 +48,12 @@ pub enum Command {
     Simulate(Simulate),
     /// Recordings, PCD clouds or pcap captures through the pipeline; writes tracks and links.
     Run(Run),
+    /// Sensors in, warnings out: receives packets, runs all stages as frames close, serves a page, records.
+    Live(Live),
+    /// Watch a recording in the browser as if it were live.
+    View(View),
+    /// Send the packets of recordings again, at the pace they came.
+    Replay(ReplayPackets),
     /// Score every stage: a run against its truth, or freshly simulated scenes in memory.
     Evaluate(Evaluate),
     /// Put the main figures of several reports into one table.

@@ -1,0 +1,112 @@
+//! Arguments of what runs live.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+use umbracast::{Error, Mode};
+
+use super::{CrowdArgs, SiteArgs};
+
+/// `live`
+#[derive(Debug, Args)]
+pub struct Live {
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// Simulate the site's sensors and people who walk, in place of real ones: true packets over loopback.
+    #[arg(long)]
+    pub demo: bool,
+    #[command(flatten)]
+    pub crowd: CrowdArgs,
+    /// Whose method: hdl, paper or default.
+    #[arg(long, default_value = "default")]
+    pub mode: Mode,
+    /// The hall without people: a recording, clouds or captures. Default: learned on the way.
+    #[arg(long, value_name = "PATH")]
+    pub empty: Option<PathBuf>,
+    /// Weights of the LSTM in place of the embedded ones.
+    #[arg(long, value_name = "FILE")]
+    pub weights: Option<PathBuf>,
+    #[command(flatten)]
+    pub page: PageArgs,
+    #[command(flatten)]
+    pub record: RecordArgs,
+    /// UDP port of the site's first sensor; the others follow. 0: free ones.
+    #[arg(long, default_value_t = 2368, value_name = "PORT")]
+    pub port: u16,
+    /// End after so many seconds; default: on a signal.
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub seconds: Option<f64>,
+}
+
+/// `view`
+#[derive(Debug, Args)]
+pub struct View {
+    /// A recording, clouds or captures.
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// Whose method: hdl, paper or default.
+    #[arg(long, default_value = "default")]
+    pub mode: Mode,
+    /// How many times faster than it was.
+    #[arg(long, default_value_t = 1.0, value_name = "X", value_parser = positive)]
+    pub rate: f64,
+    /// Begin anew at the end, until a signal comes.
+    #[arg(long)]
+    pub again: bool,
+    #[command(flatten)]
+    pub page: PageArgs,
+}
+
+/// `replay`
+#[derive(Debug, Args)]
+pub struct ReplayPackets {
+    /// Recordings or captures, one after the other.
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// Where each sensor's packets go, in the site's order; the last one given goes for those that follow, on the ports
+    /// that follow.
+    #[arg(long, default_value = "127.0.0.1:2368", value_name = "HOST:PORT", value_delimiter = ',')]
+    pub to: Vec<SocketAddr>,
+    /// How many times faster than it was.
+    #[arg(long, default_value_t = 1.0, value_name = "X", value_parser = positive)]
+    pub rate: f64,
+}
+
+/// The page.
+#[derive(Debug, Clone, Args)]
+pub struct PageArgs {
+    /// Where the page and its interface are served. Other hosts can reach another address than loopback: it needs a
+    /// token, in the environment variable UMBRACAST_TOKEN.
+    #[arg(long, default_value = "127.0.0.1:8600", value_name = "HOST:PORT")]
+    pub serve: SocketAddr,
+    /// Serve no page.
+    #[arg(long, conflicts_with = "serve")]
+    pub no_serve: bool,
+}
+
+/// The recorder.
+#[derive(Debug, Clone, Args)]
+pub struct RecordArgs {
+    /// Record packets and results into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub record: Option<PathBuf>,
+    /// A new file after so many megabytes.
+    #[arg(long, default_value_t = 4096, value_name = "MB", requires = "record")]
+    pub record_mb: u64,
+    /// A new file after so many minutes.
+    #[arg(long, default_value_t = 60, value_name = "MIN", requires = "record")]
+    pub record_minutes: u64,
+    /// Keep the newest so many files and delete older ones; default: delete none.
+    #[arg(long, value_name = "N", requires = "record")]
+    pub record_keep: Option<usize>,
+}
+
+fn positive(text: &str) -> Result<f64, Error> {
+    let number: Option<f64> = text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite());
+    number.ok_or_else(|| Error::new(format!("expected a number above 0, found {text}")))
+}

@@ -1,0 +1,170 @@
+//! `live`: sensors in, warnings out, until somebody asks for the end.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use umbracast::{Config, Error, Frame, Health, STEP_NS};
+use umbracast_eval::run::chain::{self, CIRCLE_M};
+use umbracast_live::receive::Door;
+use umbracast_live::record::RecordSettings;
+use umbracast_live::run::Counters;
+use umbracast_live::send::{self, Sent};
+use umbracast_live::{HostClock, Live, Settings, Summary};
+use umbracast_sim::crowd;
+use umbracast_sim::scene::Scene;
+use umbracast_sim::sensor::Sensors;
+
+use crate::args::{self, Common, RecordArgs};
+use crate::ending::Ending;
+use crate::input;
+use crate::page::Page;
+use crate::run_json::{RunJson, Stopwatch};
+use crate::setup::{self, TEST_SEED};
+use crate::{say, signal};
+
+/// A demonstration's people walk so long before others take their place.
+const DEMO_S: u64 = 300;
+/// How often the end may be asked for.
+const TICK: Duration = Duration::from_millis(50);
+
+/// Runs until the end is asked for, then says how it went.
+pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
+    let config = setup::config(args.mode, args.site.site.as_deref())?;
+    let asked = signal::asked_to_end()?;
+    let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
+    let sensors = config.site.sensors.len();
+    let settings = Settings {
+        weights: Some(setup::weights(args.weights.as_deref())?),
+        empty: empty_frames(args, &config)?,
+        // A demonstration takes free ports: nobody is disturbed who listens already.
+        doors: (0..sensors).map(|sensor| door(sensor, if args.demo { 0 } else { args.port })).collect(),
+        record: recorder(&args.record),
+        config: config.clone(),
+        clock,
+        counters: counters.clone(),
+    };
+    let title = if args.demo { format!("{}, simulated", config.site.name) } else { config.site.name.clone() };
+    let page = Page::open(&args.page, &config.site, &counters, clock, &title)?;
+    let live = Live::start(settings, page.listener())?;
+    for (sensor, address) in config.site.sensors.iter().zip(live.receivers().bound()) {
+        say::line(format_args!("{}: UDP port {}", sensor.name, address.port()));
+    }
+    let demo = args
+        .demo
+        .then(|| demonstration(args, &config, live.receivers().bound(), clock, &asked))
+        .transpose()?;
+    let watch = Stopwatch::start();
+    while !asked.load(Ordering::Relaxed) && args.seconds.is_none_or(|seconds| watch.seconds() < seconds) {
+        std::thread::sleep(TICK);
+        if !live.is_well() {
+            return Err(Error::new("a thread of the pipeline ended; this is a bug"));
+        }
+    }
+    asked.store(true, Ordering::Relaxed);
+    let sent = demo.and_then(|demo| demo.join().ok()).transpose()?;
+    let summary = live.stop();
+    page.close();
+    Ok(tell(&summary, sent, &watch, common))
+}
+
+fn door(sensor: usize, first_port: u16) -> Door {
+    let port = if first_port == 0 { 0 } else { first_port.saturating_add(sensor as u16) };
+    Door { sensor, port, from: None }
+}
+
+fn recorder(args: &RecordArgs) -> Option<RecordSettings> {
+    args.record.as_ref().map(|folder: &PathBuf| RecordSettings {
+        folder: folder.clone(),
+        file_bytes: args.record_mb << 20,
+        file_s: args.record_minutes * 60,
+        keep: args.record_keep,
+    })
+}
+
+/// The hall without people, as given; a demonstration simulates it.
+fn empty_frames(args: &args::Live, config: &Config) -> Result<Vec<Frame>, Error> {
+    match (&args.empty, args.demo) {
+        (Some(path), _) => {
+            input::empty_frames(path, config, &mut Health::default()).map(|(frames, _)| frames)
+        }
+        (None, true) => chain::empty_frames(&config.site, TEST_SEED),
+        (None, false) => Ok(Vec::new()),
+    }
+}
+
+/// Simulated sensors, from a thread of their own.
+fn demonstration(
+    args: &args::Live,
+    config: &Config,
+    to: &[SocketAddr],
+    clock: HostClock,
+    stop: &Arc<AtomicBool>,
+) -> Result<JoinHandle<Result<Sent, Error>>, Error> {
+    let (site, stop) = (config.site.clone(), stop.clone());
+    let (preset, people) = (args.crowd.preset, args.crowd.people);
+    let seed = args.crowd.seed.unwrap_or(TEST_SEED);
+    let to: Vec<SocketAddr> =
+        to.iter().map(|at| SocketAddr::from((Ipv4Addr::LOCALHOST, at.port()))).collect();
+    let sensors = Sensors::new(&site, seed)?;
+    Ok(std::thread::spawn(move || {
+        let mut sent = Sent::default();
+        for seed in seed.. {
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
+            let first = send::frame_of_hour(clock.now_ns());
+            let crowd =
+                crowd::strolling(preset, people, CIRCLE_M, seed, DEMO_S).later(first as i64 * STEP_NS);
+            let scene = Scene::in_hall(crowd, &site, &sensors, seed).starting_at(first);
+            let more = send::send(send::simulated(scene), &to, 1.0, clock, &stop)?;
+            sent.packets += more.packets;
+            sent.failed += more.failed;
+            sent.latest_ns = sent.latest_ns.max(more.latest_ns);
+        }
+        Ok(sent)
+    }))
+}
+
+fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Common) -> Ending {
+    let ms = |share: f64, of: &umbracast_live::latency::Latencies| of.quantile(share).as_secs_f64() * 1e3;
+    let (latency, step) = (&summary.latencies, &summary.steps);
+    let mut json = RunJson::new("live", watch)
+        .with("packets", summary.packets)
+        .with("packets_lost", summary.packets_lost)
+        .with("packets_of_strangers", summary.strangers)
+        .with("frames", summary.frames)
+        .with("frames_skipped", summary.frames_skipped)
+        .with("latency_ms_median", ms(0.5, latency))
+        .with("latency_ms_p99", ms(0.99, latency))
+        .with("latency_ms_max", latency.longest().as_secs_f64() * 1e3)
+        .with("step_ms_median", ms(0.5, step))
+        .with("step_ms_p99", ms(0.99, step))
+        .with("health", summary.health)
+        .with("recorder", &summary.recorded);
+    if let Some(sent) = sent {
+        json = json.with("packets_sent", sent.packets).with("sent_late_ms_max", sent.latest_ns as f64 * 1e-6);
+    }
+    let text = format!(
+        "{} frames of {} packets in {:.1} s: {:.2} ms from the last packet to the warning (median), {:.2} ms (99 %)",
+        summary.frames,
+        summary.packets,
+        watch.seconds(),
+        ms(0.5, latency),
+        ms(0.99, latency)
+    );
+    json.print(common, &text);
+    let lost = [
+        (summary.packets_lost, "packets given up"),
+        (summary.frames_skipped, "frames skipped"),
+        (summary.recorded.lost, "packets and results not recorded"),
+    ];
+    let told: Vec<String> =
+        lost.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+    let failing = summary.recorded.failing.iter().cloned();
+    let told: Vec<String> = told.into_iter().chain(failing).collect();
+    if told.is_empty() { Ending::Done } else { Ending::DataLost(told.join("; ")) }
+}

@@ -1,0 +1,76 @@
+//! `replay`: the packets of recordings over UDP, at the pace they came.
+
+use std::net::SocketAddr;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, mpsc};
+
+use umbracast::lidar::Packet;
+use umbracast::{Error, Mode};
+use umbracast_live::HostClock;
+use umbracast_live::receive::Arrived;
+use umbracast_live::send;
+
+use crate::args::{Common, ReplayPackets};
+use crate::ending::Ending;
+use crate::input;
+use crate::run_json::{RunJson, Stopwatch};
+use crate::{setup, signal};
+
+/// Packets that are read ahead.
+const AHEAD: usize = 4096;
+
+/// Sends everything, each sensor's packets to a port of its own.
+pub fn run(args: &ReplayPackets, common: &Common) -> Result<Ending, Error> {
+    let inputs = input::scenes(&args.inputs)?;
+    let mut site = setup::config(Mode::Default, args.site.site.as_deref())?.site;
+    if args.site.site.is_none() {
+        site = input::recorded_site(&inputs)?.unwrap_or(site);
+    }
+    let to: Vec<SocketAddr> =
+        (0..site.sensors.len()).filter_map(|sensor| address_of(sensor, &args.to)).collect();
+    let asked: Arc<AtomicBool> = signal::asked_to_end()?;
+    let watch = Stopwatch::start();
+    let (packets, coming) = mpsc::sync_channel(AHEAD);
+    let reading = std::thread::spawn(move || -> Result<Vec<String>, Error> {
+        let mut lost = Vec::new();
+        for input in &inputs {
+            let told = input.packets(&site, |sensor, packet: Packet| {
+                packets.send(Arrived { sensor, packet }).map_err(|_| Error::new("asked to end"))
+            });
+            match told {
+                Ok(told) => lost.extend(told),
+                Err(error) if error.to_string().contains("asked to end") => break,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(lost)
+    });
+    let sent = send::send(coming.into_iter(), &to, args.rate, HostClock::start(), &asked)?;
+    let lost = reading.join().unwrap_or_else(|_| Err(Error::new("the reader ended; this is a bug")))?;
+    let summary = RunJson::new("replay", &watch)
+        .with("packets", sent.packets)
+        .with("failed", sent.failed)
+        .with("late_ms_max", sent.latest_ns as f64 * 1e-6);
+    summary.print(common, &format!("{} packets sent in {:.1} s", sent.packets, watch.seconds()));
+    if lost.is_empty() { Ok(Ending::Done) } else { Ok(Ending::DataLost(lost.join("; "))) }
+}
+
+/// Where a sensor's packets go: see `--to`.
+fn address_of(sensor: usize, to: &[SocketAddr]) -> Option<SocketAddr> {
+    to.get(sensor).copied().or_else(|| {
+        let (last, further) = (to.last()?, (sensor + 1).saturating_sub(to.len()));
+        Some(SocketAddr::new(last.ip(), last.port().saturating_add(further as u16)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sensors_without_an_address_follow_the_last_one() {
+        let to: Vec<SocketAddr> = vec!["10.0.0.1:7502".parse().unwrap(), "10.0.0.2:2368".parse().unwrap()];
+        let found: Vec<String> = (0..4).filter_map(|s| address_of(s, &to)).map(|at| at.to_string()).collect();
+        assert_eq!(found, ["10.0.0.1:7502", "10.0.0.2:2368", "10.0.0.2:2369", "10.0.0.2:2370"]);
+    }
+}

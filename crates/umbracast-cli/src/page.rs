@@ -1,0 +1,81 @@
+//! The page of `live` and `view`, where this program was built with it.
+
+use std::sync::Arc;
+
+use umbracast::{Error, Site};
+use umbracast_live::run::Counters;
+use umbracast_live::{HostClock, Published};
+
+use crate::args::PageArgs;
+
+/// What gives frames to the page; to nobody where there is none.
+#[derive(Default)]
+pub struct Page {
+    #[cfg(feature = "serve")]
+    server: Option<umbracast_live::serve::Server>,
+}
+
+impl Page {
+    /// Begins to serve, unless asked not to.
+    ///
+    /// # Errors
+    /// An address that is taken, or that needs a token.
+    #[cfg(feature = "serve")]
+    pub fn open(
+        args: &PageArgs,
+        site: &Site,
+        counters: &Arc<Counters>,
+        clock: HostClock,
+        title: &str,
+    ) -> Result<Self, Error> {
+        if args.no_serve {
+            return Ok(Self::default());
+        }
+        let watched = umbracast_live::serve::Watched {
+            site: site.clone(),
+            counters: counters.clone(),
+            clock,
+            title: title.to_owned(),
+        };
+        let token = std::env::var("UMBRACAST_TOKEN").ok().filter(|token| !token.is_empty());
+        let server = umbracast_live::serve::start(args.serve, token, watched)?;
+        crate::say::line(format_args!("page: http://{}/", server.address()));
+        Ok(Self { server: Some(server) })
+    }
+
+    /// Says that there is none.
+    ///
+    /// # Errors
+    /// None.
+    #[cfg(not(feature = "serve"))]
+    pub fn open(
+        args: &PageArgs,
+        _site: &Site,
+        _counters: &Arc<Counters>,
+        _clock: HostClock,
+        _title: &str,
+    ) -> Result<Self, Error> {
+        if !args.no_serve {
+            crate::say::note("no page: this program was built without the feature `serve`");
+        }
+        Ok(Self::default())
+    }
+
+    /// For the thread that makes frames.
+    pub fn listener(&self) -> umbracast_live::run::Listener {
+        #[cfg(feature = "serve")]
+        if let Some(server) = &self.server {
+            let publisher = server.publisher();
+            return Box::new(move |published: &Arc<Published>| publisher.publish(published));
+        }
+        Box::new(|_: &Arc<Published>| {})
+    }
+
+    /// Closes it.
+    pub fn close(self) {
+        #[cfg(feature = "serve")]
+        if let Some(server) = self.server {
+            server.stop();
+        }
+    }
+}

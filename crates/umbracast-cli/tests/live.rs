@@ -1,0 +1,161 @@
+//! Live as a user meets it: packets over loopback, a recording, and the same results from it again.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+use umbracast_io::recording::{Entry, RecordingReader};
+use umbracast_io::rows::{DetectionRow, LinkRow, TrackRow};
+use umbracast_io::tables;
+use umbracast_io::wire::{self, WireRow};
+
+fn umbracast(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_umbracast"));
+    command.args(arguments);
+    command
+}
+
+fn done(arguments: &[&str]) {
+    let output = umbracast(arguments).arg("--quiet").output().expect("starts");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder for the test");
+    folder
+}
+
+/// A live run that listens on free ports.
+struct Live {
+    child: Child,
+    said: BufReader<ChildStdout>,
+    ports: Vec<String>,
+}
+
+impl Live {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = umbracast(&["live", "--port", "0", "--no-serve", "--json"])
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("starts");
+        let mut said = BufReader::new(child.stdout.take().expect("piped"));
+        let port = |_| {
+            let mut line = String::new();
+            said.read_line(&mut line).expect("a line");
+            line.trim().rsplit(' ').next().expect("a port").to_owned()
+        };
+        let ports = (0..2).map(port).collect();
+        Self { child, said, ports }
+    }
+
+    /// Asks for the end as a service manager does; gives the summary.
+    fn stop(mut self) -> serde_json::Value {
+        let pid = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-TERM", &pid]).status().expect("kill").success());
+        let mut text = String::new();
+        self.said.read_to_string(&mut text).expect("a summary");
+        self.child.wait().expect("ends");
+        serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}"))
+    }
+}
+
+fn recording_in(folder: &Path) -> PathBuf {
+    fs::read_dir(folder).expect("recordings").next().expect("one").expect("readable").path()
+}
+
+fn recorded<R: WireRow>(file: &Path, access_points: &[String]) -> Vec<R> {
+    let mut reader = RecordingReader::open(file).expect("opens");
+    let mut rows = Vec::new();
+    while let Some(entry) = reader.next_entry().expect("reads") {
+        if let Entry::Other(topic, _, message) = entry
+            && topic == R::TOPIC
+        {
+            rows.extend(wire::decode::<R>(&message, access_points).expect("a message of ours").2);
+        }
+    }
+    rows
+}
+
+#[test]
+fn live_and_replayed_results_are_the_same_to_the_byte() {
+    let folder = folder("live-and-replayed");
+    let text = |path: &Path| path.to_str().expect("a plain name").to_owned();
+    let (sim, out) = (text(&folder.join("sim")), text(&folder.join("out")));
+    fs::write(folder.join("crossing.csv"), CROSSING).expect("writes");
+    done(&["simulate", "--trajectories", &text(&folder.join("crossing.csv")), "--seed", "7", "--out", &sim]);
+    let (scene, empty) = (format!("{sim}/scene-0000.mcap"), format!("{sim}/empty.mcap"));
+    // A busy machine may skip a frame, which a replay does not: then once more, more slowly.
+    let (recording, summary) = (["1", "0.5", "0.25", "0.1"].iter())
+        .find_map(|rate| {
+            let records = folder.join(format!("records-{rate}"));
+            let live = Live::start(&["--empty", &empty, "--record", &text(&records)]);
+            let to = live.ports.iter().map(|port| format!("127.0.0.1:{port}")).collect::<Vec<_>>().join(",");
+            done(&["replay", &scene, "--to", &to, "--rate", rate]);
+            let summary = live.stop();
+            let whole = summary["frames_skipped"] == 0 && summary["recorder"]["lost"] == 0;
+            whole.then(|| (recording_in(&records), summary))
+        })
+        .expect("a run without a skipped frame");
+    assert!(summary["frames"].as_u64().expect("a count") >= 30, "{summary}");
+
+    done(&["run", &text(&recording), "--empty", &empty, "--out", &out]);
+    let access_points = ["side".to_owned(), "centre".to_owned()];
+    let tables = |name: &str| format!("{name}: rows of the table and of the recording");
+    let out = Path::new(&out);
+    let tracks = recorded::<TrackRow>(&recording, &access_points);
+    assert!(tracks.len() > 40, "{} tracks", tracks.len());
+    assert!(tables::read::<TrackRow>(out, &access_points).unwrap() == tracks, "{}", tables("tracks"));
+    let links = recorded::<LinkRow>(&recording, &access_points);
+    assert!(links.iter().any(|link| link.blocked_now), "somebody crosses in front of the access point");
+    assert!(tables::read::<LinkRow>(out, &access_points).unwrap() == links, "{}", tables("links"));
+    let detections = recorded::<DetectionRow>(&recording, &access_points);
+    assert!(
+        tables::read::<DetectionRow>(out, &access_points).unwrap() == detections,
+        "{}",
+        tables("detections")
+    );
+}
+
+/// Two people who cross in front of the `side` access point, for three seconds.
+const CROSSING: &str = "t_s,id,x_m,y_m,height_m\n\
+    0.0,1,6.0,-2.0,1.80\n1.0,1,6.0,-0.7,1.80\n2.0,1,6.0,0.6,1.80\n3.0,1,6.0,1.9,1.80\n\
+    0.0,2,1.0,0.3,1.70\n1.0,2,0.0,0.3,1.70\n2.0,2,-1.0,0.3,1.70\n3.0,2,-2.0,0.3,1.70\n";
+
+#[test]
+fn a_recording_of_a_killed_run_opens_with_all_but_its_last_chunk() {
+    let folder = folder("killed");
+    let text = |path: &Path| path.to_str().expect("a plain name").to_owned();
+    let records = folder.join("records");
+    let mut live = umbracast(&["live", "--demo", "--people", "2", "--no-serve", "--quiet"])
+        .args(["--record", &text(&records)])
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("starts");
+    let bytes = || {
+        fs::read_dir(&records)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|file| file.metadata().map_or(0, |m| m.len()))
+            .sum::<u64>()
+    };
+    while bytes() < 6_000_000 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        assert!(live.try_wait().expect("a child").is_none(), "ended by itself");
+    }
+    live.kill().expect("kills"); // SIGKILL: nothing is written after it.
+    live.wait().expect("ends");
+    let mut reader = RecordingReader::open(&recording_in(&records)).expect("opens");
+    let mut packets = 0;
+    while let Some(entry) = reader.next_entry().expect("reads") {
+        if let Entry::Packets(_, some) = entry {
+            packets += some.len();
+        }
+    }
+    // Four of the six megabytes at least: a chunk has less than one, and a second is flushed.
+    assert!(packets * 1206 > 4_000_000, "{packets} packets");
+}

@@ -1,0 +1,27 @@
+//! Umbracast live: the one place with sockets, threads and the time of day.
+//!
+//! ```text
+//! sockets  -> packets -> assembler -> frames -> pipeline -> what was published -> page, events, metrics
+//! (receive)              (frames)               (run)    \-> recorder           (serve)
+//!                            \-> recorder (raw packets)
+//! ```
+//!
+//! Every arrow is a [`queue::Queue`] of bounded length with a rule for when it is full: in front of the pipeline the
+//! newest frame wins, the recorder never delays anybody, and what is lost is counted. The stages are those of the
+//! runtime, called with the same frames as from a file: a recording gives the same results again, to the byte.
+
+pub mod clock;
+pub mod queue;
+pub mod latency;
+pub mod receive;
+pub mod published;
+pub mod warnings;
+pub mod record;
+pub mod run;
+pub mod send;
+#[cfg(feature = "serve")]
+pub mod serve;
+
+pub use clock::HostClock;
+pub use published::Published;
+pub use run::{Live, Settings, Summary};

@@ -1,0 +1,88 @@
+//! What leaves the pipeline of one frame: the rows that tables have, the points that are drawn, and how old it is.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use umbracast::{Health, Outcome};
+use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
+use umbracast_io::wire;
+
+use crate::warnings::Event;
+
+/// Points beyond this are drawn by nobody: every n-th is kept.
+const POINTS_DRAWN: usize = 4000;
+
+/// One frame's results. Shared, never changed.
+#[derive(Debug, Clone, Default)]
+pub struct Published {
+    /// Counts from the first packet.
+    pub frame: u64,
+    /// The end of the frame, in the time of the sensors.
+    pub time_ns: i64,
+    /// When it was published, host time.
+    pub published_ns: i64,
+    /// From the last packet of the frame to this.
+    pub latency: Duration,
+    /// Of the stages alone.
+    pub step: Duration,
+    /// Everybody seen.
+    pub detections: Vec<DetectionRow>,
+    /// Everybody followed, with where they will be.
+    pub tracks: Vec<TrackRow>,
+    /// Every link.
+    pub links: Vec<LinkRow>,
+    /// What changed of the links.
+    pub events: Vec<Event>,
+    /// New points, site frame, centimetres.
+    pub points_cm: Vec<[i16; 3]>,
+    /// Of assembler and stages since the start.
+    pub health: Health,
+    /// Frames since the start that were given up because the pipeline was busy.
+    pub frames_skipped: u64,
+    /// For each sensor, whether it gave anything to this frame.
+    pub sensors: Vec<bool>,
+}
+
+impl Published {
+    /// The rows and points of an outcome.
+    pub fn of(outcome: &Outcome) -> Self {
+        let (mut tracks, mut links) = (Vec::new(), Vec::new());
+        rows::of_outcome(0, outcome, &mut tracks, &mut links);
+        let every = outcome.foreground.len().div_ceil(POINTS_DRAWN).max(1);
+        let in_cm = |value_m: f64| (value_m * 100.0).round() as i16; // Saturates beyond 327 m.
+        Self {
+            frame: outcome.frame,
+            time_ns: outcome.time_ns,
+            detections: rows::detections(0, outcome).collect(),
+            tracks,
+            links,
+            points_cm: (outcome.foreground.iter().step_by(every))
+                .map(|point| point.position_m.to_array().map(in_cm))
+                .collect(),
+            health: outcome.health,
+            ..Self::default()
+        }
+    }
+
+    /// As the page, `curl` and every client get it. Names are those of the tables.
+    pub fn json(&self, access_points: &[String], with_points: bool) -> Value {
+        let ms = |time: Duration| (time.as_secs_f64() * 1e6).round() / 1e3;
+        let mut value = json!({
+            "frame": self.frame,
+            "time_ns": self.time_ns,
+            "published_ns": self.published_ns,
+            "latency_ms": ms(self.latency),
+            "step_ms": ms(self.step),
+            "frames_skipped": self.frames_skipped,
+            "sensors": self.sensors,
+            "health": self.health,
+            "tracks": self.tracks.iter().map(|&row| wire::json(row, access_points)).collect::<Vec<_>>(),
+            "blockages": self.links.iter().map(|&row| wire::json(row, access_points)).collect::<Vec<_>>(),
+            "events": self.events.iter().map(|event| event.json(access_points)).collect::<Vec<_>>(),
+        });
+        if with_points {
+            value["points_cm"] = json!(self.points_cm.as_flattened());
+        }
+        value
+    }
+}

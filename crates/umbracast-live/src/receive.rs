@@ -1,0 +1,192 @@
+//! Sensors over UDP: a socket and a thread for each port, packets told apart by the address they come from.
+
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use socket2::{Domain, Protocol, Socket, Type};
+use umbracast::Error;
+use umbracast::lidar::Packet;
+
+use crate::clock::HostClock;
+use crate::queue::Queue;
+
+/// What the system shall hold for us while we are not scheduled: 4 MiB are two HDL-32E for 0.9 s. The system may give
+/// less (`net.core.rmem_max`).
+const SOCKET_BUFFER_BYTES: usize = 4 << 20;
+/// How long a stop may go unnoticed.
+const WAKE: Duration = Duration::from_millis(100);
+/// A UDP payload cannot be longer.
+const LONGEST_BYTES: usize = 65_536;
+
+/// Where a sensor's packets come in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Door {
+    /// The sensor's place in the site.
+    pub sensor: usize,
+    /// UDP port on this host.
+    pub port: u16,
+    /// The sensor's own address; none takes whatever comes in on the port.
+    pub from: Option<IpAddr>,
+}
+
+/// A packet and whose it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arrived {
+    /// The sensor's place in the site.
+    pub sensor: usize,
+    /// With the time that it came.
+    pub packet: Packet,
+}
+
+/// Threads that receive until they are told to stop.
+#[derive(Debug)]
+pub struct Receivers {
+    threads: Vec<JoinHandle<()>>,
+    stop: Arc<AtomicBool>,
+    /// Packets from addresses that no sensor has.
+    strangers: Arc<AtomicU64>,
+    /// Where the sockets are bound, in the order of the ports.
+    bound: Vec<SocketAddr>,
+}
+
+impl Receivers {
+    /// Opens every port and begins to receive. Port 0 takes a free one.
+    ///
+    /// # Errors
+    /// A port that is taken, and two sensors that cannot be told apart.
+    pub fn start(doors: &[Door], clock: HostClock, packets: &Arc<Queue<Arrived>>) -> Result<Self, Error> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let strangers = Arc::new(AtomicU64::new(0));
+        let mut of_port: BTreeMap<(u16, usize), Vec<Door>> = BTreeMap::new();
+        for (k, door) in doors.iter().enumerate() {
+            // Every free port is a port of its own.
+            let key = if door.port == 0 { (0, k) } else { (door.port, 0) };
+            of_port.entry(key).or_default().push(door.clone());
+        }
+        let mut receivers = Self { threads: Vec::new(), stop, strangers, bound: Vec::new() };
+        for ((port, _), doors) in of_port {
+            told_apart(port, &doors)?;
+            let socket = bind(port).map_err(|e| Error::new(format!("UDP port {port}: {e}")))?;
+            receivers.bound.push(socket.local_addr().map_err(|e| Error::new(e.to_string()))?);
+            let (stop, strangers) = (receivers.stop.clone(), receivers.strangers.clone());
+            let packets = packets.clone();
+            receivers.threads.push(std::thread::spawn(move || {
+                receive(&socket, &doors, clock, &packets, &stop, &strangers);
+            }));
+        }
+        Ok(receivers)
+    }
+
+    /// Where each port is open, in the order of the ports; free ones in the order of their sensors.
+    pub fn bound(&self) -> &[SocketAddr] {
+        &self.bound
+    }
+
+    /// Packets so far that came from no sensor's address.
+    pub fn strangers(&self) -> u64 {
+        self.strangers.load(Ordering::Relaxed)
+    }
+
+    /// Ends every thread.
+    pub fn stop(self) {
+        self.stop.store(true, Ordering::Relaxed);
+        for thread in self.threads {
+            let _ = thread.join(); // A receiver does not panic; if one did, the others end all the same.
+        }
+    }
+}
+
+fn told_apart(port: u16, doors: &[Door]) -> Result<(), Error> {
+    let unnamed = doors.len() > 1 && doors.iter().any(|door| door.from.is_none());
+    let twice = (1..doors.len()).any(|i| doors[..i].iter().any(|other| other.from == doors[i].from));
+    if unnamed || twice {
+        let sensors: Vec<String> = doors.iter().map(|door| door.sensor.to_string()).collect();
+        return Err(Error::new(format!(
+            "UDP port {port}: expected an address of its own for each of sensors {}, or a port of its own",
+            sensors.join(", ")
+        )));
+    }
+    Ok(())
+}
+
+fn bind(port: u16) -> std::io::Result<UdpSocket> {
+    let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
+    socket.set_recv_buffer_size(SOCKET_BUFFER_BYTES)?;
+    socket.bind(&SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).into())?;
+    socket.set_read_timeout(Some(WAKE))?;
+    Ok(socket.into())
+}
+
+fn receive(
+    socket: &UdpSocket,
+    doors: &[Door],
+    clock: HostClock,
+    packets: &Queue<Arrived>,
+    stop: &AtomicBool,
+    strangers: &AtomicU64,
+) {
+    let mut buffer = vec![0; LONGEST_BYTES];
+    while !stop.load(Ordering::Relaxed) {
+        match socket.recv_from(&mut buffer) {
+            Ok((length, from)) => {
+                let time_ns = clock.now_ns();
+                let own = |door: &&Door| door.from.is_none_or(|address| address == from.ip());
+                match doors.iter().find(own) {
+                    Some(door) => {
+                        let packet = Packet { time_ns, payload: buffer[..length].to_vec() };
+                        packets.push(Arrived { sensor: door.sensor, packet });
+                    }
+                    None => {
+                        strangers.fetch_add(1, Ordering::Relaxed);
+                    }
+                }
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            // An interface that went away comes back, or does not: no packet is no reason to end.
+            Err(_) => std::thread::sleep(WAKE),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::queue::WhenFull;
+
+    fn door(sensor: usize, port: u16, from: Option<[u8; 4]>) -> Door {
+        Door { sensor, port, from: from.map(IpAddr::from) }
+    }
+
+    #[test]
+    fn packets_on_one_port_are_told_apart_by_their_address_and_strangers_are_counted() {
+        let packets = Arc::new(Queue::new(16, WhenFull::DropNewest));
+        // A free port is known once it is bound: bound twice here, the second time with both sensors on it.
+        let port = UdpSocket::bind("0.0.0.0:0").unwrap().local_addr().unwrap().port();
+        let doors = [door(0, port, Some([127, 0, 0, 2])), door(1, port, Some([127, 0, 0, 3]))];
+        let receivers = Receivers::start(&doors, HostClock::start(), &packets).unwrap();
+        for last in [3, 2, 9] {
+            let sender = UdpSocket::bind(SocketAddr::from(([127, 0, 0, last], 0))).unwrap();
+            sender.send_to(&[last; 5], ("127.0.0.1", port)).unwrap();
+        }
+        let two: Vec<Arrived> = (0..2).filter_map(|_| packets.pop()).collect();
+        assert_eq!((two[0].sensor, &two[0].packet.payload[..]), (1, &[3; 5][..]));
+        assert_eq!((two[1].sensor, &two[1].packet.payload[..]), (0, &[2; 5][..]));
+        while receivers.strangers() == 0 {
+            std::thread::yield_now();
+        }
+        receivers.stop();
+    }
+
+    #[test]
+    fn sensors_that_cannot_be_told_apart_are_refused() {
+        let packets = Arc::new(Queue::new(1, WhenFull::DropNewest));
+        let doors = [door(0, 2368, None), door(1, 2368, Some([10, 0, 0, 1]))];
+        let message = Receivers::start(&doors, HostClock::start(), &packets).unwrap_err().to_string();
+        assert!(message.contains("2368") && message.contains("sensors 0, 1"), "{message}");
+    }
+}

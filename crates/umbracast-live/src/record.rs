@@ -1,0 +1,362 @@
+//! The recorder: raw packets and results into MCAP files, on a thread of its own that delays nobody.
+
+use std::collections::VecDeque;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, SystemTime};
+
+use serde::Serialize;
+use umbracast::lidar::Packet;
+use umbracast::{Config, Error, STEP_NS};
+use umbracast_io::recording::RecordingWriter;
+
+use crate::published::Published;
+use crate::queue::{Queue, WhenFull};
+use crate::receive::Arrived;
+
+/// Half a second of two HDL-32E, 1800 packets a second each, and their results.
+const WAITING: usize = 2048;
+/// After a write that failed the disk is tried again so much later.
+const RETRY_NS: i64 = 5_000_000_000;
+/// What is younger than this is lost when the program is killed.
+const FLUSH_NS: i64 = 1_000_000_000;
+
+/// How recordings are kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordSettings {
+    /// The folder they go to.
+    pub folder: PathBuf,
+    /// A file is closed when it has so many bytes,
+    pub file_bytes: u64,
+    /// or has gone on for so long.
+    pub file_s: u64,
+    /// The oldest are deleted beyond so many; none are without.
+    pub keep: Option<usize>,
+}
+
+/// What a recorder did so far.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct RecordStatus {
+    /// Files begun.
+    pub files: u64,
+    /// Bytes of packets and results handed to the disk.
+    pub bytes: u64,
+    /// Packets and results that came while the queue was full or the disk failed.
+    pub lost: u64,
+    /// What the disk said last, while it fails.
+    pub failing: Option<String>,
+}
+
+enum Item {
+    Packet(Arrived),
+    Result(Arc<Published>),
+}
+
+/// The thread's handle. Whoever records only pushes.
+pub struct Recorder {
+    queue: Arc<Queue<Item>>,
+    status: Arc<Mutex<RecordStatus>>,
+    thread: JoinHandle<()>,
+}
+
+impl Recorder {
+    /// Makes the folder and begins; how it goes stands in `status` from then on.
+    ///
+    /// # Errors
+    /// A folder that cannot be made.
+    pub fn start(
+        settings: RecordSettings,
+        config: &Config,
+        status: Arc<Mutex<RecordStatus>>,
+    ) -> Result<Self, Error> {
+        let folder = &settings.folder;
+        fs::create_dir_all(folder).map_err(|e| Error::new(e.to_string()).within(folder.display()))?;
+        let queue = Arc::new(Queue::new(WAITING, WhenFull::DropNewest));
+        let mut files = Files::new(settings, config.clone());
+        let (items, shared) = (queue.clone(), status.clone());
+        let thread = std::thread::spawn(move || {
+            let tell = |files: &Files| {
+                let status = RecordStatus { lost: files.status.lost + items.lost(), ..files.status.clone() };
+                *shared.lock().unwrap_or_else(PoisonError::into_inner) = status;
+            };
+            while let Some(item) = items.pop() {
+                files.take(item);
+                tell(&files);
+            }
+            files.close();
+            tell(&files);
+        });
+        Ok(Self { queue, status, thread })
+    }
+
+    /// A packet, in the order in which the assembler got it.
+    pub fn packet(&self, packet: Arrived) {
+        self.queue.push(Item::Packet(packet));
+    }
+
+    /// A frame's results.
+    pub fn result(&self, published: Arc<Published>) {
+        self.queue.push(Item::Result(published));
+    }
+
+    /// Writes what waits, and ends the file.
+    pub fn stop(self) -> RecordStatus {
+        self.queue.close();
+        let _ = self.thread.join(); // What it did stands in the status, also if it panicked.
+        self.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// The files, one after the other. Lives in the recorder's thread.
+struct Files {
+    settings: RecordSettings,
+    config: Config,
+    status: RecordStatus,
+    open: Option<Open>,
+    /// Those of the folder that are ours, the oldest first.
+    ours: VecDeque<PathBuf>,
+    /// No new file before this, after one that failed.
+    not_before_ns: i64,
+    /// Of one frame's length, by sensor: a message each.
+    batch: Vec<Vec<Packet>>,
+    batch_start_ns: Option<i64>,
+}
+
+struct Open {
+    writer: RecordingWriter,
+    started_ns: i64,
+    flushed_ns: i64,
+    bytes: u64,
+}
+
+impl Files {
+    fn new(settings: RecordSettings, config: Config) -> Self {
+        let batch = vec![Vec::new(); config.site.sensors.len()];
+        let ours = recordings_in(&settings.folder, &config.site.name);
+        let (status, open) = (RecordStatus::default(), None);
+        Self { settings, config, status, open, ours, not_before_ns: i64::MIN, batch, batch_start_ns: None }
+    }
+
+    fn take(&mut self, item: Item) {
+        match item {
+            Item::Packet(Arrived { sensor, packet }) => {
+                let start_ns = *self.batch_start_ns.get_or_insert(packet.time_ns);
+                if packet.time_ns - start_ns >= STEP_NS {
+                    self.write_batch();
+                    self.batch_start_ns = Some(packet.time_ns);
+                }
+                if let Some(batch) = self.batch.get_mut(sensor) {
+                    batch.push(packet);
+                }
+            }
+            Item::Result(published) => {
+                let (frame, sensor_time_ns) = (published.frame, published.time_ns);
+                let bytes = 700 * published.tracks.len() + 250 * published.links.len();
+                self.write(published.published_ns, bytes as u64, 1, |writer| {
+                    writer.write_rows(sensor_time_ns, frame, &published.detections)?;
+                    writer.write_rows(sensor_time_ns, frame, &published.tracks)?;
+                    writer.write_rows(sensor_time_ns, frame, &published.links)
+                });
+            }
+        }
+    }
+
+    fn write_batch(&mut self) {
+        let mut batch = std::mem::take(&mut self.batch);
+        let count: u64 = batch.iter().map(|packets| packets.len() as u64).sum();
+        let bytes: usize = batch.iter().flatten().map(|packet| packet.payload.len() + 8).sum();
+        if let Some(time_ns) = batch.iter().flatten().map(|packet| packet.time_ns).max() {
+            self.write(time_ns, bytes as u64, count, |writer| writer.write_packets(time_ns, &batch));
+        }
+        batch.iter_mut().for_each(Vec::clear);
+        self.batch = batch;
+    }
+
+    /// Writes into the file of that time. A disk that fails is told and tried again later; what came meanwhile is
+    /// lost, what was written stays.
+    fn write(
+        &mut self,
+        now_ns: i64,
+        bytes: u64,
+        items: u64,
+        write: impl FnOnce(&mut RecordingWriter) -> Result<(), Error>,
+    ) {
+        let written = self.file_for(now_ns).and_then(|open| {
+            write(&mut open.writer)?;
+            open.bytes += bytes;
+            if now_ns - open.flushed_ns >= FLUSH_NS {
+                open.flushed_ns = now_ns;
+                open.writer.flush()?;
+            }
+            Ok(())
+        });
+        match written {
+            Ok(()) => {
+                self.status.bytes += bytes;
+                self.status.failing = None;
+            }
+            Err(error) => {
+                self.status.lost += items;
+                if self.open.take().is_some() || self.not_before_ns <= now_ns {
+                    self.not_before_ns = now_ns + RETRY_NS;
+                }
+                self.status.failing = Some(error.to_string());
+            }
+        }
+    }
+
+    /// The open file, or a new one where it is full or there is none.
+    fn file_for(&mut self, now_ns: i64) -> Result<&mut Open, Error> {
+        let full = |open: &Open| {
+            let s = (now_ns - open.started_ns) / 1_000_000_000;
+            open.bytes >= self.settings.file_bytes || s >= self.settings.file_s as i64
+        };
+        if self.open.as_ref().is_some_and(full) {
+            self.finish_file();
+        }
+        if self.open.is_none() {
+            if now_ns < self.not_before_ns {
+                let told = self.status.failing.clone().unwrap_or_default();
+                return Err(Error::new(told));
+            }
+            self.make_room();
+            let path = self.settings.folder.join(format!("{}-{}.mcap", self.config.site.name, stamp(now_ns)));
+            let toml = self.config.to_toml();
+            let mut writer = RecordingWriter::create_live(&path, &toml, &self.config.site)?;
+            writer.flush()?;
+            self.ours.push_back(path);
+            self.status.files += 1;
+            self.open = Some(Open { writer, started_ns: now_ns, flushed_ns: now_ns, bytes: 0 });
+        }
+        self.open.as_mut().ok_or_else(|| Error::new("no open file"))
+    }
+
+    fn finish_file(&mut self) {
+        if let Some(Err(error)) = self.open.take().map(|open| open.writer.finish()) {
+            self.status.failing = Some(error.to_string());
+        }
+    }
+
+    /// Deletes the oldest, only where that was asked for.
+    fn make_room(&mut self) {
+        let Some(keep) = self.settings.keep else { return };
+        while self.ours.len() >= keep.max(1) {
+            let Some(oldest) = self.ours.pop_front() else { return };
+            if let Err(error) = fs::remove_file(&oldest) {
+                self.status.failing =
+                    Some(Error::new(error.to_string()).within(oldest.display()).to_string());
+            }
+        }
+    }
+
+    fn close(&mut self) {
+        self.write_batch();
+        self.finish_file();
+    }
+}
+
+/// Recordings of that site in a folder, the oldest first: their names hold the time.
+fn recordings_in(folder: &Path, site: &str) -> VecDeque<PathBuf> {
+    let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let ours = |path: &PathBuf| {
+        let name = name(path).unwrap_or_default();
+        let time = name.strip_prefix(site).and_then(|rest| rest.strip_prefix('-')?.strip_suffix(".mcap"));
+        time.is_some_and(|time| time.bytes().all(|b| b.is_ascii_digit() || b"TZ.".contains(&b)))
+    };
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut found: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(ours).collect();
+    found.sort();
+    found.into()
+}
+
+/// A time as a file's name holds it: `20261122T070503.250Z`.
+fn stamp(time_ns: i64) -> String {
+    let time = SystemTime::UNIX_EPOCH + Duration::from_nanos(time_ns.max(0) as u64);
+    humantime::format_rfc3339_millis(time).to_string().replace(['-', ':'], "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use umbracast_io::recording::{Entry, RecordingReader};
+
+    const START_NS: i64 = 1_795_330_000_000_000_000;
+
+    fn settings(folder: &Path) -> RecordSettings {
+        RecordSettings { folder: folder.to_owned(), file_bytes: u64::MAX, file_s: 3600, keep: None }
+    }
+
+    fn arrived(k: i64) -> Arrived {
+        let payload = vec![k as u8; umbracast_io::messages::PACKET_BYTES];
+        Arrived { sensor: (k % 2) as usize, packet: Packet { time_ns: START_NS + k * 1_000_000, payload } }
+    }
+
+    /// Times of the packets in a file, in its order.
+    fn times(path: &Path) -> Vec<i64> {
+        let mut reader = RecordingReader::open(path).unwrap();
+        let mut times = Vec::new();
+        while let Some(entry) = reader.next_entry().unwrap() {
+            if let Entry::Packets(_, packets) = entry {
+                times.extend(packets.iter().map(|packet| packet.time_ns));
+            }
+        }
+        times
+    }
+
+    #[test]
+    fn times_are_written_as_dates() {
+        assert_eq!(stamp(0), "19700101T000000.000Z");
+        assert_eq!(stamp(951_782_400_000_000_000), "20000229T000000.000Z");
+        assert_eq!(stamp(1_795_330_000_123_000_000), "20261122T065320.123Z");
+    }
+
+    #[test]
+    fn every_packet_is_in_the_files_and_files_roll_over_by_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let recorder = Recorder::start(
+            RecordSettings { file_s: 1, ..settings(folder.path()) },
+            &Config::default(),
+            Arc::default(),
+        )
+        .unwrap();
+        for k in 0..1900 {
+            recorder.packet(arrived(k));
+        }
+        let status = recorder.stop();
+        assert_eq!((status.files, status.failing), (2, None));
+        let files = recordings_in(folder.path(), "default");
+        let mut found: Vec<i64> = files.iter().flat_map(|file| times(file)).collect();
+        found.sort_unstable();
+        assert_eq!(found.len() as u64 + status.lost, 1900);
+        assert!(found.len() > 1000 || status.lost > 0);
+    }
+
+    #[test]
+    fn the_oldest_is_deleted_only_where_that_was_asked_for() {
+        for (keep, left) in [(None, 4), (Some(2), 2)] {
+            let folder = tempfile::tempdir().unwrap();
+            let mut files =
+                Files::new(RecordSettings { file_s: 1, keep, ..settings(folder.path()) }, Config::default());
+            (0..40).for_each(|k| files.take(Item::Packet(arrived(k * 100))));
+            files.close();
+            assert_eq!(recordings_in(folder.path(), "default").len(), left);
+        }
+    }
+
+    #[test]
+    fn a_disk_that_fails_is_told_and_tried_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let gone = folder.path().join("gone");
+        let mut files = Files::new(settings(&gone), Config::default());
+        (0..300).for_each(|k| files.take(Item::Packet(arrived(k))));
+        assert!(files.status.failing.as_ref().is_some_and(|told| told.contains("gone")));
+        assert_eq!(files.status.files, 0);
+        fs::create_dir(&gone).unwrap();
+        (0..70).for_each(|k| files.take(Item::Packet(arrived(400 + k * 100))));
+        files.close();
+        assert_eq!((files.status.files, files.status.failing.as_ref()), (1, None));
+        assert!(files.status.lost > 0 && !times(&recordings_in(&gone, "default")[0]).is_empty());
+    }
+}

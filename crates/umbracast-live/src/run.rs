@@ -1,0 +1,253 @@
+//! The whole of a live run: receive, assemble, step, publish, record. One thread each, a queue between.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use umbracast::forecast::Weights;
+use umbracast::lidar::Assembler;
+use umbracast::{Config, Error, Frame, Health, Pipeline};
+
+use crate::clock::HostClock;
+use crate::latency::Latencies;
+use crate::published::Published;
+use crate::queue::{Queue, WhenFull};
+use crate::receive::{Arrived, Door, Receivers};
+use crate::record::{RecordSettings, RecordStatus, Recorder};
+use crate::warnings::Warnings;
+
+/// Packets that wait for the assembler: a second of four HDL-32E.
+const PACKETS_WAITING: usize = 8192;
+/// Frames that wait for the pipeline: one is worked on, one waits, and the newest takes its place.
+const FRAMES_WAITING: usize = 1;
+
+/// What a live run is made of.
+pub struct Settings {
+    /// Site and method.
+    pub config: Config,
+    /// The network's, for modes that forecast with it.
+    pub weights: Option<Weights>,
+    /// The hall without people; the background is learned on the way where there is none.
+    pub empty: Vec<Frame>,
+    /// Where the sensors' packets come in.
+    pub doors: Vec<Door>,
+    /// Whether and where all is recorded.
+    pub record: Option<RecordSettings>,
+    /// What packets are stamped with.
+    pub clock: HostClock,
+    /// Where it counts.
+    pub counters: Arc<Counters>,
+}
+
+/// Who is told of every frame. Called on the pipeline's thread: it must not wait for anybody.
+pub type Listener = Box<dyn Fn(&Arc<Published>) + Send>;
+
+/// A live run: threads that go on until [`Live::stop`].
+pub struct Live {
+    receivers: Receivers,
+    packets: Arc<Queue<Arrived>>,
+    frames: Arc<Queue<Closed>>,
+    assembling: JoinHandle<()>,
+    stepping: JoinHandle<()>,
+    recorder: Option<Arc<Recorder>>,
+    counters: Arc<Counters>,
+}
+
+/// What is counted while it runs, for `/metrics` and the summary.
+#[derive(Debug, Default)]
+pub struct Counters {
+    /// Packets that came from sensors.
+    pub packets: AtomicU64,
+    /// Frames that were published.
+    pub frames: AtomicU64,
+    /// From the last packet of a frame to its results.
+    pub latencies: Mutex<Latencies>,
+    /// Of the stages alone.
+    pub steps: Mutex<Latencies>,
+    /// Of assembler and stages, as of the last frame.
+    pub health: Mutex<Health>,
+    /// How the recorder does.
+    pub recorder: Arc<Mutex<RecordStatus>>,
+}
+
+impl Counters {
+    /// How the recorder does now.
+    pub fn recorder(&self) -> RecordStatus {
+        self.recorder.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// A run's account.
+#[derive(Debug, Clone)]
+pub struct Summary {
+    /// Packets that came from sensors.
+    pub packets: u64,
+    /// Packets given up because the assembler was busy.
+    pub packets_lost: u64,
+    /// Packets from addresses that no sensor has.
+    pub strangers: u64,
+    /// Frames that were published.
+    pub frames: u64,
+    /// Frames given up because the pipeline was busy.
+    pub frames_skipped: u64,
+    /// From the last packet of a frame to its results.
+    pub latencies: Latencies,
+    /// Of the stages alone.
+    pub steps: Latencies,
+    /// Of assembler and stages, as of the last frame.
+    pub health: Health,
+    /// The recorder's.
+    pub recorded: RecordStatus,
+}
+
+/// A frame that closed, and what the assembler knew then.
+struct Closed {
+    frame: Frame,
+    /// When the last packet before the one that closed it came: no later than the last packet of the frame.
+    arrived_ns: i64,
+    health: Health,
+}
+
+impl Live {
+    /// Opens sockets and files and begins; every frame is told to `listener`.
+    ///
+    /// # Errors
+    /// A setting that cannot work, a port that is taken, a folder that cannot be made.
+    pub fn start(settings: Settings, listener: Listener) -> Result<Self, Error> {
+        let Settings { config, weights, empty, doors, record, clock, counters } = settings;
+        let mut pipeline = Pipeline::new(&config, weights.as_ref())?;
+        empty.iter().for_each(|frame| pipeline.learn_empty(frame));
+        let assembler = Assembler::new(&config.site)?;
+        let start = |record| Recorder::start(record, &config, counters.recorder.clone());
+        let recorder = record.map(start).transpose()?.map(Arc::new);
+        let packets = Arc::new(Queue::new(PACKETS_WAITING, WhenFull::DropNewest));
+        let frames = Arc::new(Queue::new(FRAMES_WAITING, WhenFull::DropOldest));
+        let receivers = Receivers::start(&doors, clock, &packets)?;
+        let assembling = {
+            let (packets, frames, recorder) = (packets.clone(), frames.clone(), recorder.clone());
+            let counters = counters.clone();
+            std::thread::spawn(move || {
+                assemble(assembler, &packets, &frames, recorder.as_deref(), &counters);
+                frames.close();
+            })
+        };
+        let sensors = config.site.sensors.len();
+        let stepping = {
+            let (frames, recorder, counters) = (frames.clone(), recorder.clone(), counters.clone());
+            std::thread::spawn(move || {
+                let publish =
+                    Publish { clock, sensors, recorder, counters, listener, warnings: Warnings::default() };
+                step(pipeline, &frames, publish);
+            })
+        };
+        Ok(Self { receivers, packets, frames, assembling, stepping, recorder, counters })
+    }
+
+    /// The sockets.
+    pub fn receivers(&self) -> &Receivers {
+        &self.receivers
+    }
+
+    /// True while every thread works. One that does not is a bug: then everything had better end and be started anew.
+    pub fn is_well(&self) -> bool {
+        !self.assembling.is_finished() && !self.stepping.is_finished()
+    }
+
+    /// Ends in the order of the data, so that what has come is finished, published and recorded.
+    pub fn stop(self) -> Summary {
+        let strangers = self.receivers.strangers();
+        self.receivers.stop();
+        self.packets.close();
+        let _ = self.assembling.join();
+        let _ = self.stepping.join();
+        let recorded = self.recorder.and_then(Arc::into_inner).map(Recorder::stop).unwrap_or_default();
+        let of =
+            |latencies: &Mutex<Latencies>| latencies.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        Summary {
+            packets: self.counters.packets.load(Ordering::Relaxed),
+            packets_lost: self.packets.lost(),
+            strangers,
+            frames: self.counters.frames.load(Ordering::Relaxed),
+            frames_skipped: self.frames.lost(),
+            latencies: of(&self.counters.latencies),
+            steps: of(&self.counters.steps),
+            health: *self.counters.health.lock().unwrap_or_else(PoisonError::into_inner),
+            recorded,
+        }
+    }
+}
+
+/// Packets to frames. Stamps are made strictly increasing, so that a recording, which keeps a list for each sensor,
+/// gives them back in this order.
+fn assemble(
+    mut assembler: Assembler,
+    packets: &Queue<Arrived>,
+    frames: &Queue<Closed>,
+    recorder: Option<&Recorder>,
+    counters: &Counters,
+) {
+    let mut health = Health::default();
+    let mut before_ns = i64::MIN;
+    while let Some(mut arrived) = packets.pop() {
+        counters.packets.fetch_add(1, Ordering::Relaxed);
+        let came_ns = arrived.packet.time_ns.max(before_ns.saturating_add(1));
+        arrived.packet.time_ns = came_ns;
+        assembler.push(arrived.sensor, &arrived.packet, &mut health);
+        while let Some(frame) = assembler.pop() {
+            let arrived_ns = if before_ns == i64::MIN { came_ns } else { before_ns };
+            frames.push(Closed { frame, arrived_ns, health });
+        }
+        before_ns = came_ns;
+        if let Some(recorder) = recorder {
+            recorder.packet(arrived);
+        }
+    }
+    assembler.finish();
+    while let Some(frame) = assembler.pop() {
+        frames.push(Closed { frame, arrived_ns: before_ns, health });
+    }
+}
+
+/// What is done with every outcome.
+struct Publish {
+    clock: HostClock,
+    sensors: usize,
+    recorder: Option<Arc<Recorder>>,
+    counters: Arc<Counters>,
+    listener: Listener,
+    warnings: Warnings,
+}
+
+fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
+    while let Some(Closed { frame, arrived_ns, health }) = frames.pop() {
+        let begun_ns = publish.clock.now_ns();
+        let outcome = pipeline.step(&frame);
+        let stepped_ns = publish.clock.now_ns();
+        let mut published = Published::of(outcome);
+        published.health.add(&health);
+        published.frames_skipped = frames.lost();
+        published.sensors =
+            (0..publish.sensors).map(|s| frame.scans.iter().any(|scan| scan.sensor == s)).collect();
+        published.events = publish.warnings.changes(&published.links);
+        published.step = Duration::from_nanos((stepped_ns - begun_ns).max(0) as u64);
+        published.published_ns = publish.clock.now_ns();
+        published.latency = Duration::from_nanos((published.published_ns - arrived_ns).max(0) as u64);
+        publish.out(published);
+    }
+}
+
+impl Publish {
+    fn out(&self, published: Published) {
+        let counters = &self.counters;
+        counters.frames.fetch_add(1, Ordering::Relaxed);
+        counters.latencies.lock().unwrap_or_else(PoisonError::into_inner).add(published.latency);
+        counters.steps.lock().unwrap_or_else(PoisonError::into_inner).add(published.step);
+        *counters.health.lock().unwrap_or_else(PoisonError::into_inner) = published.health;
+        let published = Arc::new(published);
+        (self.listener)(&published);
+        if let Some(recorder) = &self.recorder {
+            recorder.result(published);
+        }
+    }
+}

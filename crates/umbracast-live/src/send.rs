@@ -1,0 +1,79 @@
+//! Packets out, at the times they carry: simulated sensors and recordings that look like real ones to whoever listens.
+
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use umbracast::lidar::Packet;
+use umbracast::{Error, STEP_NS};
+use umbracast_sim::scene::{Scene, SceneFrame};
+
+use crate::clock::HostClock;
+use crate::receive::Arrived;
+
+/// What was sent.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Sent {
+    /// Packets.
+    pub packets: u64,
+    /// Packets that the system did not take.
+    pub failed: u64,
+    /// The packet that left latest after its time, by so much.
+    pub latest_ns: i64,
+}
+
+/// Sends packets, each `rate` times as fast as the times they carry follow one another. `to` has an address for each
+/// sensor; all packets leave from a socket of their sensor's own. Ends with the packets or when `stop` is set.
+///
+/// # Errors
+/// No socket to send from.
+pub fn send(
+    packets: impl Iterator<Item = Arrived>,
+    to: &[SocketAddr],
+    rate: f64,
+    clock: HostClock,
+    stop: &AtomicBool,
+) -> Result<Sent, Error> {
+    let sockets = to
+        .iter()
+        .map(|_| UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|e| Error::new(format!("a socket to send from: {e}")))?;
+    let mut sent = Sent::default();
+    let mut first = None;
+    for Arrived { sensor, packet } in packets {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let (Some(socket), Some(to)) = (sockets.get(sensor), to.get(sensor)) else { continue };
+        let (host_ns, packet_ns) = *first.get_or_insert((clock.now_ns(), packet.time_ns));
+        let due_ns = host_ns + ((packet.time_ns - packet_ns) as f64 / rate) as i64;
+        clock.sleep_until(due_ns);
+        sent.latest_ns = sent.latest_ns.max(clock.now_ns() - due_ns);
+        match socket.send_to(&packet.payload, to) {
+            Ok(_) => sent.packets += 1,
+            // Nobody listens yet: the next one may be heard.
+            Err(_) => sent.failed += 1,
+        }
+    }
+    Ok(sent)
+}
+
+/// The packets of a simulated scene in the order in which they are sent.
+pub fn simulated(mut scene: Scene) -> impl Iterator<Item = Arrived> {
+    std::iter::from_fn(move || scene.next_frame()).flat_map(in_order)
+}
+
+fn in_order(frame: SceneFrame) -> Vec<Arrived> {
+    let of_sensor = |(sensor, packets): (usize, Vec<Packet>)| {
+        packets.into_iter().map(move |packet| Arrived { sensor, packet })
+    };
+    let mut all: Vec<Arrived> = frame.packets.into_iter().enumerate().flat_map(of_sensor).collect();
+    all.sort_by_key(|arrived| arrived.packet.time_ns);
+    all
+}
+
+/// The frame of a scene that agrees with a time of day within the hour: sensors tell no more, and who receives them
+/// takes the hour from his own clock.
+pub fn frame_of_hour(time_ns: i64) -> u64 {
+    (time_ns.rem_euclid(3_600_000_000_000) / STEP_NS) as u64
+}

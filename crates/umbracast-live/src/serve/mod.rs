@@ -1,0 +1,341 @@
+//! The page and the interface behind it, over HTTP: what the page gets, `curl` gets.
+//!
+//! | path | gives |
+//! |---|---|
+//! | `/` | the page, whole in one answer |
+//! | `/api/site` | hall, sensors, access points |
+//! | `/api/frame` | the newest frame |
+//! | `/api/live` | WebSocket: every frame, or the newest that a slow client can take |
+//! | `/api/events` | server-sent events: warnings, blockages, clear links |
+//! | `/api/openapi.json` | this interface, with the JSON Schema of every row |
+//! | `/health` | 200 while frames come, 503 while they do not |
+//! | `/metrics` | for Prometheus |
+//!
+//! A thread of its own with one worker: a slow or hostile client takes time from other clients at most, never from the
+//! pipeline, which only leaves the newest frame here.
+
+mod metrics;
+mod openapi;
+
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::{Query, Request, State};
+use axum::http::{StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::sse::{Event as Sent, KeepAlive, Sse};
+use axum::response::{Html, IntoResponse, Response};
+use axum::routing::get;
+use axum::{Json, Router};
+use serde_json::{Value, json};
+use tokio::sync::{broadcast, oneshot, watch};
+use tokio_stream::StreamExt;
+use tokio_stream::wrappers::BroadcastStream;
+use umbracast::{Error, Site};
+
+use crate::clock::HostClock;
+use crate::published::Published;
+use crate::run::Counters;
+use crate::warnings::Event;
+
+/// The page: HTML, style and script in one, nothing loaded from elsewhere.
+const PAGE: &str = include_str!("page.html");
+/// More WebSockets and event streams than this at once are refused.
+const STREAMS_MAX: usize = 64;
+/// Events that wait for a slow client; beyond it is told how many it missed.
+const EVENTS_WAITING: usize = 1024;
+/// A client that takes nothing for so long is let go.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Without a frame for so long, something is wrong.
+const STALE: Duration = Duration::from_secs(1);
+
+/// What the page is about.
+pub struct Watched {
+    /// Where everything stands.
+    pub site: Site,
+    /// What is counted.
+    pub counters: Arc<Counters>,
+    /// The clock of the run.
+    pub clock: HostClock,
+    /// What it is that is shown: `live`, or a recording's name.
+    pub title: String,
+}
+
+/// The server's thread, and where it listens.
+pub struct Server {
+    address: SocketAddr,
+    newest: watch::Sender<Arc<Published>>,
+    events: broadcast::Sender<Event>,
+    stop: oneshot::Sender<()>,
+    thread: std::thread::JoinHandle<()>,
+}
+
+/// Hands frames to the server, from any thread, without waiting.
+#[derive(Clone)]
+pub struct Publisher {
+    newest: watch::Sender<Arc<Published>>,
+    events: broadcast::Sender<Event>,
+}
+
+impl Publisher {
+    /// The newest frame.
+    pub fn publish(&self, published: &Arc<Published>) {
+        for event in &published.events {
+            let _ = self.events.send(*event); // Nobody listens: nobody misses it.
+        }
+        self.newest.send_replace(published.clone());
+    }
+}
+
+struct Shared {
+    watched: Watched,
+    access_points: Vec<String>,
+    newest: watch::Sender<Arc<Published>>,
+    events: broadcast::Sender<Event>,
+    token: Option<String>,
+    streams: AtomicUsize,
+}
+
+/// Listens on an address. Others than loopback need a token: what is seen here is where people are.
+///
+/// # Errors
+/// An address that is taken, or that others can reach without a token.
+pub fn start(address: SocketAddr, token: Option<String>, watched: Watched) -> Result<Server, Error> {
+    if !address.ip().is_loopback() && token.is_none() {
+        return Err(Error::new(format!(
+            "{address}: expected a token (UMBRACAST_TOKEN) for an address that other hosts can reach, found none"
+        )));
+    }
+    let listener = TcpListener::bind(address).map_err(|e| Error::new(e.to_string()).within(address))?;
+    let failed = |e: std::io::Error| Error::new(e.to_string()).within(address);
+    listener.set_nonblocking(true).map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    let newest = watch::Sender::new(Arc::new(Published::default()));
+    let events = broadcast::Sender::new(EVENTS_WAITING);
+    let (stop, stopped) = oneshot::channel();
+    let access_points = watched.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let (sender, event_sender) = (newest.clone(), events.clone());
+    let shared = Shared {
+        watched,
+        access_points,
+        newest: sender,
+        events: event_sender,
+        token,
+        streams: AtomicUsize::new(0),
+    };
+    let thread = std::thread::spawn(move || {
+        runtime.block_on(async move {
+            let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
+            let serving =
+                std::future::IntoFuture::into_future(axum::serve(listener, router(Arc::new(shared))));
+            // Streams never end by themselves, so nobody is waited for.
+            tokio::select! { _ = serving => (), _ = stopped => () }
+        });
+    });
+    Ok(Server { address, newest, events, stop, thread })
+}
+
+impl Server {
+    /// Where it listens: the port is known where a free one was asked for.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// For whoever makes frames.
+    pub fn publisher(&self) -> Publisher {
+        Publisher { newest: self.newest.clone(), events: self.events.clone() }
+    }
+
+    /// Closes every connection.
+    pub fn stop(self) {
+        let _ = self.stop.send(());
+        let _ = self.thread.join();
+    }
+}
+
+fn router(shared: Arc<Shared>) -> Router {
+    Router::new()
+        .route("/", get(page))
+        .route("/api/site", get(site))
+        .route("/api/frame", get(frame))
+        .route("/api/live", get(live))
+        .route("/api/events", get(events))
+        .route("/api/openapi.json", get(async || Json(openapi::document())))
+        .route("/health", get(health))
+        .route("/metrics", get(metrics_text))
+        .layer(from_fn_with_state(shared.clone(), guard))
+        .with_state(shared)
+}
+
+/// Lets in who may see this.
+async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+    match refused(shared.token.as_deref(), &request) {
+        Some(refusal) => refusal.into_response(),
+        None => next.run(request).await,
+    }
+}
+
+/// Who has not the token is refused; without one, a page of another origin is: its requests carry that origin's name.
+fn refused(token: Option<&str>, request: &Request) -> Option<(StatusCode, &'static str)> {
+    let head = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
+    let Some(token) = token else {
+        let host = head(header::HOST).unwrap_or_default();
+        let foreign = head(header::ORIGIN)
+            .is_some_and(|origin| origin.split_once("://").is_none_or(|(_, name)| name != host));
+        return foreign.then_some((StatusCode::FORBIDDEN, "expected a request of this page's own\n"));
+    };
+    let bearer = head(header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
+    let mut in_query = request.uri().query().into_iter().flat_map(|query| query.split('&'));
+    let given = bearer.or_else(|| in_query.find_map(|pair| pair.strip_prefix("token=")));
+    let refusal = (StatusCode::UNAUTHORIZED, "expected a token: Authorization: Bearer, or ?token=\n");
+    (!given.is_some_and(|given| same(given, token))).then_some(refusal)
+}
+
+/// Compares in a time that tells nothing of where they differ.
+fn same(given: &str, token: &str) -> bool {
+    let differing = given.bytes().zip(token.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
+    given.len() == token.len() && differing == 0
+}
+
+async fn page() -> impl IntoResponse {
+    let policy = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; \
+                  img-src data:; frame-ancestors 'none'";
+    ([(header::CONTENT_SECURITY_POLICY, policy), (header::CACHE_CONTROL, "no-store")], Html(PAGE))
+}
+
+async fn site(State(shared): State<Arc<Shared>>) -> Json<Value> {
+    Json(json!({ "title": shared.watched.title, "site": shared.watched.site }))
+}
+
+#[derive(serde::Deserialize)]
+struct FrameQuery {
+    /// 0 leaves the points out.
+    points: Option<u8>,
+}
+
+impl FrameQuery {
+    fn with_points(&self) -> bool {
+        self.points != Some(0)
+    }
+}
+
+async fn frame(State(shared): State<Arc<Shared>>, Query(query): Query<FrameQuery>) -> Json<Value> {
+    let newest = shared.newest.borrow().clone();
+    Json(shared.frame_json(&newest, query.with_points()))
+}
+
+async fn live(
+    State(shared): State<Arc<Shared>>,
+    Query(query): Query<FrameQuery>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    let Some(place) = Place::take(&shared) else { return full() };
+    // Nothing is expected from a client but that it closes.
+    upgrade.max_message_size(4096).on_upgrade(move |socket| stream(socket, place, query.with_points()))
+}
+
+/// Every frame that the client can take. A watch holds the newest only, so a slow one skips frames, and the others
+/// notice nothing.
+async fn stream(mut socket: WebSocket, place: Place, with_points: bool) {
+    let mut newest = place.0.newest.subscribe();
+    newest.mark_changed();
+    loop {
+        tokio::select! {
+            changed = newest.changed() => {
+                if changed.is_err() {
+                    return;
+                }
+                let frame = newest.borrow_and_update().clone();
+                let text = place.0.frame_json(&frame, with_points).to_string();
+                let sent = tokio::time::timeout(PATIENCE, socket.send(Message::Text(text.into()))).await;
+                if !matches!(sent, Ok(Ok(()))) {
+                    return;
+                }
+            }
+            said = socket.recv() => {
+                if !matches!(said, Some(Ok(_))) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+async fn events(State(shared): State<Arc<Shared>>) -> Response {
+    let Some(place) = Place::take(&shared) else { return full() };
+    let stream = BroadcastStream::new(shared.events.subscribe()).map(move |event| {
+        let shared = &place.0;
+        Ok::<_, std::convert::Infallible>(match event {
+            Ok(event) => {
+                Sent::default().event(event.state.name()).data(event.json(&shared.access_points).to_string())
+            }
+            Err(missed) => Sent::default().event("missed").data(missed.to_string()),
+        })
+    });
+    Sse::new(stream).keep_alive(KeepAlive::default()).into_response()
+}
+
+fn full() -> Response {
+    (StatusCode::SERVICE_UNAVAILABLE, "as many streams as are allowed are open\n").into_response()
+}
+
+async fn health(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
+    let newest = shared.newest.borrow().clone();
+    let stale = shared.age(&newest).is_none_or(|age| age > STALE);
+    let status = if stale { StatusCode::SERVICE_UNAVAILABLE } else { StatusCode::OK };
+    let value = json!({
+        "well": !stale,
+        "age_ms": shared.age(&newest).map(|age| age.as_millis() as u64),
+        "sensors": shared.watched.site.sensors.iter().zip(&newest.sensors)
+            .map(|(sensor, &gave)| json!({ "name": sensor.name, "gave": gave })).collect::<Vec<_>>(),
+        "frames_skipped": newest.frames_skipped,
+        "health": newest.health,
+        "recorder": shared.watched.counters.recorder(),
+    });
+    (status, Json(value))
+}
+
+async fn metrics_text(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
+    let newest = shared.newest.borrow().clone();
+    let text = metrics::text(&shared.watched, &newest, shared.streams.load(Ordering::Relaxed));
+    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text)
+}
+
+impl Shared {
+    fn frame_json(&self, published: &Published, with_points: bool) -> Value {
+        let mut value = published.json(&self.access_points, with_points);
+        value["age_ms"] = json!(self.age(published).map(|age| age.as_millis() as u64));
+        value
+    }
+
+    /// How long ago it was published; none before the first frame.
+    fn age(&self, published: &Published) -> Option<Duration> {
+        let age_ns = self.watched.clock.now_ns() - published.published_ns;
+        (published.published_ns > 0).then(|| Duration::from_nanos(age_ns.max(0) as u64))
+    }
+}
+
+/// One of the streams that may be open; given back when it ends, however it ends.
+struct Place(Arc<Shared>);
+
+impl Place {
+    fn take(shared: &Arc<Shared>) -> Option<Self> {
+        let open = shared.streams.fetch_add(1, Ordering::Relaxed);
+        let place = Self(shared.clone());
+        (open < STREAMS_MAX).then_some(place)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.streams.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;

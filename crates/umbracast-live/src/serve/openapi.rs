@@ -1,0 +1,79 @@
+//! The interface as OpenAPI 3.1, with the rows' schemas made from their columns.
+
+use serde_json::{Value, json};
+use umbracast_io::rows::{LinkRow, TrackRow};
+use umbracast_io::wire;
+
+/// The document.
+pub fn document() -> Value {
+    let json_of = |what: &str, schema: Value| {
+        json!({ "get": { "summary": what, "responses": { "200": {
+            "description": what, "content": { "application/json": { "schema": schema } } } } } })
+    };
+    let text_of = |what: &str, kind: &str| {
+        json!({ "get": { "summary": what, "responses": { "200": {
+            "description": what, "content": { kind: { "schema": { "type": "string" } } } } } } })
+    };
+    let frame = json!({ "$ref": "#/components/schemas/Frame" });
+    json!({
+        "openapi": "3.1.0",
+        "info": { "title": "Umbracast", "version": env!("CARGO_PKG_VERSION") },
+        "paths": {
+            "/api/site": json_of("Hall, sensors, access points", json!({ "type": "object" })),
+            "/api/frame": json_of("The newest frame; ?points=0 leaves the points out", frame),
+            "/api/live": text_of("WebSocket: a Frame as JSON text, each time there is a newer one", "application/json"),
+            "/api/events": text_of("Server-sent events: warning, blocked, clear; an Event as JSON each", "text/event-stream"),
+            "/health": json_of("200 while frames come, 503 while they do not", json!({ "type": "object" })),
+            "/metrics": text_of("Counters and histograms for Prometheus", "text/plain"),
+        },
+        "components": { "schemas": {
+            "Track": wire::json_schema::<TrackRow>(),
+            "Blockage": wire::json_schema::<LinkRow>(),
+            "Frame": frame_schema(),
+            "Event": event_schema(),
+        } }
+    })
+}
+
+fn frame_schema() -> Value {
+    let list =
+        |of: &str| json!({ "type": "array", "items": { "$ref": format!("#/components/schemas/{of}") } });
+    json!({
+        "title": "Frame",
+        "type": "object",
+        "properties": {
+            "frame": { "type": "integer", "description": "Counts from the first packet." },
+            "time_ns": { "type": "integer", "description": "End of the frame, time of the sensors." },
+            "published_ns": { "type": "integer", "description": "Host time." },
+            "age_ms": { "type": ["integer", "null"], "description": "Since it was published; null before the first." },
+            "latency_ms": { "type": "number", "description": "From the last packet of the frame to its results." },
+            "step_ms": { "type": "number", "description": "The stages alone." },
+            "frames_skipped": { "type": "integer" },
+            "sensors": { "type": "array", "items": { "type": "boolean" }, "description": "Which gave to this frame." },
+            "health": { "type": "object", "description": "What was skipped since the start." },
+            "tracks": list("Track"),
+            "blockages": list("Blockage"),
+            "events": list("Event"),
+            "points_cm": { "type": "array", "items": { "type": "integer" }, "description": "x y z, x y z, ... of new points." },
+        }
+    })
+}
+
+fn event_schema() -> Value {
+    json!({
+        "title": "Event",
+        "type": "object",
+        "properties": {
+            "event": { "enum": ["warning", "blocked", "clear"] },
+            "access_point": { "type": "string" },
+            "track": { "type": "integer" },
+            "frame": { "type": "integer" },
+            "time_ns": { "type": "integer" },
+            "p_now": { "type": "number" },
+            "p_w9": { "type": "number", "description": "Within 900 ms." },
+            "onset_p10_s": { "type": ["number", "null"] },
+            "onset_p50_s": { "type": ["number", "null"] },
+            "onset_p90_s": { "type": ["number", "null"] },
+        }
+    })
+}

@@ -1,0 +1,190 @@
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+
+use umbracast::Config;
+use umbracast_io::rows::{LinkRow, TrackRow};
+
+use super::*;
+use crate::warnings::Warnings;
+
+fn server(token: Option<&str>) -> (Server, HostClock) {
+    let clock = HostClock::start();
+    let watched = Watched {
+        site: Config::default().site,
+        counters: Arc::new(Counters::default()),
+        clock,
+        title: "a test".to_owned(),
+    };
+    let address = SocketAddr::from(([127, 0, 0, 1], 0));
+    (start(address, token.map(str::to_owned), watched).unwrap(), clock)
+}
+
+fn published(clock: HostClock) -> Arc<Published> {
+    let link = LinkRow { track: 4, blocked_now: true, p_now: 0.9, p: [0.9; 9], ..LinkRow::default() };
+    Arc::new(Published {
+        frame: 12,
+        published_ns: clock.now_ns(),
+        tracks: vec![TrackRow { track: 4, x_m: 1.5, confirmed: true, ..TrackRow::default() }],
+        links: vec![link],
+        events: Warnings::default().changes(&[link]),
+        points_cm: vec![[1, 2, 3]],
+        sensors: vec![true, false],
+        ..Published::default()
+    })
+}
+
+/// A connection on which this request was sent.
+fn ask(server: &Server, path: &str, heads: &str) -> BufReader<TcpStream> {
+    let mut stream = TcpStream::connect(server.address()).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+    let host = server.address();
+    write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\n{heads}\r\n").unwrap();
+    BufReader::new(stream)
+}
+
+/// Status and body of an answer.
+fn get(server: &Server, path: &str, heads: &str) -> (u16, String) {
+    let mut answer = String::new();
+    ask(server, path, &format!("Connection: close\r\n{heads}")).read_to_string(&mut answer).unwrap();
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+    (head.split(' ').nth(1).unwrap().parse().unwrap(), body.to_owned())
+}
+
+#[test]
+fn curl_gets_what_the_page_gets() {
+    let (server, clock) = server(None);
+    assert_eq!(get(&server, "/health", "").0, 503, "no frame yet");
+    server.publisher().publish(&published(clock));
+    let (status, body) = get(&server, "/api/frame", "");
+    let frame: Value = serde_json::from_str(&body).unwrap();
+    assert_eq!((status, &frame["frame"], &frame["tracks"][0]["x_m"]), (200, &json!(12), &json!(1.5)));
+    assert_eq!(
+        (&frame["blockages"][0]["access_point"], &frame["points_cm"]),
+        (&json!("side"), &json!([1, 2, 3]))
+    );
+    let slim: Value = serde_json::from_str(&get(&server, "/api/frame?points=0", "").1).unwrap();
+    assert_eq!(slim.get("points_cm"), None);
+    let (status, body) = get(&server, "/health", "");
+    assert!(
+        status == 200 && body.contains("\"name\":\"lidar_west\"") && body.contains("\"gave\":false"),
+        "{body}"
+    );
+    let site: Value = serde_json::from_str(&get(&server, "/api/site", "").1).unwrap();
+    assert_eq!(
+        (&site["title"], &site["site"]["access_points"][0]["name"]),
+        (&json!("a test"), &json!("side"))
+    );
+    let metrics = get(&server, "/metrics", "").1;
+    assert!(
+        metrics.contains("\numbracast_links_blocked 1\n") && metrics.contains("le=\"+Inf\""),
+        "{metrics}"
+    );
+    let (status, page) = get(&server, "/", "");
+    assert!(
+        status == 200 && page.contains("<canvas") && !page.contains("https://"),
+        "nothing is loaded from elsewhere"
+    );
+    server.stop();
+}
+
+#[test]
+fn every_field_of_a_frame_is_in_the_interface() {
+    let document = openapi::document();
+    let frame = published(HostClock::start()).json(&["side".to_owned()], true);
+    let known = &document["components"]["schemas"]["Frame"]["properties"];
+    frame.as_object().unwrap().keys().for_each(|name| assert!(known.get(name).is_some(), "{name}"));
+    let known = &document["components"]["schemas"]["Event"]["properties"];
+    frame["events"][0]
+        .as_object()
+        .unwrap()
+        .keys()
+        .for_each(|name| assert!(known.get(name).is_some(), "{name}"));
+}
+
+#[test]
+fn without_its_token_nobody_sees_anything() {
+    let (server, _) = server(Some("secret"));
+    for path in
+        ["/", "/api/frame", "/api/live", "/api/events", "/metrics", "/api/frame?token=secre", "/?token="]
+    {
+        assert_eq!(get(&server, path, "").0, 401, "{path}");
+    }
+    assert_eq!(get(&server, "/api/frame?token=secret", "").0, 200);
+    assert_eq!(get(&server, "/api/frame", "Authorization: Bearer secret\r\n").0, 200);
+    server.stop();
+}
+
+#[test]
+fn a_page_of_another_origin_is_refused() {
+    let (server, _) = server(None);
+    assert_eq!(get(&server, "/api/frame", "Origin: http://elsewhere.example\r\n").0, 403);
+    let own = format!("Origin: http://{}\r\n", server.address());
+    assert_eq!(get(&server, "/api/frame", &own).0, 200);
+    server.stop();
+}
+
+#[test]
+fn an_address_that_others_reach_needs_a_token() {
+    let watched = Watched {
+        site: Config::default().site,
+        counters: Arc::new(Counters::default()),
+        clock: HostClock::start(),
+        title: String::new(),
+    };
+    let message = start(SocketAddr::from(([0, 0, 0, 0], 0)), None, watched).err().unwrap().to_string();
+    assert!(message.contains("UMBRACAST_TOKEN"), "{message}");
+}
+
+#[test]
+fn a_websocket_gets_the_newest_frame_and_the_next() {
+    let (server, clock) = server(None);
+    server.publisher().publish(&published(clock));
+    // The key and its answer are those of RFC 6455, section 1.3.
+    let heads = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
+                 Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+    let mut stream = ask(&server, "/api/live?points=0", heads);
+    let mut line = String::new();
+    while line != "\r\n" {
+        line.clear();
+        stream.read_line(&mut line).unwrap();
+        assert!(!line.is_empty(), "closed");
+    }
+    let mut text = || {
+        let mut head = [0; 2];
+        stream.read_exact(&mut head).unwrap();
+        assert_eq!(head[0], 0x81, "one whole text");
+        let length = match head[1] {
+            126 => {
+                let mut long = [0; 2];
+                stream.read_exact(&mut long).unwrap();
+                usize::from(u16::from_be_bytes(long))
+            }
+            short => usize::from(short),
+        };
+        let mut text = vec![0; length];
+        stream.read_exact(&mut text).unwrap();
+        serde_json::from_slice::<Value>(&text).unwrap()
+    };
+    assert_eq!(text()["frame"], 12);
+    server.publisher().publish(&Arc::new(Published { frame: 13, ..(*published(clock)).clone() }));
+    assert_eq!(text()["frame"], 13);
+    server.stop();
+}
+
+#[test]
+fn events_are_sent_as_they_happen() {
+    let (server, clock) = server(None);
+    let mut stream = ask(&server, "/api/events", "Accept: text/event-stream\r\n");
+    let mut line = String::new();
+    while line != "\r\n" {
+        line.clear();
+        stream.read_line(&mut line).unwrap();
+    }
+    server.publisher().publish(&published(clock));
+    let mut said = String::new();
+    while !said.contains("data: ") {
+        stream.read_line(&mut said).unwrap();
+    }
+    assert!(said.contains("event: blocked\n") && said.contains("\"track\":4"), "{said}");
+    server.stop();
+}

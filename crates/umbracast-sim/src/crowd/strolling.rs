@@ -1,0 +1,73 @@
+//! People who cross a circle again and again, for as long as somebody wants to watch.
+
+use glam::Vec2;
+use rand::RngExt;
+use umbracast::geometry::DVec2;
+
+use super::circle::setting;
+use super::crossing::{ARRIVED_M, STEP_S, scatter};
+use super::orca::{Agent, Orca};
+use super::preset::Preset;
+use super::trajectory::{Crowd, STEP_NS, Trajectory};
+use crate::random::stream;
+
+/// Preferred speeds, m/s: everybody has one of these for good, so that no two walk in step.
+const PREFERRED_MPS: std::ops::Range<f32> = 0.8..1.3;
+/// The next goal lies opposite, or so far to its side, radians.
+const ASIDE_RAD: f32 = 0.8;
+
+/// Everybody walks across the circle, and on arrival to another point of it, for `seconds`. Nobody ever arrives for
+/// good. Spacing and manners are those of the preset; a mixed crowd or pairs stroll like `orca-03`.
+pub fn strolling(preset: Preset, people: usize, radius_m: f64, seed: u64, seconds: u64) -> Crowd {
+    let (mut parameters, spacing_m) = setting(preset);
+    parameters.max_speed_mps = parameters.max_speed_mps.max(PREFERRED_MPS.end);
+    let mut rng = stream(seed, "strolling", 0);
+    let mut starts = Vec::new();
+    scatter(&mut starts, people, radius_m as f32, |_, _| spacing_m, &mut rng);
+    let preferred_mps: Vec<f32> = starts.iter().map(|_| rng.random_range(PREFERRED_MPS)).collect();
+    let mut goals: Vec<Vec2> = starts.iter().map(|start| -*start).collect();
+    let agents = starts.iter().map(|&start| Agent::new(parameters, start)).collect();
+    let mut orca = Orca::new(STEP_S, agents, &[]);
+    let steps = seconds as usize * (1_000_000_000 / STEP_NS) as usize;
+    let way = |start: &Vec2| {
+        let mut positions_m = Vec::with_capacity(steps + 1);
+        positions_m.push(start.as_dvec2());
+        positions_m
+    };
+    let mut positions: Vec<Vec<DVec2>> = starts.iter().map(way).collect();
+    for _ in 0..steps {
+        for ((agent, goal), &speed) in orca.agents.iter_mut().zip(&mut goals).zip(&preferred_mps) {
+            let mut to_goal = *goal - agent.position_m;
+            if to_goal.length() < ARRIVED_M {
+                let aside = Vec2::from_angle(rng.random_range(-ASIDE_RAD..ASIDE_RAD));
+                *goal = aside.rotate(-agent.position_m.normalize_or(Vec2::X)) * radius_m as f32;
+                to_goal = *goal - agent.position_m;
+            }
+            agent.preferred_mps = to_goal.normalize_or_zero() * speed;
+        }
+        orca.step();
+        for (way, agent) in positions.iter_mut().zip(&orca.agents) {
+            way.push(agent.position_m.as_dvec2());
+        }
+    }
+    let trajectories = Trajectory::from_steps(positions, std::iter::repeat(None));
+    Crowd { trajectories, duration_ns: steps as i64 * STEP_NS }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_stops_and_nobody_leaves_the_circle() {
+        let crowd = strolling(Preset::Orca03, 6, 8.0, 3, 60);
+        assert_eq!((crowd.trajectories.len(), crowd.duration_ns), (6, 60_000_000_000));
+        for way in &crowd.trajectories {
+            let walked_m: f64 = way.positions_m.windows(2).map(|p| p[0].distance(p[1])).sum();
+            assert!(walked_m > 0.6 * 60.0, "person {} walked {walked_m} m", way.person);
+            assert!(way.positions_m.iter().all(|p| p.length() < 10.0), "person {}", way.person);
+            let speed_mps = |p: &[DVec2]| p[0].distance(p[1]) / f64::from(STEP_S);
+            assert!(way.positions_m.windows(2).all(|p| speed_mps(p) < 1.4));
+        }
+    }
+}
