@@ -1,0 +1,97 @@
+//! The page as somebody sees it, in a headless Chromium: people move, a link turns red after it turned amber, the last
+//! minute can be gone back through, a telephone's width holds.
+
+#[path = "chromium/mod.rs"]
+mod chromium;
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+use chromium::Page;
+
+/// A run that ends with this. It would end by itself where nobody held the other side of what it says.
+struct Demo(Child, #[expect(dead_code, reason = "held, not read")] BufReader<ChildStdout>);
+
+impl Drop for Demo {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A demonstration on a free port, and its address.
+fn demonstration() -> (Demo, String) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_umbracast"))
+        .args(["live", "--demo", "--people", "8", "--serve", "127.0.0.1:0", "--seed", "100300", "--quiet"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    let mut line = String::new();
+    let mut said = BufReader::new(child.stdout.take().expect("piped"));
+    said.read_line(&mut line).expect("a line");
+    let address = line.trim().strip_prefix("page: ").expect("the page's address").to_owned();
+    (Demo(child, said), address)
+}
+
+#[test]
+fn people_move_links_turn_and_the_last_minute_can_be_gone_back_through() {
+    let profile = Path::new(env!("CARGO_TARGET_TMPDIR")).join("chromium");
+    let _ = std::fs::remove_dir_all(&profile);
+    let (_demo, address) = demonstration();
+    let Some(mut page) = Page::open(&address, &profile) else { return };
+    page.size(1400, 900);
+    page.until("document.body.dataset.people >= 6");
+
+    // People move.
+    let place =
+        "(() => { const t = shown.tracks.find(t => t.confirmed); return [t.track, t.x_m, t.y_m]; })()";
+    let before = page.value(place);
+    let moved = format!(
+        "(() => {{ const t = shown.tracks.find(t => t.track === {}); return !t || Math.hypot(t.x_m - {}, t.y_m - {}) > 0.5; }})()",
+        before[0], before[1], before[2]
+    );
+    page.until(&moved);
+
+    // Links are told before they are blocked: some link that is blocked now was amber in a frame before.
+    page.until(
+        "kept.some((frame, i) => frame.blockages.some(link => link.blocked_now && kept.slice(0, i).some(earlier => \
+         earlier.blockages.some(l => l.track === link.track && l.access_point === link.access_point && \
+         !l.blocked_now && l.blocked_w9))))",
+    );
+    page.until("document.body.dataset.blocked > 0");
+    page.screenshot("page.png");
+    assert!(page.value("document.querySelectorAll('#links tbody tr.blocked').length").as_u64() > Some(0));
+
+    // A frame before now stays while new ones come.
+    page.until("kept.length > 25");
+    page.value("$('scrub').value = kept.length - 20; $('scrub').dispatchEvent(new Event('input')); true");
+    page.until("paused && drawn && +document.body.dataset.frame === shown.frame");
+    let held = page.value("shown.frame");
+    page.until(&format!("kept[kept.length - 1].frame > {held} + 25"));
+    assert_eq!(page.value("+document.body.dataset.frame"), held);
+    page.value("$('pause').click(); true");
+    page.until(&format!("+document.body.dataset.frame > {held} + 25"));
+
+    // A person is picked by a click on the plan.
+    let click = "(() => { const t = shown.tracks.find(t => t.confirmed), { at } = planView($('plan').clientWidth), \
+                 [x, y] = at(t.x_m, t.y_m), corner = $('plan').getBoundingClientRect(); \
+                 $('plan').dispatchEvent(new MouseEvent('click', { clientX: corner.left + x, clientY: corner.top + y })); \
+                 return picked != null; })()";
+    assert_eq!(page.value(click), true);
+    page.until("$('person').textContent.includes('m/s')");
+
+    // On a telephone nothing stands beyond the edge.
+    page.size(390, 844);
+    page.until("document.documentElement.scrollWidth <= 390 && $('plan').clientWidth > 300");
+    page.screenshot("telephone.png");
+
+    // Both themes.
+    page.size(1400, 900);
+    let ground = "getComputedStyle(document.body).backgroundColor";
+    let first = page.value(ground);
+    page.value("$('theme').click(); true");
+    assert_ne!(page.value(ground), first);
+    page.until("drawn");
+    page.screenshot("dark.png");
+}
