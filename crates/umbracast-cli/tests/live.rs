@@ -1,7 +1,7 @@
 //! Live as a user meets it: packets over loopback, a recording, and the same results from it again.
 
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
@@ -112,12 +112,47 @@ fn live_and_replayed_results_are_the_same_to_the_byte() {
     let links = recorded::<LinkRow>(&recording, &access_points);
     assert!(links.iter().any(|link| link.blocked_now), "somebody crosses in front of the access point");
     assert!(tables::read::<LinkRow>(out, &access_points).unwrap() == links, "{}", tables("links"));
+    peers_read(&recording, &tracks);
     let detections = recorded::<DetectionRow>(&recording, &access_points);
     assert!(
         tables::read::<DetectionRow>(out, &access_points).unwrap() == detections,
         "{}",
         tables("detections")
     );
+}
+
+/// `rosbags` and `mcap-ros2-support` read every topic, and the same values.
+fn peers_read(recording: &Path, tracks: &[TrackRow]) {
+    let python = std::env::var("UMBRACAST_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers.py");
+    let output = Command::new(&python).arg(script).arg(recording).output();
+    let output = match output {
+        Ok(output) if output.status.success() => output,
+        Ok(output) if !String::from_utf8_lossy(&output.stderr).contains("ModuleNotFoundError") => {
+            panic!("{}", String::from_utf8_lossy(&output.stderr))
+        }
+        // To the terminal itself: a test's output is held back when it passes.
+        _ => {
+            let _ = writeln!(
+                std::io::stderr(),
+                "skipped: {python} has no rosbags and mcap-ros2-support to read with"
+            );
+            return;
+        }
+    };
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(found["rosbags"], found["mcap-ros2-support"]);
+    let topics = found["rosbags"].as_object().expect("topics");
+    for topic in ["/umbracast/config", "/tf_static", "/lidar_east/packets", "/lidar_west/packets"] {
+        assert!(topics.contains_key(topic), "{topic} of {topics:?}");
+    }
+    for topic in [DetectionRow::TOPIC, TrackRow::TOPIC, LinkRow::TOPIC] {
+        assert!(topics[topic]["messages"].as_u64() >= Some(30), "{topic}: {}", topics[topic]);
+    }
+    let last = tracks.last().expect("tracks").frame;
+    let first = tracks.iter().find(|row| row.frame == last).expect("a first row");
+    let read = &topics[TrackRow::TOPIC]["last"]["first"];
+    assert_eq!((&read["track"], &read["x_m"]), (&first.track.into(), &first.x_m.into()));
 }
 
 /// Two people who cross in front of the `side` access point, for three seconds.
