@@ -93,6 +93,25 @@ impl Caster {
         }
     }
 
+    /// Whether the last cast took fewer samples than the configuration says, because so many people could come in each
+    /// other's way: probabilities are coarser then.
+    ///
+    /// ```
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
+    /// # let tracks = two_people();
+    /// # let forecasts = forecasts_of(&tracks);
+    /// use umbracast::blockage::Caster;
+    ///
+    /// let mut caster = Caster::new(&config.blockage, &config.site);
+    /// caster.cast(&tracks, &forecasts, &mut Vec::new());
+    /// assert!(!caster.took_fewer_samples(), "two people leave time for all");
+    /// ```
+    pub fn took_fewer_samples(&self) -> bool {
+        self.method == BlockageMethod::Probability && self.sampler.takes_fewer(&self.numbers)
+    }
+
     /// The paper's way: boxes at the means, yes or no.
     fn cast_boxes(&self, people: &[(&Track, &Forecast)], blockages: &mut Vec<Blockage>) {
         let boxes_now: Vec<PersonBox> = people

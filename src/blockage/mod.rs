@@ -12,7 +12,9 @@ mod steps;
 #[doc(hidden)] // What tests and ablations turn.
 pub mod numbers;
 mod trajectories;
+mod figure;
 mod rays;
+mod crossing;
 mod shadows;
 #[doc(hidden)] // Phases of a gait, for the fit of the body.
 pub mod probability;

@@ -50,8 +50,6 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
 fn one_by_one(sampler: &Sampler, numbers: &Numbers, ue: &Ue, ap_m: DVec3, q: usize, k: usize) -> u16 {
     let people = &sampler.people[..sampler.present];
     let posture = |p: &Trajectories, step: usize| {
-        let mut p = p.clone();
-        p.walk(numbers.body.arms.still_share, &sampler.draws[&p.track]);
         let i = step * p.samples + k;
         let speed_hz = p.gait.swing_hz[k];
         Posture {
@@ -117,6 +115,9 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
         let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
         let mut sampler = Sampler::new(&numbers);
         sampler.draw(&numbers, &ue, &aps_m, tracks.iter().zip(&forecasts));
+        for p in &mut sampler.people {
+            p.walk(numbers.body.arms.still_share, &sampler.draws[&p.track]);
+        }
         for (ap, &ap_m) in aps_m.iter().enumerate() {
             for q in 0..tracks.len() {
                 let bits: Vec<u16> =

@@ -1,12 +1,8 @@
-//! The rays of one link at one step, a sample each, against the samples of one body.
-//!
-//! Two tests: [`Rays::near`] tells cheaply, in single precision with room to spare, which samples of the body come near
-//! their ray at all; [`Crossing::blocked`] asks those exactly what [`super::body::blocks`] asks one, in loops over
-//! samples. Answers are the same but where a ray touches a body to within [`SAME_WITHIN`].
+//! The rays of one link at one step, a sample each, and which samples of a body come near them: in single precision with
+//! room to spare, so that only those are asked exactly ([`super::crossing`]) that may meet.
 
-use super::body_model::{Arms, BodyModel, Slice};
+use super::figure::{Band, Extent, Figure};
 use super::trajectories::Trajectories;
-use crate::gait::{FOREMOST_RAD, LEFTMOST_RAD};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
 
@@ -14,16 +10,13 @@ use crate::site::Ue;
 pub(super) const WORD: usize = 64;
 /// Single precision errs by less, out to a kilometre.
 const ROOM_M: f32 = 1e-3;
-/// The loops order their sums otherwise than [`super::body::blocks`]: a share of the body's height.
-#[cfg(test)]
-const SAME_WITHIN: f64 = 1e-9;
 
 /// The rays of a link at a step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rays {
-    start_m: DVec3,
+    pub(super) start_m: DVec3,
     /// By sample: where the ray ends.
-    end_m: [Vec<f64>; 3],
+    pub(super) end_m: [Vec<f64>; 3],
     /// By sample: the unit vector to the end in plan view, and how far it is.
     to: [Vec<f32>; 2],
     length_m: Vec<f32>,
@@ -65,8 +58,15 @@ impl Rays {
         }
     }
 
-    /// In which samples of a word the body of `other` may come near the ray: those of the others do not.
-    pub(super) fn near(&self, other: &Trajectories, step: usize, word: usize) -> u64 {
+    /// What of a word of samples is known of the body of `other`, whose gait is known, without asking exactly.
+    pub(super) fn near(
+        &self,
+        figure: &Figure,
+        other: &Trajectories,
+        step: usize,
+        word: usize,
+        band: Band,
+    ) -> Near {
         let samples = self.length_m.len();
         let of = word * WORD..samples.min((word + 1) * WORD);
         let row = step * other.samples + of.start..step * other.samples + of.end;
@@ -74,363 +74,115 @@ impl Rays {
         let plan = Plan {
             base_m: [base.x as f32, base.y as f32],
             reach_m: other.reach_m as f32 + ROOM_M,
+            ahead: [other.ahead[step].x as f32, other.ahead[step].y as f32],
+            extent: figure.extent(band),
             off_m: [&other.off_x_m[row.clone()], &other.off_y_m[row]],
+            turn: [&other.gait.turn[0][of.clone()], &other.gait.turn[1][of.clone()]],
+            height_m: &other.height_m[of.clone()],
+            width: &other.width_scale[of.clone()],
+            swing: &other.gait.swing_hz[of.clone()],
             to: [&self.to[0][of.clone()], &self.to[1][of.clone()]],
             length_m: &self.length_m[of],
         };
-        wide::near(&plan)
+        plan.near_widely()
     }
+}
+
+/// Samples of a word in which a body may meet the ray, and those of them in which it does for sure.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Near {
+    pub(super) maybe: u64,
+    pub(super) surely: u64,
 }
 
 /// What [`Rays::near`] looks at: a word of samples in plan view.
 struct Plan<'a> {
     base_m: [f32; 2],
     reach_m: f32,
+    ahead: [f32; 2],
+    extent: Extent,
     off_m: [&'a [f32]; 2],
+    turn: [&'a [f64]; 2],
+    height_m: &'a [f64],
+    width: &'a [f64],
+    swing: &'a [f64],
     to: [&'a [f32]; 2],
     length_m: &'a [f32],
 }
 
 impl Plan<'_> {
+    /// [`Plan::near`], once more for processors with wider registers; both give the same bits.
+    fn near_widely(&self) -> Near {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has just said that it has what the function was compiled for.
+            return unsafe { self.near_avx2() };
+        }
+        self.near()
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn near_avx2(&self) -> Near {
+        self.near()
+    }
+
     #[inline(always)]
-    fn near(&self) -> u64 {
+    fn near(&self) -> Near {
         let n = self.length_m.len().min(WORD);
         let (off_x, off_y) = (&self.off_m[0][..n], &self.off_m[1][..n]);
         let (to_x, to_y, length_m) = (&self.to[0][..n], &self.to[1][..n], &self.length_m[..n]);
-        let mut room = [-1.0_f32; WORD];
-        let [base_x, base_y] = self.base_m;
+        let (turn_x, turn_y) = (&self.turn[0][..n], &self.turn[1][..n]);
+        let (height_m, width, swing) = (&self.height_m[..n], &self.width[..n], &self.swing[..n]);
+        let (mut room, mut sure) = ([-1.0_f32; WORD], [-1.0_f32; WORD]);
+        let ([base_x, base_y], [ahead_x, ahead_y], extent) = (self.base_m, self.ahead, &self.extent);
         for k in 0..n {
             let (x, y) = (base_x + off_x[k], base_y + off_y[k]);
-            let aside = (to_x[k] * y - to_y[k] * x).abs();
+            let left_of_ray = to_x[k] * y - to_y[k] * x;
             let along = to_x[k] * x + to_y[k] * y;
-            let beyond = (along - length_m[k]).max(-along);
-            room[k] = self.reach_m - aside.max(beyond);
+            let beyond = larger32(along - length_m[k], -along);
+            let (turn_x, turn_y) = (turn_x[k] as f32, turn_y[k] as f32);
+            let (own_x, own_y) = (ahead_x * turn_x - ahead_y * turn_y, ahead_y * turn_x + ahead_x * turn_y);
+            // How far the body reaches across the ray to either side, from its axis.
+            let (across, with) = (to_x[k] * own_y - to_y[k] * own_x, to_x[k] * own_x + to_y[k] * own_y);
+            let (h, w, u) = (height_m[k] as f32, width[k] as f32, swing[k] as f32);
+            let ahead = extent.depth + extent.depth_per_width * w + extent.ahead_per_swing * u;
+            let back = extent.depth + extent.depth_per_width * w + extent.back_per_swing * u;
+            let aside = (extent.side + extent.side_per_width * w) * with.abs();
+            let left_m = h * (larger32(ahead * across, -back * across) + aside) + ROOM_M;
+            let right_m = h * (larger32(back * across, -ahead * across) + aside) + ROOM_M;
+            // The ray passes through a slice's ellipse where it is nearer to its middle than the ellipse reaches.
+            let (depth, side) = (extent.core[0] * across, extent.core[1] * with);
+            let off = extent.core_off[0] * across.abs() + extent.core_off[1] * with.abs();
+            let through_m = h * (w * (depth * depth + side * side).sqrt() - off) - ROOM_M;
+            sure[k] = smaller32(through_m - left_of_ray.abs(), -self.reach_m - beyond);
+            room[k] =
+                smaller32(smaller32(left_m + left_of_ray, right_m - left_of_ray), self.reach_m - beyond);
         }
-        let mut bits = 0;
-        for (byte, eight) in room.chunks_exact(8).enumerate() {
-            let mut eight_bits = 0_u8;
-            for (i, room) in eight.iter().enumerate() {
-                eight_bits |= u8::from(*room >= 0.0) << i;
-            }
-            bits |= u64::from(eight_bits) << (8 * byte);
-        }
-        bits
+        Near { maybe: bits_of(&room), surely: bits_of(&sure) }
     }
 }
 
-/// The body's numbers as the loops want them.
-#[derive(Debug, Clone)]
-pub(super) struct Figure {
-    slices: Vec<Slice>,
-    arms: Arms,
-    sway_left: f64,
-    sway_ahead: f64,
-}
-
-impl Figure {
-    pub(super) fn new(body: &BodyModel) -> Self {
-        Self {
-            slices: body.slices.clone(),
-            arms: body.arms.clone(),
-            sway_left: body.sway_left,
-            sway_ahead: body.sway_ahead,
-        }
-    }
-}
-
-/// Heights between which rays may meet a body, as shares of its height.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Band {
-    pub(super) low: f64,
-    pub(super) high: f64,
-}
-
-impl Band {
-    fn meets(&self, bottom: f64, top: f64) -> bool {
-        top >= self.low && bottom <= self.high
-    }
-}
-
-type Lane = [f64; WORD];
-
-/// Samples of a word in which a body comes near its ray, each in the body's own frame: shares of its height, from its
-/// swaying axis, x ahead and y to the left.
-#[derive(Debug, Clone)]
-pub(super) struct Crossing {
-    samples: Vec<u8>,
-    /// Where the body and the ray's end are, then what is worked out of it.
-    position: [Lane; 2],
-    end: [Lane; 3],
-    turn: [Lane; 2],
-    height: Lane,
-    width: Lane,
-    sway: Lane,
-    swing: Lane,
-    phase: [Lane; 2],
-    from: [Lane; 3],
-    along: [Lane; 3],
-    /// How far the ray misses the body, in no unit: touching is 0.
-    miss: Lane,
-}
-
-impl Default for Crossing {
-    fn default() -> Self {
-        let [none, one] = [[0.0; WORD], [1.0; WORD]];
-        Self {
-            samples: Vec::with_capacity(WORD),
-            position: [none; 2],
-            end: [none; 3],
-            turn: [none; 2],
-            height: one,
-            width: one,
-            sway: none,
-            swing: none,
-            phase: [none; 2],
-            from: [none; 3],
-            along: [none; 3],
-            miss: none,
-        }
-    }
-}
-
-impl Crossing {
-    /// Of the samples in `asked`, a word of bits, those whose ray the body meets.
-    pub(super) fn blocked(
-        &mut self,
-        figure: &Figure,
-        rays: &Rays,
-        other: &Trajectories,
-        step: usize,
-        word: usize,
-        asked: u64,
-        band: Band,
-    ) -> u64 {
-        if asked == 0 {
-            return 0;
-        }
-        self.gather(rays, other, step, word, asked);
-        wide::cross(self, figure, rays.start_m, other.ahead[step], band);
-        let met = self.samples.iter().zip(&self.miss).filter(|(_, miss)| **miss <= 0.0);
-        met.fold(0, |bits, (sample, _)| bits | 1 << sample)
-    }
-
-    /// Takes what is asked for out of the arrays of rays and body.
-    fn gather(&mut self, rays: &Rays, other: &Trajectories, step: usize, word: usize, asked: u64) {
-        self.samples.clear();
-        let (row, gait) = (step * other.samples, &other.gait);
-        let mut left = asked;
-        for lane in 0..WORD {
-            if left == 0 {
-                break;
-            }
-            let bit = left.trailing_zeros() as usize;
-            left &= left - 1;
-            self.samples.push(bit as u8);
-            let k = word * WORD + bit;
-            let i = row + k;
-            (self.position[0][lane], self.position[1][lane]) = (other.x_m[i], other.y_m[i]);
-            (self.end[0][lane], self.end[1][lane]) = (rays.end_m[0][k], rays.end_m[1][k]);
-            self.end[2][lane] = rays.end_m[2][k];
-            (self.turn[0][lane], self.turn[1][lane]) = (gait.turn[0][k], gait.turn[1][k]);
-            (self.height[lane], self.width[lane]) = (other.height_m[k], other.width_scale[k]);
-            (self.sway[lane], self.swing[lane]) = (gait.sway[k], gait.swing_hz[k]);
-            (self.phase[0][lane], self.phase[1][lane]) = (gait.phase[0][i], gait.phase[1][i]);
-        }
-    }
-
-    #[inline(always)]
-    fn cross(&mut self, figure: &Figure, start_m: DVec3, ahead: DVec2, band: Band) {
-        self.turn_to_body(figure, start_m, ahead);
-        self.miss = [f64::INFINITY; WORD];
-        let mut bottom = 0.0;
-        for slice in &figure.slices {
-            if band.meets(bottom, slice.top) {
-                self.cross_slice(slice, bottom);
-            }
-            bottom = slice.top;
-        }
-        if self.miss[..self.lanes()].iter().all(|miss| *miss <= 0.0) {
-            return;
-        }
-        let arms = &figure.arms;
-        // No width is more than twice the usual one.
-        let (upper, fore) = (2.0 * arms.upper_radius, 2.0 * arms.fore_radius);
-        for side in [-1.0, 1.0] {
-            let hand = Joint {
-                up: arms.hand_up,
-                out: arms.hand_out,
-                ahead: arms.hand_ahead,
-                swing: arms.hand_swing,
-            };
-            let elbow = Joint { up: arms.elbow_up, out: arms.elbow_out, ahead: 0.0, swing: arms.elbow_swing };
-            let shoulder = Joint { up: arms.shoulder_up, out: arms.shoulder_out, ahead: 0.0, swing: 0.0 };
-            if band.meets(
-                arms.elbow_up.min(arms.shoulder_up) - upper,
-                arms.elbow_up.max(arms.shoulder_up) + upper,
-            ) {
-                self.cross_rod(&shoulder, &elbow, arms.upper_radius, side);
-            }
-            if band.meets(arms.hand_up.min(arms.elbow_up) - fore, arms.hand_up.max(arms.elbow_up) + fore) {
-                self.cross_rod(&elbow, &hand, arms.fore_radius, side);
-            }
-        }
-    }
-
-    /// How many lanes are in use.
-    #[inline(always)]
-    fn lanes(&self) -> usize {
-        self.samples.len().min(WORD)
-    }
-
-    /// Each ray into the frame of its body, whose trunk rides over the foot that stands, once a stride, and goes ahead
-    /// and back with every step.
-    #[inline(always)]
-    fn turn_to_body(&mut self, figure: &Figure, start_m: DVec3, ahead: DVec2) {
-        let n = self.lanes();
-        let (leftmost, foremost) = (DVec2::from_angle(LEFTMOST_RAD), DVec2::from_angle(FOREMOST_RAD));
-        for i in 0..n {
-            let turned_x = ahead.x * self.turn[0][i] - ahead.y * self.turn[1][i];
-            let turned_y = ahead.y * self.turn[0][i] + ahead.x * self.turn[1][i];
-            let share = 1.0 / self.height[i];
-            let (cos, sin) = (self.phase[0][i], self.phase[1][i]);
-            let from_foremost = cos * foremost.x + sin * foremost.y;
-            let sway_ahead = figure.sway_ahead * self.sway[i] * (2.0 * from_foremost * from_foremost - 1.0);
-            let sway_left = figure.sway_left * self.sway[i] * (cos * leftmost.x + sin * leftmost.y);
-            let (from_x, from_y) = (start_m.x - self.position[0][i], start_m.y - self.position[1][i]);
-            let (along_x, along_y) = (self.end[0][i] - start_m.x, self.end[1][i] - start_m.y);
-            self.from[0][i] = (turned_x * from_x + turned_y * from_y) * share - sway_ahead;
-            self.from[1][i] = (turned_x * from_y - turned_y * from_x) * share - sway_left;
-            self.from[2][i] = start_m.z * share;
-            self.along[0][i] = (turned_x * along_x + turned_y * along_y) * share;
-            self.along[1][i] = (turned_x * along_y - turned_y * along_x) * share;
-            self.along[2][i] = (self.end[2][i] - start_m.z) * share;
-        }
-    }
-
-    /// The ray at the height of a slice against its ellipse: in the space where that is the unit circle, the ray comes
-    /// nearest at `nearest` and is inside where `|s + t d|^2 <= 1`.
-    #[inline(always)]
-    fn cross_slice(&mut self, slice: &Slice, bottom: f64) {
-        let n = self.lanes();
-        for i in 0..n {
-            // A level ray is taken to rise by next to nothing.
-            let up = self.along[2][i];
-            let per_up = 1.0 / if up.abs() < LEVEL { LEVEL } else { up };
-            let (a, b) = ((bottom - self.from[2][i]) * per_up, (slice.top - self.from[2][i]) * per_up);
-            let (enter, leave) = (larger(smaller(a, b), 0.0), smaller(larger(a, b), 1.0));
-            let width = 1.0 / self.width[i];
-            let (per_depth, per_width) = (width / slice.half_depth, width / slice.half_width);
-            let (sx, sy) = ((self.from[0][i] - slice.ahead) * per_depth, self.from[1][i] * per_width);
-            let (dx, dy) = (self.along[0][i] * per_depth, self.along[1][i] * per_width);
-            let squared = larger(dx * dx + dy * dy, f64::MIN_POSITIVE);
-            let nearest = larger(smaller(-(sx * dx + sy * dy) / squared, leave), enter);
-            let (x, y) = (sx + nearest * dx, sy + nearest * dy);
-            let miss = if enter <= leave { x * x + y * y - 1.0 } else { f64::INFINITY };
-            self.miss[i] = smaller(self.miss[i], miss);
-        }
-    }
-
-    /// The ray against a rod of an arm on the left (`side` 1) or the right. Arms swing against the leg of their side, and
-    /// farther ahead than back because the elbow bends.
-    #[inline(always)]
-    fn cross_rod(&mut self, upper: &Joint, lower: &Joint, radius: f64, side: f64) {
-        let n = self.lanes();
-        for i in 0..n {
-            let wave = side * self.phase[0][i];
-            let ahead = |joint: &Joint| self.swing[i] * (joint.ahead + joint.swing * wave);
-            let (upper_ahead, lower_ahead) = (ahead(upper), ahead(lower));
-            let d = [self.along[0][i], self.along[1][i], self.along[2][i]];
-            let e = [lower_ahead - upper_ahead, side * (lower.out - upper.out), lower.up - upper.up];
-            let r = [
-                self.from[0][i] - upper_ahead,
-                self.from[1][i] - side * upper.out,
-                self.from[2][i] - upper.up,
-            ];
-            let squared = nearest_of_segments(r, d, e);
-            let width = radius * self.width[i];
-            self.miss[i] = smaller(self.miss[i], squared - width * width);
-        }
-    }
-}
-
-/// A rise that is none, as a share of a body's height over the whole ray.
-const LEVEL: f64 = 1e-12;
-
-/// Where an arm's shoulder, elbow or hand is.
-struct Joint {
-    up: f64,
-    out: f64,
-    ahead: f64,
-    swing: f64,
-}
-
-/// Square of the smallest distance between the segments p + t d and q + u e, where r = p - q.
+/// A bit for each number that is not negative.
 #[inline(always)]
-fn nearest_of_segments(r: [f64; 3], d: [f64; 3], e: [f64; 3]) -> f64 {
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let (a, b, c) = (larger(dot(d, d), f64::MIN_POSITIVE), dot(d, e), larger(dot(e, e), f64::MIN_POSITIVE));
-    let (f, g) = (dot(d, r), dot(e, r));
-    let parallel = a * c - b * b;
-    let on_d = if parallel > 0.0 { share((b * g - c * f) / parallel) } else { 0.0 };
-    let on_e = share((b * on_d + g) / c);
-    let on_d = share((b * on_e - f) / a);
-    let apart: [f64; 3] = [
-        r[0] + on_d * d[0] - on_e * e[0],
-        r[1] + on_d * d[1] - on_e * e[1],
-        r[2] + on_d * d[2] - on_e * e[2],
-    ];
-    dot(apart, apart)
+fn bits_of(numbers: &[f32; WORD]) -> u64 {
+    let mut bits = 0;
+    for (byte, eight) in numbers.chunks_exact(8).enumerate() {
+        let mut eight_bits = 0_u8;
+        for (i, number) in eight.iter().enumerate() {
+            eight_bits |= u8::from(*number >= 0.0) << i;
+        }
+        bits |= u64::from(eight_bits) << (8 * byte);
+    }
+    bits
 }
 
 #[inline(always)]
-fn share(t: f64) -> f64 {
-    smaller(larger(t, 0.0), 1.0)
-}
-
-// `f64::min` and `max` ask for NaN as well, which no lane holds: these are one instruction.
-
-#[inline(always)]
-fn smaller(a: f64, b: f64) -> f64 {
+fn smaller32(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
+fn larger32(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
-}
-
-/// The loops once more for processors with wider registers. No instruction that rounds otherwise is used (fused
-/// multiply-add is another feature), so both give the same bits.
-mod wide {
-    use super::{Band, Crossing, DVec2, DVec3, Figure, Plan};
-
-    pub(super) fn near(plan: &Plan) -> u64 {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has just said that it has what the function was compiled for.
-            return unsafe { near_avx2(plan) };
-        }
-        plan.near()
-    }
-
-    pub(super) fn cross(crossing: &mut Crossing, figure: &Figure, start_m: DVec3, ahead: DVec2, band: Band) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: as above.
-            return unsafe { cross_avx2(crossing, figure, start_m, ahead, band) };
-        }
-        crossing.cross(figure, start_m, ahead, band);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn near_avx2(plan: &Plan) -> u64 {
-        plan.near()
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn cross_avx2(crossing: &mut Crossing, figure: &Figure, start_m: DVec3, ahead: DVec2, band: Band) {
-        crossing.cross(figure, start_m, ahead, band);
-    }
 }

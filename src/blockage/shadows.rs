@@ -6,7 +6,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::rays::Band;
+use super::figure::Band;
 use super::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
@@ -24,6 +24,8 @@ pub(super) struct Meeting {
     pub(super) step: u32,
     /// Where on the body, as shares of its height.
     pub(super) band: Band,
+    /// Square of how far the middle of the body's samples is from the middle ray.
+    off_m2: f64,
 }
 
 /// Shadows of everybody's bodies, seen from one access point.
@@ -120,24 +122,30 @@ impl Shadows {
             other as usize != person && self.band(q, q.second, p, p.second).is_some()
         });
         for step in 0..MOMENTS {
+            let first = meetings.len();
             for &other in &candidates {
                 let p = &people[other as usize];
-                if let Some(band) = self.band(q, q.discs[step], p, p.discs[step]) {
-                    meetings.push(Meeting { other, step: step as u32, band });
+                if let Some((band, off_m2)) = self.band(q, q.discs[step], p, p.discs[step]) {
+                    meetings.push(Meeting { other, step: step as u32, band, off_m2 });
                 }
             }
+            // Who stands nearest to the line blocks most, and what is blocked is not asked again.
+            meetings[first..]
+                .sort_unstable_by(|a, b| a.off_m2.total_cmp(&b.off_m2).then(a.other.cmp(&b.other)));
         }
         self.candidates = candidates;
     }
 
-    /// The heights at which rays to `q` within `q_disc` may meet the body of `p` within `p_disc`; `None` where none can.
-    fn band(&self, q: &Trajectories, q_disc: Disc, p: &Trajectories, p_disc: Disc) -> Option<Band> {
+    /// The heights at which rays to `q` within `q_disc` may meet the body of `p` within `p_disc`, and the square of how far
+    /// apart the middles are; `None` where none can.
+    fn band(&self, q: &Trajectories, q_disc: Disc, p: &Trajectories, p_disc: Disc) -> Option<(Band, f64)> {
         let start = self.ap_m.truncate();
         let (along, off) = (q_disc.center_m - start, p_disc.center_m - start);
         let length2 = along.length_squared().max(1e-12);
         let t = (off.dot(along) / length2).clamp(0.0, 1.0);
         let reach = p.reach_m + self.ue_reach_m + p_disc.radius_m + q_disc.radius_m + ROOM;
-        let room2 = reach * reach - off.distance_squared(along * t);
+        let off_m2 = off.distance_squared(along * t);
+        let room2 = reach * reach - off_m2;
         if room2 < 0.0 {
             return None;
         }
@@ -156,7 +164,7 @@ impl Shadows {
             low: per(low_m, [p.height_max_m, p.height_min_m]) - ROOM,
             high: per(high_m, [p.height_min_m, p.height_max_m]) + ROOM,
         };
-        (band.low <= 1.0).then_some(band)
+        (band.low <= 1.0).then_some((band, off_m2))
     }
 }
 
