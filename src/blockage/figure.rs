@@ -15,20 +15,21 @@ impl Band {
     }
 }
 
-/// How far the parts of a body within a band reach from the axis, as shares of its height: all alike, and what a width
-/// scale and a swing of 1 add.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Extent {
-    pub(super) depth: f32,
-    pub(super) depth_per_width: f32,
-    pub(super) ahead_per_swing: f32,
-    pub(super) back_per_swing: f32,
-    pub(super) side: f32,
-    pub(super) side_per_width: f32,
-    /// Half axes of an ellipse that every slice of the band holds for a width scale of 1, and how far from the axis its
-    /// middle may be; without a half axis where the band leaves the trunk.
-    pub(super) core: [f32; 2],
-    pub(super) core_off: [f32; 2],
+/// The parts of a body within a band, seen from above, in single precision and shares of the height.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plan {
+    /// Half axes, ahead and aside, of an ellipse that holds every slice of the band for a width scale of 1, and of one that
+    /// every slice holds; 0 where there is none.
+    pub(super) around: [f32; 2],
+    pub(super) within: [f32; 2],
+    /// The slices' middles are so far ahead of the axis, and by so much more or less.
+    pub(super) ahead: f32,
+    pub(super) ahead_by: f32,
+    /// Ends of the arms' rods from above down, those of rods outside the band left out: ahead, ahead for each swing, out.
+    pub(super) joints: [[f32; 3]; 3],
+    /// Of the thicker rod; without arms in the band so negative that nothing is near.
+    pub(super) radius: f32,
+    pub(super) sway: [f32; 2],
 }
 
 /// The body's numbers as the loops want them.
@@ -50,38 +51,46 @@ impl Figure {
         }
     }
 
-    /// How far the parts within a band reach.
-    pub(super) fn extent(&self, band: Band) -> Extent {
-        let mut of = Extent { core: [f32::MAX; 2], ..Extent::default() };
-        let mut bottom = 0.0;
+    /// What of the body is within a band.
+    pub(super) fn plan(&self, band: Band) -> Plan {
+        let (mut around, mut within, mut bottom) = ([0.0_f64; 2], [f64::MAX; 2], 0.0);
+        let (mut least, mut most) = (f64::MAX, f64::MIN);
         for slice in &self.slices {
             if band.meets(bottom, slice.top) {
-                of.depth = of.depth.max(slice.ahead.abs() as f32);
-                of.depth_per_width = of.depth_per_width.max(slice.half_depth as f32);
-                of.side_per_width = of.side_per_width.max(slice.half_width as f32);
-                of.core[0] = of.core[0].min(slice.half_depth as f32);
-                of.core[1] = of.core[1].min(slice.half_width as f32);
+                let half = [slice.half_depth, slice.half_width];
+                around = [around[0].max(half[0]), around[1].max(half[1])];
+                within = [within[0].min(half[0]), within[1].min(half[1])];
+                (least, most) = (least.min(slice.ahead), most.max(slice.ahead));
             }
             bottom = slice.top;
         }
-        of.core_off = [of.depth + self.sway_ahead.abs() as f32, self.sway_left.abs() as f32];
-        if band.low < 0.0 || band.high > bottom {
-            of.core = [0.0; 2];
+        if around[0] == 0.0 {
+            (least, most) = (0.0, 0.0);
         }
-        for rod in self.arms.rods().into_iter().filter(|rod| rod.is_within(band)) {
-            for joint in [rod.upper, rod.lower] {
-                of.side = of.side.max(joint.out.abs() as f32);
-                of.ahead_per_swing = of.ahead_per_swing.max((joint.ahead.abs() + joint.swing.abs()) as f32);
-                of.back_per_swing = of.back_per_swing.max((joint.swing.abs() - joint.ahead) as f32);
-            }
-            of.depth_per_width = of.depth_per_width.max(rod.radius as f32);
-            of.side_per_width = of.side_per_width.max(rod.radius as f32);
+        if around[0] == 0.0 || band.low < 0.0 || band.high > bottom {
+            within = [0.0; 2];
         }
-        of.depth += self.sway_ahead.abs() as f32;
-        of.side += self.sway_left.abs() as f32;
-        of
+        let [upper, fore] = self.arms.rods();
+        let ends = match (upper.is_within(band), fore.is_within(band)) {
+            (true, true) => [upper.upper, upper.lower, fore.lower],
+            (true, false) => [upper.upper, upper.lower, upper.lower],
+            (false, _) => [fore.upper, fore.lower, fore.lower],
+        };
+        let armed = upper.is_within(band) || fore.is_within(band);
+        Plan {
+            around: around.map(|half| half as f32),
+            within: within.map(|half| half as f32),
+            ahead: (0.5 * (least + most)) as f32,
+            ahead_by: (0.5 * (most - least)) as f32,
+            joints: ends.map(|joint| [joint.ahead, joint.swing, joint.out].map(|x| x as f32)),
+            radius: if armed { upper.radius.max(fore.radius) as f32 } else { NOWHERE },
+            sway: [self.sway_ahead as f32, self.sway_left as f32],
+        }
     }
 }
+
+/// A radius of what is not there.
+const NOWHERE: f32 = -1e3;
 
 /// One of the two rods of an arm.
 pub(super) struct Rod {

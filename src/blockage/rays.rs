@@ -1,8 +1,9 @@
 //! The rays of one link at one step, a sample each, and which samples of a body come near them: in single precision with
 //! room to spare, so that only those are asked exactly ([`super::crossing`]) that may meet.
 
-use super::figure::{Band, Extent, Figure};
+use super::figure::{Band, Figure, Plan};
 use super::trajectories::Trajectories;
+use crate::gait::{FOREMOST_RAD, LEFTMOST_RAD};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
 
@@ -71,20 +72,23 @@ impl Rays {
         let of = word * WORD..samples.min((word + 1) * WORD);
         let row = step * other.samples + of.start..step * other.samples + of.end;
         let base = other.discs[step].center_m - self.start_m.truncate();
-        let plan = Plan {
+        let rough = &other.gait.rough;
+        let from_above = FromAbove {
             base_m: [base.x as f32, base.y as f32],
             reach_m: other.reach_m as f32 + ROOM_M,
             ahead: [other.ahead[step].x as f32, other.ahead[step].y as f32],
-            extent: figure.extent(band),
-            off_m: [&other.off_x_m[row.clone()], &other.off_y_m[row]],
-            turn: [&other.gait.turn[0][of.clone()], &other.gait.turn[1][of.clone()]],
-            height_m: &other.height_m[of.clone()],
-            width: &other.width_scale[of.clone()],
-            swing: &other.gait.swing_hz[of.clone()],
+            plan: figure.plan(band),
+            off_m: [&other.off_x_m[row.clone()], &other.off_y_m[row.clone()]],
+            turn: [&rough.turn[0][of.clone()], &rough.turn[1][of.clone()]],
+            phase: [&rough.phase[0][row.clone()], &rough.phase[1][row]],
+            height_m: &rough.height_m[of.clone()],
+            width: &rough.width[of.clone()],
+            sway: &rough.sway[of.clone()],
+            swing: &rough.swing[of.clone()],
             to: [&self.to[0][of.clone()], &self.to[1][of.clone()]],
             length_m: &self.length_m[of],
         };
-        plan.near_widely()
+        from_above.near_widely()
     }
 }
 
@@ -95,23 +99,25 @@ pub(super) struct Near {
     pub(super) surely: u64,
 }
 
-/// What [`Rays::near`] looks at: a word of samples in plan view.
-struct Plan<'a> {
+/// What [`Rays::near`] looks at: a word of samples.
+struct FromAbove<'a> {
     base_m: [f32; 2],
     reach_m: f32,
     ahead: [f32; 2],
-    extent: Extent,
+    plan: Plan,
     off_m: [&'a [f32]; 2],
-    turn: [&'a [f64]; 2],
-    height_m: &'a [f64],
-    width: &'a [f64],
-    swing: &'a [f64],
+    turn: [&'a [f32]; 2],
+    phase: [&'a [f32]; 2],
+    height_m: &'a [f32],
+    width: &'a [f32],
+    sway: &'a [f32],
+    swing: &'a [f32],
     to: [&'a [f32]; 2],
     length_m: &'a [f32],
 }
 
-impl Plan<'_> {
-    /// [`Plan::near`], once more for processors with wider registers; both give the same bits.
+impl FromAbove<'_> {
+    /// [`FromAbove::near`], once more for processors with wider registers; both give the same bits.
     fn near_widely(&self) -> Near {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
@@ -133,31 +139,49 @@ impl Plan<'_> {
         let (off_x, off_y) = (&self.off_m[0][..n], &self.off_m[1][..n]);
         let (to_x, to_y, length_m) = (&self.to[0][..n], &self.to[1][..n], &self.length_m[..n]);
         let (turn_x, turn_y) = (&self.turn[0][..n], &self.turn[1][..n]);
-        let (height_m, width, swing) = (&self.height_m[..n], &self.width[..n], &self.swing[..n]);
+        let (phase_x, phase_y) = (&self.phase[0][..n], &self.phase[1][..n]);
+        let (height_m, width) = (&self.height_m[..n], &self.width[..n]);
+        let (sway, swing) = (&self.sway[..n], &self.swing[..n]);
         let (mut room, mut sure) = ([-1.0_f32; WORD], [-1.0_f32; WORD]);
-        let ([base_x, base_y], [ahead_x, ahead_y], extent) = (self.base_m, self.ahead, &self.extent);
+        let ([base_x, base_y], [ahead_x, ahead_y], plan) = (self.base_m, self.ahead, &self.plan);
+        let [leftmost, foremost] = [LEFTMOST_RAD, FOREMOST_RAD].map(|at| [at.cos() as f32, at.sin() as f32]);
+        let per_depth = plan.ahead_by / if plan.within[0] > 0.0 { plan.within[0] } else { 1.0 };
         for k in 0..n {
             let (x, y) = (base_x + off_x[k], base_y + off_y[k]);
-            let left_of_ray = to_x[k] * y - to_y[k] * x;
             let along = to_x[k] * x + to_y[k] * y;
-            let beyond = larger32(along - length_m[k], -along);
-            let (turn_x, turn_y) = (turn_x[k] as f32, turn_y[k] as f32);
-            let (own_x, own_y) = (ahead_x * turn_x - ahead_y * turn_y, ahead_y * turn_x + ahead_x * turn_y);
-            // How far the body reaches across the ray to either side, from its axis.
-            let (across, with) = (to_x[k] * own_y - to_y[k] * own_x, to_x[k] * own_x + to_y[k] * own_y);
-            let (h, w, u) = (height_m[k] as f32, width[k] as f32, swing[k] as f32);
-            let ahead = extent.depth + extent.depth_per_width * w + extent.ahead_per_swing * u;
-            let back = extent.depth + extent.depth_per_width * w + extent.back_per_swing * u;
-            let aside = (extent.side + extent.side_per_width * w) * with.abs();
-            let left_m = h * (larger32(ahead * across, -back * across) + aside) + ROOM_M;
-            let right_m = h * (larger32(back * across, -ahead * across) + aside) + ROOM_M;
-            // The ray passes through a slice's ellipse where it is nearer to its middle than the ellipse reaches.
-            let (depth, side) = (extent.core[0] * across, extent.core[1] * with);
-            let off = extent.core_off[0] * across.abs() + extent.core_off[1] * with.abs();
-            let through_m = h * (w * (depth * depth + side * side).sqrt() - off) - ROOM_M;
-            sure[k] = smaller32(through_m - left_of_ray.abs(), -self.reach_m - beyond);
-            room[k] =
-                smaller32(smaller32(left_m + left_of_ray, right_m - left_of_ray), self.reach_m - beyond);
+            let beyond = larger(along - length_m[k], -along);
+            let own_x = ahead_x * turn_x[k] - ahead_y * turn_y[k];
+            let own_y = ahead_y * turn_x[k] + ahead_x * turn_y[k];
+            // Across the ray, to the left: what a step ahead and one aside are, and where the swaying axis is, in heights.
+            let (ahead, aside) = (to_x[k] * own_y - to_y[k] * own_x, to_x[k] * own_x + to_y[k] * own_y);
+            let from_foremost = phase_x[k] * foremost[0] + phase_y[k] * foremost[1];
+            let sway_ahead = plan.sway[0] * sway[k] * (2.0 * from_foremost * from_foremost - 1.0);
+            let sway_left = plan.sway[1] * sway[k] * (phase_x[k] * leftmost[0] + phase_y[k] * leftmost[1]);
+            let per_m = 1.0 / height_m[k];
+            let room_own = ROOM_M * per_m;
+            let axis = (to_x[k] * y - to_y[k] * x) * per_m + ahead * sway_ahead + aside * sway_left;
+            // The ray cuts an ellipse where its middle is nearer than the ellipse reaches; ellipses whose middles are apart
+            // along one half axis all hold one that is smaller by that share of the half axis.
+            let off = (axis + ahead * plan.ahead).abs();
+            let reach = |half: [f32; 2]| {
+                let (depth, side) = (half[0] * ahead, half[1] * aside);
+                (depth * depth + side * side).sqrt()
+            };
+            let trunk = width[k] * reach(plan.around) + plan.ahead_by * ahead.abs() - off;
+            let core = (width[k] - per_depth) * reach(plan.within) - off;
+            // An arm is near where the ray passes between its ends.
+            let wave = phase_x[k];
+            let arm = |side: f32| {
+                let end = |[fixed, swings, out]: [f32; 3]| {
+                    axis + ahead * swing[k] * (fixed + swings * side * wave) + aside * side * out
+                };
+                let [a, b, c] = [end(plan.joints[0]), end(plan.joints[1]), end(plan.joints[2])];
+                plan.radius * width[k] + smaller(larger(larger(a, b), c), -smaller(smaller(a, b), c))
+            };
+            let near = larger(trunk, larger(arm(1.0), arm(-1.0))) + room_own;
+            let beyond = (self.reach_m - beyond, -self.reach_m - beyond);
+            room[k] = smaller(near, beyond.0);
+            sure[k] = smaller(core - room_own, beyond.1);
         }
         Near { maybe: bits_of(&room), surely: bits_of(&sure) }
     }
@@ -178,11 +202,11 @@ fn bits_of(numbers: &[f32; WORD]) -> u64 {
 }
 
 #[inline(always)]
-fn smaller32(a: f32, b: f32) -> f32 {
+fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-fn larger32(a: f32, b: f32) -> f32 {
+fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }

@@ -70,7 +70,35 @@ pub(super) struct Gait {
     pub(super) swing_hz: Vec<f64>,
     /// By step and sample: cosine and sine of the phase since the right heel touched the floor.
     pub(super) phase: [Vec<f64>; 2],
+    pub(super) rough: Rough,
     known: bool,
+}
+
+/// A body's samples in single precision, for tests that need not be exact.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Rough {
+    /// By sample, as in [`Trajectories`] and [`Gait`].
+    pub(super) height_m: Vec<f32>,
+    pub(super) width: Vec<f32>,
+    pub(super) turn: [Vec<f32>; 2],
+    pub(super) sway: Vec<f32>,
+    pub(super) swing: Vec<f32>,
+    /// By step and sample.
+    pub(super) phase: [Vec<f32>; 2],
+}
+
+impl Rough {
+    /// In the order of the fields.
+    fn round(&mut self, exact: [&[f64]; 8]) {
+        let [to_x, to_y] = &mut self.turn;
+        let [of_x, of_y] = &mut self.phase;
+        let rounded =
+            [&mut self.height_m, &mut self.width, to_x, to_y, &mut self.sway, &mut self.swing, of_x, of_y];
+        for (rounded, exact) in rounded.into_iter().zip(exact) {
+            rounded.clear();
+            rounded.extend(exact.iter().map(|x| *x as f32));
+        }
+    }
 }
 
 impl Trajectories {
@@ -220,6 +248,18 @@ impl Trajectories {
                 (sin, cos) = (sin * step_cos + cos * step_sin, cos * step_cos - sin * step_sin);
             }
         }
+        let ([turn_x, turn_y], [phase_x, phase_y]) = (&gait.turn, &gait.phase);
+        let bodies: [&[f64]; 2] = [&self.height_m, &self.width_scale];
+        gait.rough.round([
+            bodies[0],
+            bodies[1],
+            turn_x,
+            turn_y,
+            &gait.sway,
+            &gait.swing_hz,
+            phase_x,
+            phase_y,
+        ]);
     }
 }
 
