@@ -34,6 +34,9 @@ pub struct Health {
     pub frames_out_of_order: u64,
     /// Foreground points dropped because there were more than the configured limit in one frame.
     pub points_over_limit: u64,
+    /// Frames in which so many people could come in each other's way that fewer samples were cast than the configuration
+    /// says: nobody was left out, probabilities are coarser.
+    pub frames_with_fewer_samples: u64,
 }
 
 impl Health {
@@ -68,5 +71,6 @@ impl Health {
         self.points_invalid += other.points_invalid;
         self.frames_out_of_order += other.frames_out_of_order;
         self.points_over_limit += other.points_over_limit;
+        self.frames_with_fewer_samples += other.frames_with_fewer_samples;
     }
 }

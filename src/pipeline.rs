@@ -155,6 +155,7 @@ impl Pipeline {
         self.tracker.update(frame, &o.detections, &mut o.tracks);
         self.forecaster.forecast(&o.tracks, &mut o.forecasts);
         self.caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
+        o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());
         o
     }
 }

@@ -2,7 +2,7 @@
 
 use umbracast::lidar::{Assembler, Frame, Packet};
 use umbracast::{Error, Health, Site};
-use umbracast_sim::crowd::{Preset, circle_crossing};
+use umbracast_sim::crowd::{Crowd, Preset, circle_crossing};
 use umbracast_sim::scene::{Scene, SceneFrame};
 
 /// What the sensors see of the hall, first without people, then with people who cross a circle; and what was so.
@@ -12,10 +12,17 @@ pub struct Recording {
     pub truth: Vec<SceneFrame>,
 }
 
+/// Of everything drawn: a tuning scene.
+const SEED: u64 = 100_000;
+
 /// `people` start on a circle of this radius. Frame `k` of `frames` and of `truth` are of the same tenth of a second.
 pub fn crossing(site: &Site, people: usize, radius_m: f64, frames: usize) -> Result<Recording, Error> {
-    const SEED: u64 = 100_000;
-    let crowd = circle_crossing(Preset::Orca03, people, radius_m, SEED);
+    walking(site, circle_crossing(Preset::Orca03, people, radius_m, SEED), frames)
+}
+
+/// The same of a crowd of one's own.
+#[allow(dead_code)] // Of the examples none has one; the benchmarks do.
+pub fn walking(site: &Site, crowd: Crowd, frames: usize) -> Result<Recording, Error> {
     let mut scene = Scene::new(crowd, site, SEED)?;
     let mut truth: Vec<SceneFrame> = std::iter::from_fn(|| scene.next_frame()).take(frames).collect();
     let packets = truth.iter_mut().map(|frame| std::mem::take(&mut frame.packets)).collect();

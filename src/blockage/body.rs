@@ -41,7 +41,7 @@ impl Posture {
 }
 
 /// Speed over the height of the hips.
-fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
+pub(super) fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
     gait::relative_speed_hz(speed_mps, height_m).min(FASTEST_HZ)
 }
 
@@ -133,13 +133,6 @@ fn arm_blocks(arms: &Arms, posture: &Posture, speed_hz: f64, side: f64, start: D
         distance2_of_segments(start, end, a, b) <= (radius * h * posture.width_scale).powi(2)
     };
     touches(shoulder, elbow, arms.upper_radius) || touches(elbow, hand, arms.fore_radius)
-}
-
-/// Square of the distance of a point to a segment.
-pub(super) fn distance2_to_segment(point: DVec2, start: DVec2, end: DVec2) -> f64 {
-    let along = end - start;
-    let t = ((point - start).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    point.distance_squared(start + along * t)
 }
 
 /// Square of the smallest distance between the segments p and q.

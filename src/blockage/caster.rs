@@ -62,10 +62,10 @@ impl Caster {
             method: config.method,
             person_box: config.person_box,
             threshold: config.threshold,
+            sampler: Sampler::new(&numbers),
             numbers,
             access_points_m: site.access_points.iter().map(|ap| ap.position()).collect(),
             ue: site.ue,
-            sampler: Sampler::default(),
         }
     }
 
@@ -86,12 +86,30 @@ impl Caster {
     /// ```
     pub fn cast(&mut self, tracks: &[Track], forecasts: &[Forecast], blockages: &mut Vec<Blockage>) {
         blockages.clear();
-        let people: Vec<(&Track, &Forecast)> =
-            tracks.iter().zip(forecasts).filter(|(track, _)| track.confirmed).collect();
+        let people = tracks.iter().zip(forecasts).filter(|(track, _)| track.confirmed);
         match self.method {
-            BlockageMethod::Algorithm1 => self.cast_boxes(&people, blockages),
-            BlockageMethod::Probability => self.cast_samples(&people, blockages),
+            BlockageMethod::Algorithm1 => self.cast_boxes(&people.collect::<Vec<_>>(), blockages),
+            BlockageMethod::Probability => self.cast_samples(people, blockages),
         }
+    }
+
+    /// Whether the last cast took fewer samples than the configuration says, because so many people could come in each
+    /// other's way: probabilities are coarser then.
+    ///
+    /// ```
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
+    /// # let tracks = two_people();
+    /// # let forecasts = forecasts_of(&tracks);
+    /// use umbracast::blockage::Caster;
+    ///
+    /// let mut caster = Caster::new(&config.blockage, &config.site);
+    /// caster.cast(&tracks, &forecasts, &mut Vec::new());
+    /// assert!(!caster.took_fewer_samples(), "two people leave time for all");
+    /// ```
+    pub fn took_fewer_samples(&self) -> bool {
+        self.method == BlockageMethod::Probability && self.sampler.takes_fewer(&self.numbers)
     }
 
     /// The paper's way: boxes at the means, yes or no.
@@ -137,22 +155,25 @@ impl Caster {
     }
 
     /// Our way: bodies on sampled trajectories, a probability and a threshold.
-    fn cast_samples(&mut self, people: &[(&Track, &Forecast)], blockages: &mut Vec<Blockage>) {
-        self.sampler.draw(&self.numbers, people);
+    fn cast_samples<'a>(
+        &mut self,
+        people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
+        blockages: &mut Vec<Blockage>,
+    ) {
+        let (numbers, ue) = (&self.numbers, &self.ue);
+        self.sampler.draw(numbers, ue, &self.access_points_m, people.clone());
         for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
-            for (person, (track, _)) in people.iter().enumerate() {
-                let chances = self.sampler.chances(&self.numbers, &self.ue, ap_m, person);
-                let blocked_now = chances.p_now >= self.threshold;
-                let (p, none) = (chances.p, [None; 3]);
+            for (person, (track, _)) in people.clone().enumerate() {
+                let chances = self.sampler.chances(numbers, ue, access_point, ap_m, person, self.threshold);
                 blockages.push(Blockage {
                     access_point,
                     track: track.id,
-                    blocked_now,
+                    blocked_now: chances.blocked_now,
                     p_now: chances.p_now,
-                    blocked: p.map(|p| p >= self.threshold),
-                    p,
-                    onset_s: if blocked_now { none } else { chances.onset_s },
-                    duration_s: if blocked_now { chances.clear_s } else { chances.clear_again_s },
+                    blocked: chances.p.map(|p| p >= self.threshold),
+                    p: chances.p,
+                    onset_s: chances.onset_s,
+                    duration_s: chances.duration_s,
                 });
             }
         }

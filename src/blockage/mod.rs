@@ -7,9 +7,15 @@ pub mod body;
 #[doc(hidden)] // For the corpus of rays; `Caster` chooses by the config.
 pub mod algorithm1;
 mod draws;
+mod phases;
 mod steps;
 #[doc(hidden)] // What tests and ablations turn.
 pub mod numbers;
+mod trajectories;
+mod figure;
+mod rays;
+mod crossing;
+mod shadows;
 #[doc(hidden)] // Phases of a gait, for the fit of the body.
 pub mod probability;
 mod caster;

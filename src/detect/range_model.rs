@@ -116,8 +116,11 @@ impl RangeModel {
     /// The pixel of a row that looks at this azimuth, hundredths of a degree.
     #[inline]
     pub fn pixel(&self, row: usize, azimuth_cdeg: f32) -> usize {
-        // A turn more or less is common, more than one is not: no remainder in the hot loop.
-        let mut bin = (azimuth_cdeg * self.bins_per_cdeg).floor() as i32;
+        // A turn more or less is common, more than one is not: no remainder in the hot loop. Nor a call of `floor`, which
+        // is one where the processor may be any.
+        let bins = azimuth_cdeg * self.bins_per_cdeg;
+        let mut bin = bins as i32;
+        bin -= i32::from(bins < bin as f32);
         let bins = self.bins as i32;
         if bin >= bins {
             bin -= bins;

@@ -17,14 +17,16 @@ pub fn coverage(book: &mut Book) -> Result<()> {
     keep(book, &out.join("coverage.svg"), "coverage.svg")
 }
 
-/// One scene of 10 people with two HDL-32E on one core, and a frame through every mode.
+/// One scene of 10 people with two HDL-32E on one core, and a frame through every mode; then a step of the default mode as
+/// people and access points grow.
 pub fn speed(book: &mut Book) -> Result<()> {
     let recording = book.scratch("sim");
     book.umbracast_says(simulate("1", "1", &recording))?;
     for mode in ["default", "paper", "hdl"] {
         book.umbracast_says(run(&recording, mode, "1", &book.scratch(mode)))?;
     }
-    Ok(())
+    let growth = "cargo run --release --quiet --manifest-path bench/Cargo.toml --bin growth";
+    script(book, growth, growth)
 }
 
 /// The same seed twice, on one thread and on two.

@@ -154,8 +154,8 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     if !lost.is_empty() {
         return Ok(Ending::DataLost(lost.join("; ")));
     }
-    // Points outside the range that the site gives its sensor are the site's choice, not a loss.
-    if !(Health { points_invalid: 0, ..health }).is_clean() {
+    // Points outside the range that the site gives its sensor are the site's choice, not a loss; nor are coarser chances.
+    if !(Health { points_invalid: 0, frames_with_fewer_samples: 0, ..health }).is_clean() {
         return Ok(Ending::DataLost(counts(&health)));
     }
     Ok(Ending::Done)

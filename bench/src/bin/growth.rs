@@ -1,0 +1,171 @@
+//! How long a step of the default mode takes as people and access points grow: `cargo run --release --manifest-path
+//! bench/Cargo.toml --bin growth [PEOPLE ACCESS_POINTS]`. On one core; each frame is run three times from the same
+//! memory and the fastest counts, since other programs run beside.
+
+use std::time::Duration;
+
+use rustix::time::{ClockId, clock_gettime};
+use umbracast::geometry::DVec2;
+use umbracast::lidar::Frame;
+use umbracast::site::AccessPoint;
+use umbracast::{Config, Health, Pipeline};
+use umbracast_bench::Stages;
+use umbracast_bench::simulated::{Recording, crossing, walking};
+use umbracast_sim::crowd::{Crowd, Trajectory};
+
+/// People with two access points, and access points with so many people.
+const PEOPLE: [usize; 5] = [10, 20, 40, 100, 300];
+const ACCESS_POINTS: [usize; 5] = [1, 2, 4, 16, 64];
+/// Until everybody is followed.
+const BEFORE: usize = 30;
+/// A circle is crossed within; people meet in the middle after 12 s, sooner where they are many.
+const FRAMES: usize = 130;
+/// So many no longer cross a circle: they walk in lanes.
+const LANES_FROM: usize = 200;
+const LANES_FRAMES: usize = 90;
+const TRIES: usize = 3;
+
+fn main() {
+    let words: Vec<usize> = std::env::args().skip(1).map(|word| word.parse().expect("a number")).collect();
+    println!(
+        "people  access points  followed  links   median ms    99 % ms   fore  clust  detec  track  forec   cast  fewer"
+    );
+    if let [people, access_points, ..] = words[..] {
+        measure(&recording(people), people, access_points);
+        return;
+    }
+    for people in PEOPLE {
+        let recording = recording(people);
+        for access_points in ACCESS_POINTS {
+            if access_points == 2 || [10, 100, 300].contains(&people) {
+                measure(&recording, people, access_points);
+            }
+        }
+    }
+}
+
+fn recording(people: usize) -> Recording {
+    let site = Config::default().site;
+    let made = match people < LANES_FROM {
+        true => crossing(&site, people, 12.5, FRAMES),
+        false => walking(&site, lanes(people), LANES_FRAMES),
+    };
+    made.expect("the default site is simulated")
+}
+
+/// People in lanes along x, 0.9 m apart, every other lane the other way, 3 m from each to the next.
+fn lanes(people: usize) -> Crowd {
+    const LANE_M: f64 = 0.9;
+    const GAP_M: f64 = 3.0;
+    let lanes = (people as f64 * GAP_M / 30.0).ceil();
+    let steps = 10 * LANES_FRAMES;
+    let way = |person: usize| {
+        let (lane, place) = (person % lanes as usize, person / lanes as usize);
+        let ahead = if lane % 2 == 0 { 1.0 } else { -1.0 };
+        let speed_mps = 1.1 + 0.02 * (lane % 5) as f64;
+        let start = DVec2::new(
+            place as f64 * GAP_M - 15.0 + 0.37 * (lane % 7) as f64,
+            (lane as f64 - 0.5 * (lanes - 1.0)) * LANE_M,
+        );
+        let at = |step: usize| {
+            // Who leaves at one end comes back at the other.
+            let x = ahead * start.x + speed_mps * 0.01 * step as f64;
+            DVec2::new(ahead * ((x + 15.0).rem_euclid(30.0) - 15.0), start.y)
+        };
+        (0..=steps).map(at).collect::<Vec<DVec2>>()
+    };
+    let trajectory = |person: usize| Trajectory {
+        person: person as u32,
+        start_ns: 0,
+        step_ns: 10_000_000,
+        positions_m: way(person),
+        arrived_ns: None,
+        height_m: None,
+    };
+    Crowd {
+        trajectories: (0..people).map(trajectory).collect(),
+        duration_ns: LANES_FRAMES as i64 * umbracast::STEP_NS,
+    }
+}
+
+/// The two of the default site, then more evenly on a circle of 14 m, 2.5 m high.
+fn config(access_points: usize) -> Config {
+    let mut config = Config::default();
+    let own = config.site.access_points.clone();
+    let more = |i: usize| {
+        let at = DVec2::from_angle(2.4 * i as f64) * 14.0;
+        AccessPoint { name: format!("more-{i}"), position_m: [at.x, at.y, 2.5] }
+    };
+    config.site.access_points =
+        own.into_iter().chain((0..access_points).map(more)).take(access_points).collect();
+    config
+}
+
+fn measure(recording: &Recording, people: usize, access_points: usize) {
+    let config = config(access_points);
+    let mut stages = Stages::new(&config, &recording.empty).expect("the defaults work");
+    let mut pipeline = Pipeline::new(&config, None).expect("the defaults work");
+    recording.empty.iter().for_each(|frame| pipeline.learn_empty(frame));
+    let (mut whole, mut parts) = (Vec::new(), vec![Vec::new(); 6]);
+    let (mut followed, mut links, mut fewer) = (Vec::new(), Vec::new(), 0);
+    for (k, frame) in recording.frames.iter().enumerate() {
+        if k < BEFORE {
+            pipeline.step(frame);
+            stages.step(frame);
+            continue;
+        }
+        let mut fastest = Duration::MAX;
+        for _ in 1..TRIES {
+            let mut pipeline = pipeline.clone();
+            fastest = fastest.min(timed(|| {
+                pipeline.step(frame);
+            }));
+        }
+        let mut health = Health::default();
+        let last = timed(|| health = pipeline.step(frame).health);
+        whole.push(fastest.min(last));
+        for (part, took) in parts.iter_mut().zip(by_stage(&mut stages, frame)) {
+            part.push(took);
+        }
+        followed.push(stages.tracks.iter().filter(|track| track.confirmed).count());
+        links.push(stages.blockages.len());
+        fewer = health.frames_with_fewer_samples;
+    }
+    let ms = |times: &mut Vec<Duration>, share: f64| {
+        times.sort();
+        times[((times.len() as f64 * share) as usize).min(times.len() - 1)].as_secs_f64() * 1e3
+    };
+    let middle = |values: &mut Vec<usize>| {
+        values.sort();
+        values[values.len() / 2]
+    };
+    print!("{people:6} {access_points:14} {:9} {:6} ", middle(&mut followed), middle(&mut links));
+    print!("{:11.2} {:10.2} ", ms(&mut whole, 0.5), ms(&mut whole, 0.99));
+    for part in &mut parts {
+        print!(" {:6.2}", ms(part, 0.5));
+    }
+    println!(" {fewer:6}");
+}
+
+fn by_stage(stages: &mut Stages, frame: &Frame) -> [Duration; 6] {
+    stages.expect(frame);
+    [
+        timed(|| stages.foreground(frame)),
+        timed(|| stages.clusters()),
+        timed(|| stages.detections()),
+        timed(|| stages.update(frame)),
+        timed(|| stages.forecast()),
+        timed(|| stages.cast()),
+    ]
+}
+
+/// Time of this thread alone, as if nothing else ran on its core.
+fn timed(work: impl FnOnce()) -> Duration {
+    let now = || {
+        let now = clock_gettime(ClockId::ThreadCPUTime);
+        Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
+    };
+    let before = now();
+    work();
+    now() - before
+}

@@ -1,0 +1,41 @@
+//! Which phases of a gait samples take.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::gait::GaitPhase;
+
+/// Quantiles of the phase of a gait.
+#[derive(Debug, Clone)]
+pub struct Phases {
+    first_rad: f64,
+    /// Share of the phases up to each of so many equal steps of a turn, the first from opposite the likeliest phase.
+    shares: [f64; PHASES],
+}
+
+const PHASES: usize = 48;
+
+impl Phases {
+    /// Of a von Mises distribution.
+    pub fn new(gait: &GaitPhase) -> Self {
+        let width_rad = TAU / PHASES as f64;
+        let density = |i: usize| {
+            let off_rad = (i as f64 + 0.5) * width_rad - PI;
+            (gait.concentration * (off_rad.cos() - 1.0)).exp()
+        };
+        let total: f64 = (0..PHASES).map(density).sum();
+        let mut sum = 0.0;
+        let shares = std::array::from_fn(|i| {
+            sum += density(i) / total;
+            sum
+        });
+        Self { first_rad: gait.phase_rad - PI, shares }
+    }
+
+    /// The phase below which a share of them lies.
+    pub fn at(&self, share: f64) -> f64 {
+        let i = self.shares.partition_point(|&up_to| up_to < share).min(PHASES - 1);
+        let below = if i == 0 { 0.0 } else { self.shares[i - 1] };
+        let within = (share - below) / (self.shares[i] - below).max(f64::MIN_POSITIVE);
+        self.first_rad + TAU / PHASES as f64 * (i as f64 + within)
+    }
+}

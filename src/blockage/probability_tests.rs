@@ -1,0 +1,132 @@
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::*;
+use crate::Config;
+use crate::blockage::body::{Posture, blocks};
+use crate::forecast::constant_velocity;
+use crate::gait::GaitPhase;
+use crate::geometry::{Aabb, DVec2, DVec3, Obb};
+
+#[test]
+fn quantiles_count_those_who_come_later_than_the_last_step() {
+    // Of ten, one at step 2, five at step 4, the rest never.
+    let mut counts = [0; MOMENTS];
+    (counts[2], counts[4]) = (1, 5);
+    assert_eq!(quantiles_s(&counts, 10), [Some(0.2), Some(0.4), None]);
+    assert_eq!(quantiles_s(&[0; MOMENTS], 0), [None; 3]);
+}
+
+/// Somebody anywhere within 8 m of the middle, who walks, stands or hurries.
+fn somebody(id: u64, random: &mut Pcg64) -> Track {
+    let mut within = |most: f64| random.random_range(-most..most);
+    let (position_m, velocity_mps) =
+        (DVec2::new(within(8.0), within(8.0)), DVec2::new(within(1.5), within(1.5)));
+    let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE };
+    let mut covariance = [[0.0; 4]; 4];
+    let spread = [0.002, 0.003, 0.02, 0.03].map(|variance| variance * (1.0 + within(0.9)));
+    (0..4).for_each(|i| covariance[i][i] = spread[i]);
+    Track {
+        id,
+        position_m,
+        velocity_mps: if id % 4 == 0 { DVec2::ZERO } else { velocity_mps },
+        covariance,
+        heading_rad: within(3.0),
+        heading_sigma_rad: 0.3,
+        height_m: 1.7 + within(0.3),
+        height_sigma_m: 0.03,
+        width_scale: 1.0 + within(0.1),
+        width_scale_sigma: 0.05,
+        gait: GaitPhase { phase_rad: within(3.0), concentration: 1.0 + within(1.0) },
+        points: 30,
+        confirmed: true,
+        aabb,
+        obb: Obb::from_aabb(&aabb),
+        observed: Default::default(),
+    }
+}
+
+/// Bits of the steps at which a link is blocked in a sample: everybody asked, one ray at a time.
+fn one_by_one(sampler: &Sampler, numbers: &Numbers, ue: &Ue, ap_m: DVec3, q: usize, k: usize) -> u16 {
+    let people = &sampler.people[..sampler.present];
+    let posture = |p: &Trajectories, step: usize| {
+        let i = step * p.samples + k;
+        let speed_hz = p.gait.swing_hz[k];
+        Posture {
+            position_m: DVec2::new(p.x_m[i], p.y_m[i]),
+            ahead: p.ahead[step].rotate(DVec2::from_angle(p.turn_rad[k])),
+            height_m: p.height_m[k],
+            width_scale: p.width_scale[k],
+            speed_mps: p.speed_mps(k),
+            phase_rad: p.gait.phase[1][i].atan2(p.gait.phase[0][i]),
+            arm_swing: if speed_hz == 0.0 { 0.0 } else { 1.0 },
+        }
+    };
+    let q_at = |step: usize| {
+        let (p, i) = (&people[q], step * people[q].samples + k);
+        let facing = p.ahead[step].rotate(DVec2::from_angle(p.turn_rad[k])).to_angle();
+        ue.on_body(DVec2::new(p.x_m[i], p.y_m[i]), facing, p.height_m[k])
+    };
+    let others = || people.iter().enumerate().filter(|(other, _)| *other != q).map(|(_, p)| p);
+    let blocked = |step: usize| others().any(|p| blocks(&numbers.body, &posture(p, step), ap_m, q_at(step)));
+    (0..MOMENTS).fold(0, |bits, step| bits | u16::from(blocked(step)) << step)
+}
+
+/// The chances as they are defined, from the bits of all samples.
+fn chances_of(bits: &[u16], threshold: f64) -> Chances {
+    let share = |steps: u16| bits.iter().filter(|&&at| at & steps != 0).count() as f64 / bits.len() as f64;
+    let all = (1_u16 << MOMENTS) - 1;
+    let of = |chosen: &dyn Fn(u16) -> bool, first: &dyn Fn(u16) -> u32| {
+        let (mut counts, mut total) = ([0; MOMENTS], 0);
+        for &at in bits.iter().filter(|&&at| chosen(at)) {
+            total += 1;
+            counts.get_mut(first(at) as usize).into_iter().for_each(|count| *count += 1);
+        }
+        quantiles_s(&counts, total)
+    };
+    let p_now = share(1);
+    let onset_s = of(&|at| at & 1 == 0, &|at| at.trailing_zeros());
+    let again = |at: u16| (!at & all & (u16::MAX << at.trailing_zeros())).trailing_zeros();
+    let blocked_now = p_now >= threshold;
+    Chances {
+        p_now,
+        blocked_now,
+        p: std::array::from_fn(|w| share((1 << (w + 2)) - 2)),
+        onset_s: if blocked_now { [None; 3] } else { onset_s },
+        duration_s: match (blocked_now, onset_s[0]) {
+            (true, _) => of(&|at| at & 1 == 1, &|at| (!at & all).trailing_zeros()),
+            (false, Some(_)) => of(&|at| at & 1 == 0 && at != 0, &again),
+            (false, None) => [None; 3],
+        },
+    }
+}
+
+#[test]
+fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
+    const THRESHOLD: f64 = 0.47;
+    let config = Config::default();
+    let mut random = Pcg64::seed_from_u64(3);
+    let ear = Ue { forward_m: 0.05, left_m: 0.1, height_share: 0.9 };
+    let aps_m = [DVec3::new(9.0, 1.0, 2.0), DVec3::new(0.0, 0.0, 3.0), DVec3::new(-3.0, -6.0, 0.6)];
+    let mut in_doubt = 0;
+    for (samples, ue) in [(128, config.site.ue), (70, ear)] {
+        let numbers = Numbers { samples, ..Numbers::new(&config.blockage) };
+        let tracks: Vec<Track> = (0..14).map(|id| somebody(id, &mut random)).collect();
+        let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
+        let mut sampler = Sampler::new(&numbers);
+        sampler.draw(&numbers, &ue, &aps_m, tracks.iter().zip(&forecasts));
+        for p in &mut sampler.people {
+            p.walk(numbers.body.arms.still_share, &sampler.draws[&p.track]);
+        }
+        for (ap, &ap_m) in aps_m.iter().enumerate() {
+            for q in 0..tracks.len() {
+                let bits: Vec<u16> =
+                    (0..samples).map(|k| one_by_one(&sampler, &numbers, &ue, ap_m, q, k)).collect();
+                let found = sampler.chances(&numbers, &ue, ap, ap_m, q, THRESHOLD);
+                assert_eq!(found, chances_of(&bits, THRESHOLD), "access point {ap}, person {q}");
+                in_doubt += usize::from(found.p[8] > 0.1 && found.p[8] < 0.9);
+            }
+        }
+    }
+    assert!(in_doubt > 10, "{in_doubt}");
+}
