@@ -328,8 +328,8 @@ impl SensorModel {
                 if range_m == 0.0 {
                     continue;
                 }
-                let azimuth_cdeg =
-                    column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * beam.fire_offset_ns as f32;
+                let turned_cdeg = column.azimuth_rate_cdeg_per_ns * beam.turned_ns as f32;
+                let azimuth_cdeg = column.azimuth_cdeg + turned_cdeg + beam.azimuth_offset_cdeg;
                 let pixel = self.ranges.pixel(b, azimuth_cdeg);
                 // Written so that NaN is caught: it is neither beyond the limit nor in the range.
                 let background = range_m >= self.ranges.limit_m(pixel);

@@ -1,45 +1,42 @@
-//! Sensor models: the beams of a column and how they fire. Elevations and firing times are the manuals'. The z
-//! offsets, by which beams miss the sensor's origin, are those of the manufacturer's calibration files: the VLP-16
-//! manual rounds them to 0.1 mm, in an HDL-32E and a VLP-16 they come to 28.97 and 41.91 mm x tan(-elevation).
+//! Sensor models: their names, and what makes each of a site file's words. Angles and firing times stand in the
+//! family's file or in the sensor's own.
 
+use std::fmt;
 use std::sync::Arc;
 
+use super::packet::Format;
+use super::{Beam, hesai, ouster, velodyne};
 use crate::Error;
-use crate::geometry::DVec3;
-use crate::site::sensor_model;
+use crate::site::Sensor;
 
-/// One laser.
-///
-/// ```
-/// let lowest = umbracast::lidar::Model::hdl_32e().beams[0];
-/// assert_eq!((lowest.ring, lowest.elevation_rad.to_degrees().round()), (0, -31.0));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beam {
-    /// Above the horizon of the sensor, radians.
-    pub elevation_rad: f64,
-    /// Sine and cosine of the elevation: clouds have 100,000 points a frame.
-    pub elevation_sin_cos: (f64, f64),
-    /// Its origin above the sensor's origin, metres.
-    pub z_offset_m: f64,
-    /// When it fires after the column's first beam.
-    pub fire_offset_ns: u32,
-    /// Its place from the lowest beam, 0, to the highest.
-    pub ring: u16,
-}
+/// Every model that sends packets: its name in a site file, the UDP port its packets go to unless told otherwise, and
+/// what makes it.
+const MODELS: [(&str, u16, fn(&Setting) -> Result<Model, Error>); 12] = [
+    ("hdl-32e", velodyne::UDP_PORT, velodyne::hdl_32e),
+    ("vlp-16", velodyne::UDP_PORT, velodyne::vlp_16),
+    ("os0-128", ouster::UDP_PORT, ouster::model),
+    ("os0-64", ouster::UDP_PORT, ouster::model),
+    ("os0-32", ouster::UDP_PORT, ouster::model),
+    ("os1-128", ouster::UDP_PORT, ouster::model),
+    ("os1-64", ouster::UDP_PORT, ouster::model),
+    ("os1-32", ouster::UDP_PORT, ouster::model),
+    ("os2-128", ouster::UDP_PORT, ouster::model),
+    ("os2-64", ouster::UDP_PORT, ouster::model),
+    ("os2-32", ouster::UDP_PORT, ouster::model),
+    ("xt32", hesai::UDP_PORT, hesai::xt32),
+];
 
-impl Beam {
-    /// A point at `range_m` in the sensor's frame: x ahead at azimuth 0, azimuth clockwise from above.
-    ///
-    /// ```
-    /// let beam = umbracast::lidar::Model::hdl_32e().beams[15]; // level
-    /// let ahead_m = beam.point_m(0_f64.sin_cos(), 8.0);
-    /// assert_eq!(ahead_m.to_array(), [8.0, 0.0, 0.0]);
-    /// ```
-    pub fn point_m(&self, azimuth_sin_cos: (f64, f64), range_m: f64) -> DVec3 {
-        let ((sin_el, cos_el), (sin_az, cos_az)) = (self.elevation_sin_cos, azimuth_sin_cos);
-        DVec3::new(range_m * cos_el * cos_az, -range_m * cos_el * sin_az, range_m * sin_el + self.z_offset_m)
-    }
+/// The model of a sensor that is known only by its clouds.
+const POINTS: &str = "points";
+
+/// What a site file says of a model.
+pub(super) struct Setting<'a> {
+    /// As the table spells it.
+    pub name: &'static str,
+    /// Revolutions a second, where the sensor's own file does not say.
+    pub rate_hz: f64,
+    /// The text of the sensor's own file.
+    pub calibration: Option<&'a str>,
 }
 
 /// A spinning sensor.
@@ -48,7 +45,7 @@ impl Beam {
 /// let model = umbracast::lidar::Model::vlp_16();
 /// assert_eq!((model.name, model.beams.len()), ("vlp-16", 16));
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone)]
 pub struct Model {
     /// Its name in a site file.
     pub name: &'static str,
@@ -56,19 +53,34 @@ pub struct Model {
     pub beams: Arc<[Beam]>,
     /// From one column to the next.
     pub column_period_ns: f64,
-    /// Factory byte of its packets.
-    pub product_id: u8,
-    /// Columns in one block of a packet.
-    pub columns_per_block: usize,
+    /// Of a sensor whose columns are the same in every revolution.
+    pub turn: Option<Turn>,
+    /// How columns stand in its packets.
+    pub(super) format: Arc<dyn Format>,
+}
+
+/// Columns that fire at the same azimuths in every revolution.
+///
+/// ```
+/// let turn = umbracast::lidar::Model::by_name("os0-128")?.turn.expect("an Ouster's columns repeat");
+/// assert_eq!((turn.columns, turn.first_cdeg), (1024, 18_000.0));
+/// # Ok::<(), umbracast::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turn {
+    /// How many there are.
+    pub columns: u32,
+    /// Azimuth of the head at the first, hundredths of a degree.
+    pub first_cdeg: f64,
 }
 
 impl Model {
-    /// The model named in a site file.
+    /// The model of a name, as it is delivered and at ten revolutions a second.
     ///
     /// ```
     /// use umbracast::lidar::Model;
     ///
-    /// assert_eq!(Model::by_name("HDL-32E")?, Model::hdl_32e());
+    /// assert_eq!(Model::by_name("HDL-32E")?.beams, Model::hdl_32e().beams);
     /// assert!(Model::by_name("camera").is_err());
     /// # Ok::<(), umbracast::Error>(())
     /// ```
@@ -76,11 +88,34 @@ impl Model {
     /// # Errors
     /// A name that is not known, with those that are.
     pub fn by_name(name: &str) -> Result<Self, Error> {
-        match sensor_model(name) {
-            Some("hdl-32e") => Ok(Self::hdl_32e()),
-            Some("vlp-16") => Ok(Self::vlp_16()),
-            _ => Err(Error::new(format!("sensor model: expected hdl-32e or vlp-16, found {name:?}"))),
-        }
+        Self::make(name, 10.0, None)
+    }
+
+    /// The model of a sensor of a site, with the angles of its own file where there is one.
+    ///
+    /// ```
+    /// use umbracast::{Config, lidar::Model};
+    ///
+    /// let mut sensor = Config::default().site.sensors[0].clone();
+    /// sensor.model = "xt32".to_owned();
+    /// let text: String = (1..=32).map(|c| format!("{c},{},0.05\n", 16 - c)).collect();
+    /// sensor.calibration = Some(format!("Channel,Elevation,Azimuth\n{text}"));
+    /// assert_eq!(Model::of_sensor(&sensor)?.beams[0].azimuth_offset_cdeg, 5.0);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A name that is not known; a file of the sensor that is not understood, or is another sensor's.
+    pub fn of_sensor(sensor: &Sensor) -> Result<Self, Error> {
+        Self::make(&sensor.model, sensor.rate_hz, sensor.calibration.as_deref())
+    }
+
+    fn make(name: &str, rate_hz: f64, calibration: Option<&str>) -> Result<Self, Error> {
+        let (name, _, make) = row(name).ok_or_else(|| {
+            let known = MODELS.map(|(name, ..)| name).join(", ");
+            Error::new(format!("sensor model: expected one of {known}, found {name:?}"))
+        })?;
+        make(&Setting { name, rate_hz, calibration })
     }
 
     /// Velodyne HDL-32E.
@@ -89,61 +124,85 @@ impl Model {
     /// assert_eq!(umbracast::lidar::Model::hdl_32e().beams.len(), 32);
     /// ```
     pub fn hdl_32e() -> Self {
-        const ELEVATION_DEG: [f64; 32] = [
-            -30.67, -9.33, -29.33, -8.00, -28.00, -6.67, -26.67, -5.33, -25.33, -4.00, -24.00, -2.67, -22.67,
-            -1.33, -21.33, 0.00, -20.00, 1.33, -18.67, 2.67, -17.33, 4.00, -16.00, 5.33, -14.67, 6.67,
-            -13.33, 8.00, -12.00, 9.33, -10.67, 10.67,
-        ];
-        const Z_OFFSET_MM: [f64; 32] = [
-            17.17, 4.76, 16.27, 4.07, 15.40, 3.38, 14.54, 2.70, 13.71, 2.02, 12.89, 1.35, 12.09, 0.67, 11.31,
-            0.00, 10.54, -0.67, 9.78, -1.35, 9.04, -2.02, 8.30, -2.70, 7.58, -3.38, 6.86, -4.07, 6.15, -4.76,
-            5.45, -5.45,
-        ];
-        Self {
-            name: "hdl-32e",
-            beams: beams(&ELEVATION_DEG, &Z_OFFSET_MM, 1152),
-            column_period_ns: 46_080.0,
-            product_id: 0x21,
-            columns_per_block: 1,
-        }
+        Self::by_name("hdl-32e").expect("it needs no file")
     }
 
     /// Velodyne VLP-16.
     ///
     /// ```
-    /// assert_eq!(umbracast::lidar::Model::vlp_16().columns_per_block, 2);
+    /// assert_eq!(umbracast::lidar::Model::vlp_16().column_period_ns, 55_296.0);
     /// ```
     pub fn vlp_16() -> Self {
-        const ELEVATION_DEG: [f64; 16] =
-            [-15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0, -7.0, 9.0, -5.0, 11.0, -3.0, 13.0, -1.0, 15.0];
-        const Z_OFFSET_MM: [f64; 16] = [
-            11.23, -0.73, 9.68, -2.20, 8.15, -3.67, 6.64, -5.15, 5.15, -6.64, 3.67, -8.15, 2.20, -9.68, 0.73,
-            -11.23,
-        ];
-        Self {
-            name: "vlp-16",
-            beams: beams(&ELEVATION_DEG, &Z_OFFSET_MM, 2304),
-            column_period_ns: 55_296.0,
-            product_id: 0x22,
-            columns_per_block: 2,
-        }
+        Self::by_name("vlp-16").expect("it needs no file")
+    }
+
+    /// Length of a whole packet of columns, bytes.
+    ///
+    /// ```
+    /// use umbracast::lidar::Model;
+    ///
+    /// assert_eq!(Model::hdl_32e().packet_bytes(), 1206);
+    /// assert_eq!(Model::by_name("os0-128")?.packet_bytes(), 8448);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    pub fn packet_bytes(&self) -> usize {
+        self.format.packet_bytes(self)
     }
 }
 
-fn beams(elevation_deg: &[f64], z_offset_mm: &[f64], fire_period_ns: u32) -> Arc<[Beam]> {
-    let ring = |own: f64| elevation_deg.iter().filter(|&&other| other < own).count() as u16;
-    elevation_deg
-        .iter()
-        .zip(z_offset_mm)
-        .enumerate()
-        .map(|(i, (&elevation, &z))| Beam {
-            elevation_rad: elevation.to_radians(),
-            elevation_sin_cos: elevation.to_radians().sin_cos(),
-            z_offset_m: z * 1e-3,
-            fire_offset_ns: i as u32 * fire_period_ns,
-            ring: ring(elevation),
-        })
-        .collect()
+impl fmt::Debug for Model {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Model").field("name", &self.name).field("format", &self.format).finish_non_exhaustive()
+    }
+}
+
+/// The models that a site file may name; of `points` only clouds are known.
+///
+/// ```
+/// assert!(umbracast::lidar::sensor_models().any(|name| name == "points"));
+/// ```
+pub fn sensor_models() -> impl Iterator<Item = &'static str> {
+    MODELS.into_iter().map(|(name, ..)| name).chain([POINTS])
+}
+
+/// The model of that name, with or without capitals and dashes: `vlp-16` of `VLP-16` and `vlp16`.
+///
+/// ```
+/// use umbracast::lidar::sensor_model;
+///
+/// assert_eq!(sensor_model("VLP16"), Some("vlp-16"));
+/// assert_eq!(sensor_model("OS-0-128"), Some("os0-128"));
+/// assert_eq!(sensor_model("camera"), None);
+/// ```
+pub fn sensor_model(name: &str) -> Option<&'static str> {
+    sensor_models().find(|model| letters(model) == letters(name))
+}
+
+/// The UDP port that a sensor's packets go to: the one its site file names, or its model's; none for a sensor that is
+/// known by its clouds.
+///
+/// ```
+/// use umbracast::{Config, lidar::udp_port};
+///
+/// let mut sensor = Config::default().site.sensors[0].clone();
+/// assert_eq!(udp_port(&sensor), Some(2368));
+/// sensor.model = "os1-64".to_owned();
+/// assert_eq!(udp_port(&sensor), Some(7502));
+/// sensor.udp_port = Some(7000);
+/// assert_eq!(udp_port(&sensor), Some(7000));
+/// ```
+pub fn udp_port(sensor: &Sensor) -> Option<u16> {
+    let (_, port, _) = row(&sensor.model)?;
+    Some(sensor.udp_port.unwrap_or(port))
+}
+
+fn row(name: &str) -> Option<(&'static str, u16, fn(&Setting) -> Result<Model, Error>)> {
+    MODELS.into_iter().find(|(known, ..)| letters(known) == letters(name))
+}
+
+/// A name as it is compared.
+pub(super) fn letters(name: &str) -> String {
+    name.to_ascii_lowercase().replace(['-', '_', ' '], "")
 }
 
 #[cfg(test)]
@@ -151,40 +210,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn offsets_follow_from_one_length_in_each_model() {
-        for (model, arm_m) in [(Model::hdl_32e(), 0.028_97), (Model::vlp_16(), 0.041_91)] {
-            for beam in model.beams.iter() {
-                let expected_m = -arm_m * beam.elevation_rad.tan();
-                assert!((beam.z_offset_m - expected_m).abs() < 2e-5, "{} {beam:?}", model.name);
-            }
-        }
-    }
-
-    #[test]
     fn a_model_is_known_with_or_without_capitals_and_dashes() {
-        for (written, name) in [("VLP-16", "vlp-16"), ("vlp16", "vlp-16"), ("HDL-32E", "hdl-32e")] {
+        let written = [("VLP-16", "vlp-16"), ("vlp16", "vlp-16"), ("HDL-32E", "hdl-32e"), ("OS-1-64", "os1-64")];
+        for (written, name) in written {
             assert_eq!(Model::by_name(written).unwrap().name, name);
         }
         let message = Model::by_name("hdl-64").unwrap_err().to_string();
-        assert_eq!(message, "sensor model: expected hdl-32e or vlp-16, found \"hdl-64\"");
+        assert!(message.starts_with("sensor model: expected one of hdl-32e, vlp-16, os0-128,"), "{message}");
+        assert!(message.ends_with("found \"hdl-64\""), "{message}");
         assert!(Model::by_name("points").is_err(), "a sensor known only by its clouds sends no packets");
     }
 
     #[test]
-    fn rings_count_from_the_lowest_beam() {
-        let model = Model::hdl_32e();
-        let mut beams = model.beams.to_vec();
-        beams.sort_by_key(|beam| beam.ring);
-        assert!(beams.iter().map(|beam| beam.ring).eq(0..32));
-        assert!(beams.is_sorted_by(|a, b| a.elevation_rad < b.elevation_rad));
-    }
-
-    #[test]
-    fn azimuth_turns_clockwise_from_ahead() {
-        let beam = Model::vlp_16().beams[15];
-        let right = beam.point_m(90_f64.to_radians().sin_cos(), 2.0);
-        let elevation_rad = 15_f64.to_radians();
-        let expected = DVec3::new(0.0, -2.0 * elevation_rad.cos(), 2.0 * elevation_rad.sin() - 0.011_23);
-        assert!((right - expected).length() < 1e-12, "{right}");
+    fn every_model_is_made_as_it_is_delivered() {
+        for (name, ..) in MODELS {
+            let model = Model::by_name(name).unwrap();
+            let mut rings: Vec<u16> = model.beams.iter().map(|beam| beam.ring).collect();
+            rings.sort_unstable();
+            assert!(rings.iter().copied().eq(0..model.beams.len() as u16), "{name}");
+            assert!(model.beams.iter().all(|b| (b.direction.length() - 1.0).abs() < 1e-12), "{name}");
+            assert!(name.ends_with(&model.beams.len().to_string()) || name == "hdl-32e", "{name}");
+        }
     }
 }
