@@ -156,8 +156,9 @@ mod tests {
     use super::*;
     use crate::{Config, Mode};
 
-    const SITES: [&str; 2] = [
+    const SITES: [&str; 3] = [
         include_str!("../../config/sites/logictronix.toml"),
+        include_str!("../../config/sites/ouster.toml"),
         include_str!("../../config/sites/lost-sensor.toml"),
     ];
 
@@ -258,6 +259,26 @@ mod tests {
             let found = check_site(&site).unwrap_err().to_string();
             assert!(found.starts_with(story), "{found}");
         }
+    }
+
+    #[test]
+    fn what_a_sensor_may_have_beside_is_understood_and_survives_a_recording() {
+        let text = "[[site.sensors]]\nname = \"door\"\nmodel = \"xt32\"\nposition_m = [16.0, 0.0, 9.0]\n\
+                    rotation_deg = { yaw = 180.0, pitch = 35.0, roll = 0.0 }\ncalibration_file = \"a.csv\"\n\
+                    udp_port = 2370\naddress = \"10.0.0.7\"\n";
+        let config = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap();
+        let angles: String = (1..=32).map(|c| format!("{c},{}.5,-0.1\n", 15 - c)).collect();
+        let config = config.with_calibrations(|_| Ok(format!("Channel,Elevation,Azimuth\n{angles}"))).unwrap();
+        assert_eq!(Config::of_run(&config.to_toml(), "config.toml").unwrap(), config);
+        let again = config.clone().with_calibrations(|_| panic!("its text stands in the file already")).unwrap();
+        assert_eq!(again, config);
+
+        let message = |text: &str| Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
+        let found = message(&text.replace("2370", "\"2370\""));
+        assert_eq!(found, "lab.toml:7:12: site.sensors.udp_port: expected a whole number, found a string");
+        let config = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap();
+        let found = config.with_calibrations(|_| Ok("1,2".to_owned())).unwrap_err().to_string();
+        assert!(found.starts_with("site.sensors.door (a.csv): calibration: line 1: expected channel 1"), "{found}");
     }
 
     /// Six values were to be repeated for each sensor though all are defaults.

@@ -9,9 +9,9 @@
 //! The packet's time is 5.632 us before the last firing. Firings follow each other after 50 us at any speed, lasers of a
 //! firing after 1.512 us, the first of them 0.368 us after the firing's begin.
 //!
-//! A beam's azimuth is its block's and its own offset from the angle file, in hundredths of a degree: so does the
-//! manual of this model and the decoder that it is tested against. (Manuals of later models add what the head turns
-//! while the lasers fire, 0.17 degrees from the first to the last at 10 Hz.)
+//! A beam's azimuth is its block's and its own offset from the angle file: so say the first manual of this model and the
+//! decoder that it is tested against. Later manuals add what the head turns while the lasers of a firing follow one
+//! another, 0.17 degrees to the last at 10 Hz: `turned_ns` would say so.
 //!
 //! Packets with two returns a firing hold each in a block of its own, one after the other, at the same azimuth. Of the
 //! two the more reflecting is given. Position packets (512 bytes) hold no ranges.
@@ -58,8 +58,8 @@ pub(super) fn xt32(setting: &Setting) -> Result<Model, Error> {
         None => (0..BEAMS).map(|channel| (15.0 - channel as f64, 0.0)).collect(),
     };
     let beams = angles_deg.into_iter().enumerate().map(|(channel, (elevation_deg, azimuth_deg))| {
-        // The packet's azimuths are whole hundredths of a degree, and decoders take the offsets as such too.
-        let beam = beam(elevation_deg, (azimuth_deg * 100.0).round() / 100.0, DVec3::ZERO);
+        // The head's azimuths come as whole hundredths of a degree, the offset does not.
+        let beam = beam(elevation_deg, azimuth_deg, DVec3::ZERO);
         Beam { fire_offset_ns: channel as u32 * LASER_NS, whole_cdeg: true, ..beam }
     });
     Ok(Model {

@@ -1,16 +1,15 @@
 //! What `run` reads: recordings, PCD clouds, captures. Each gives frames, one after the other.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use umbracast::lidar::{Assembler, Cloud, Frame, Packet, Scan};
+use umbracast::lidar::{Assembler, Cloud, Frame, Scan};
 use umbracast::{Config, Error, Health, STEP_NS, Site};
-use umbracast_io::pcap::{DATA_PORT, PcapReader};
 use umbracast_io::pcd::read_pcd;
 use umbracast_io::recording::{Entry, RecordingReader};
 
 use crate::setup;
+
+mod captures;
 
 /// The recording without people, beside those of a simulation.
 pub const EMPTY: &str = "empty.mcap";
@@ -33,7 +32,7 @@ pub enum Input {
     Recording(PathBuf),
     /// PCD clouds of one sensor, a frame each, in natural order of their names.
     Clouds(Vec<PathBuf>),
-    /// Captures, one for each sensor in the site's order.
+    /// Captures: one for each sensor in the site's order, or one of all.
     Captures(Vec<PathBuf>),
 }
 
@@ -141,7 +140,7 @@ impl Input {
         match self {
             Self::Recording(file) => recording(file, site, health, &mut sink),
             Self::Clouds(files) => clouds(files, site, health, &mut sink),
-            Self::Captures(files) => captures(files, site, health, &mut sink),
+            Self::Captures(files) => captures::captures(files, site, health, &mut sink),
         }
     }
 }
@@ -197,48 +196,4 @@ fn clouds(files: &[PathBuf], site: &Site, health: &mut Health, sink: Sink) -> Re
         sink(&Frame { index, time_ns, scans: vec![scan] })?;
     }
     Ok(None)
-}
-
-fn captures(
-    files: &[PathBuf],
-    site: &Site,
-    health: &mut Health,
-    sink: Sink,
-) -> Result<Option<String>, Error> {
-    if files.len() != site.sensors.len() {
-        let (expected, found) = (site.sensors.len(), files.len());
-        return Err(Error::new(format!(
-            "expected {expected} captures, one for each sensor of the site in its order, found {found}"
-        ))
-        .within(files[0].display()));
-    }
-    let mut readers = files
-        .iter()
-        .map(|file| {
-            let open = File::open(file).map_err(|e| Error::new(e.to_string()).within(file.display()))?;
-            PcapReader::new(BufReader::new(open), &file.display().to_string())
-        })
-        .collect::<Result<Vec<_>, Error>>()?;
-    let mut assembler = Assembler::new(site)?;
-    let mut next: Vec<Option<Packet>> = readers.iter_mut().map(next_packet).collect();
-    // The packets of all sensors in the order of their times.
-    while let Some(sensor) = (0..next.len())
-        .filter(|&sensor| next[sensor].is_some())
-        .min_by_key(|&sensor| next[sensor].as_ref().map(|packet| packet.time_ns))
-    {
-        if let Some(packet) = next[sensor].take() {
-            assembler.push(sensor, &packet, health);
-        }
-        next[sensor] = next_packet(&mut readers[sensor]);
-        drain(&mut assembler, sink)?;
-    }
-    assembler.finish();
-    drain(&mut assembler, sink)?;
-    let cut = files.iter().zip(&readers).find(|(_, reader)| reader.truncated());
-    Ok(cut.map(|(file, _)| format!("{}: ends within a record", file.display())))
-}
-
-fn next_packet(reader: &mut PcapReader<BufReader<File>>) -> Option<Packet> {
-    let datagram = reader.by_ref().find(|datagram| datagram.port == DATA_PORT)?;
-    Some(Packet { time_ns: datagram.time_ns, payload: datagram.payload })
 }
