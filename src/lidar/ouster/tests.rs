@@ -152,3 +152,36 @@ fn metadata_that_cannot_be_are_refused_with_the_key() {
         assert!(found.starts_with(&format!("calibration: {story}")), "{found}");
     }
 }
+
+#[test]
+fn every_profile_gives_back_what_was_put_into_it() {
+    for profile in PROFILES {
+        let model = of(&old_metadata(profile.name)).unwrap();
+        let column = |c: i64| Column {
+            time_ns: 1_700_000_000_000_000_123 + (c as f64 * model.column_period_ns) as i64,
+            azimuth_cdeg: ((18_000.0 + (500 + c) as f64 * 36_000.0 / 512.0) % 36_000.0) as f32,
+            azimuth_rate_cdeg_per_ns: 7.2e-4,
+        };
+        // Over the end of the turn.
+        let columns: Vec<Column> = (0..16).map(column).collect();
+        let range_m: Vec<f32> = (0..16 * 32_u16).map(|i| f32::from(i * 31) * 0.008).collect();
+        let reflectivity: Vec<u8> = (0..16 * 32_u32).map(|i| (i % 256) as u8).collect();
+        let payload = model.format.encode(&model, &columns, &range_m, &reflectivity);
+        assert_eq!(payload.len(), model.packet_bytes());
+        let (mut got, mut ranges_m, mut reflectivities) = (Vec::new(), Vec::new(), Vec::new());
+        let mut sink = |column: Column, range_m: &[f32], reflectivity: &[u8]| {
+            got.push(column);
+            ranges_m.extend_from_slice(range_m);
+            reflectivities.extend_from_slice(reflectivity);
+        };
+        model.format.decode(&model, &Packet { time_ns: 0, payload }, &mut sink).unwrap();
+        assert!(ranges_m.iter().zip(&range_m).all(|(got, sent)| (got - sent).abs() < 1e-5), "{}", profile.name);
+        // Of a second return without a first nothing is known.
+        let known = |i: usize| range_m[i] > 0.0 || profile.second_at.is_none();
+        let same = |i: usize| !known(i) || reflectivities[i] == reflectivity[i];
+        assert!((0..reflectivity.len()).all(same), "{}", profile.name);
+        for (got, sent) in got.iter().zip(&columns) {
+            assert_eq!((got.time_ns, got.azimuth_cdeg), (sent.time_ns, sent.azimuth_cdeg), "{}", profile.name);
+        }
+    }
+}

@@ -54,7 +54,7 @@ fn people_across_the_cut_round_the_sensor_and_under_it_are_as_an_independent_cas
         ("hdl-32e", 1.3, 8.0, 14_000),
         ("hdl-32e", 2.5, 0.0, 600),
         ("os0-32", 1.3, 8.0, 3000),
-        ("os1-32", 2.5, 20.0, 600),
+        ("os1-32", 1.3, 8.0, 3000),
         ("xt32", 1.3, 8.0, 6000),
     ];
     for (model, height_m, pitch, least) in places {
