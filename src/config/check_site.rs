@@ -268,17 +268,23 @@ mod tests {
                     udp_port = 2370\naddress = \"10.0.0.7\"\n";
         let config = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap();
         let angles: String = (1..=32).map(|c| format!("{c},{}.5,-0.1\n", 15 - c)).collect();
-        let config = config.with_calibrations(|_| Ok(format!("Channel,Elevation,Azimuth\n{angles}"))).unwrap();
+        let config =
+            config.with_calibrations(|_| Ok(format!("Channel,Elevation,Azimuth\n{angles}"))).unwrap();
         assert_eq!(Config::of_run(&config.to_toml(), "config.toml").unwrap(), config);
-        let again = config.clone().with_calibrations(|_| panic!("its text stands in the file already")).unwrap();
+        let again =
+            config.clone().with_calibrations(|_| panic!("its text stands in the file already")).unwrap();
         assert_eq!(again, config);
 
-        let message = |text: &str| Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
+        let message =
+            |text: &str| Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
         let found = message(&text.replace("2370", "\"2370\""));
         assert_eq!(found, "lab.toml:7:12: site.sensors.udp_port: expected a whole number, found a string");
         let config = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap();
         let found = config.with_calibrations(|_| Ok("1,2".to_owned())).unwrap_err().to_string();
-        assert!(found.starts_with("site.sensors.door (a.csv): calibration: line 1: expected channel 1"), "{found}");
+        assert!(
+            found.starts_with("site.sensors.door (a.csv): calibration: line 1: expected channel 1"),
+            "{found}"
+        );
     }
 
     /// Six values were to be repeated for each sensor though all are defaults.

@@ -251,7 +251,10 @@ fn an_unknown_sensor_is_counted_and_an_unknown_model_refused() {
     assert_eq!(health.packets_not_understood, 1);
     site.sensors[1].model = "hdl-64".into();
     let message = Assembler::new(&site).unwrap_err().to_string();
-    assert!(message.starts_with("sensor \"lidar_west\": sensor model: expected one of hdl-32e,"), "{message}");
+    assert!(
+        message.starts_with("sensor \"lidar_west\": sensor model: expected one of hdl-32e,"),
+        "{message}"
+    );
 }
 
 /// An Ouster counts nanoseconds since it was switched on, an XT32 tells the date, an HDL-32E the time in the hour.

@@ -89,7 +89,8 @@ fn angles(text: &str) -> Result<Vec<(f64, f64)>, Error> {
                 angles_deg.push((elevation, azimuth));
             }
             _ => {
-                let expected = format!("channel {} of {BEAMS}, its elevation and azimuth", angles_deg.len() + 1);
+                let expected =
+                    format!("channel {} of {BEAMS}, its elevation and azimuth", angles_deg.len() + 1);
                 return Err(Error::new(format!("line {number}: expected {expected}, found {line:?}")));
             }
         }
@@ -190,9 +191,10 @@ impl Head {
             _ => return None,
         };
         let azimuth = |b: usize| azimuth_cdeg(block(payload, b));
-        let azimuths_ok = (0..BLOCKS)
-            .all(|b| azimuth(b) < TURN_CDEG && azimuth(b) == azimuth(b - b % blocks_per_firing));
-        let head_ok = payload[..2] == FLAG && usize::from(payload[6]) == BEAMS && usize::from(payload[7]) == BLOCKS;
+        let azimuths_ok =
+            (0..BLOCKS).all(|b| azimuth(b) < TURN_CDEG && azimuth(b) == azimuth(b - b % blocks_per_firing));
+        let head_ok =
+            payload[..2] == FLAG && usize::from(payload[6]) == BEAMS && usize::from(payload[7]) == BLOCKS;
         let within_second_us = u32::from_le_bytes([tail[19], tail[20], tail[21], tail[22]]);
         let seconds = seconds_of(tail[13..19].try_into().ok()?)?;
         // A second may hold a leap second's microseconds too.
@@ -221,7 +223,8 @@ fn azimuth_cdeg(block: &[u8]) -> u32 {
 
 /// Seconds since 1970 of a year from 1900 on, month, day, hour, minute and second; none for what is no date.
 fn seconds_of([year, month, day, hour, minute, second]: [u8; 6]) -> Option<i64> {
-    let real = (1..=12).contains(&month) && (1..=31).contains(&day) && hour < 24 && minute < 60 && second < 61;
+    let real =
+        (1..=12).contains(&month) && (1..=31).contains(&day) && hour < 24 && minute < 60 && second < 61;
     // Days since the first of March of year 0: years end with February, the month whose length changes.
     let (year, month) = (1900 + i64::from(year) - i64::from(month < 3), (i64::from(month) + 9) % 12);
     let days = year * 365 + year / 4 - year / 100 + year / 400 + (month * 153 + 2) / 5 + i64::from(day) - 1;

@@ -23,7 +23,8 @@ fn a_date_is_the_seconds_it_came_from() {
 
 #[test]
 fn an_angle_file_gives_the_channels_their_angles_and_a_broken_one_a_line() {
-    let lines = |n: usize| (1..=n).map(|c| format!("{c},{:.3},-0.{c:03}\r\n", 16.25 - c as f64)).collect::<String>();
+    let lines =
+        |n: usize| (1..=n).map(|c| format!("{c},{:.3},-0.{c:03}\r\n", 16.25 - c as f64)).collect::<String>();
     let read = angles(&format!("Channel,Elevation,Azimuth\r\n{}\n", lines(32))).unwrap();
     assert_eq!((read.len(), read[0], read[31]), (32, (15.25, -0.001), (-15.75, -0.032)));
     assert_eq!(angles(&lines(32)).unwrap(), read, "without titles");

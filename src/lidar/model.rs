@@ -9,9 +9,11 @@ use super::{Beam, hesai, ouster, velodyne};
 use crate::Error;
 use crate::site::Sensor;
 
-/// Every model that sends packets: its name in a site file, the UDP port its packets go to unless told otherwise, and
-/// what makes it.
-const MODELS: [(&str, u16, fn(&Setting) -> Result<Model, Error>); 12] = [
+/// A model's name in a site file, the UDP port its packets go to unless told otherwise, and what makes it.
+type Row = (&'static str, u16, fn(&Setting) -> Result<Model, Error>);
+
+/// Every model that sends packets.
+const MODELS: [Row; 12] = [
     ("hdl-32e", velodyne::UDP_PORT, velodyne::hdl_32e),
     ("vlp-16", velodyne::UDP_PORT, velodyne::vlp_16),
     ("os0-128", ouster::UDP_PORT, ouster::model),
@@ -152,7 +154,10 @@ impl Model {
 
 impl fmt::Debug for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Model").field("name", &self.name).field("format", &self.format).finish_non_exhaustive()
+        f.debug_struct("Model")
+            .field("name", &self.name)
+            .field("format", &self.format)
+            .finish_non_exhaustive()
     }
 }
 
@@ -196,7 +201,7 @@ pub fn udp_port(sensor: &Sensor) -> Option<u16> {
     Some(sensor.udp_port.unwrap_or(port))
 }
 
-fn row(name: &str) -> Option<(&'static str, u16, fn(&Setting) -> Result<Model, Error>)> {
+fn row(name: &str) -> Option<Row> {
     MODELS.into_iter().find(|(known, ..)| letters(known) == letters(name))
 }
 
@@ -211,7 +216,8 @@ mod tests {
 
     #[test]
     fn a_model_is_known_with_or_without_capitals_and_dashes() {
-        let written = [("VLP-16", "vlp-16"), ("vlp16", "vlp-16"), ("HDL-32E", "hdl-32e"), ("OS-1-64", "os1-64")];
+        let written =
+            [("VLP-16", "vlp-16"), ("vlp16", "vlp-16"), ("HDL-32E", "hdl-32e"), ("OS-1-64", "os1-64")];
         for (written, name) in written {
             assert_eq!(Model::by_name(written).unwrap().name, name);
         }

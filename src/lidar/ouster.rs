@@ -105,7 +105,8 @@ pub(super) fn model(setting: &Setting) -> Result<Model, Error> {
         Some(text) => metadata::read(text, setting.name).map_err(|e| e.within("calibration"))?,
         None => Geometry::nominal(setting.name, setting.rate_hz),
     };
-    let before_m = if geometry.lift_m == 0.0 { geometry.arm_m } else { geometry.arm_m.hypot(geometry.lift_m) };
+    let before_m =
+        if geometry.lift_m == 0.0 { geometry.arm_m } else { geometry.arm_m.hypot(geometry.lift_m) };
     let angles = geometry.elevation_deg.iter().zip(&geometry.azimuth_deg);
     let beams = angles.map(|(&elevation_deg, &azimuth_deg)| {
         let mut beam = beam(elevation_deg, azimuth_deg, DVec3::ZERO);
@@ -200,9 +201,7 @@ impl Ouster {
         };
         let (first_mm, second_at) = (range_mm(0), profile.second_at);
         match second_at {
-            Some(second_at) if first_mm == 0 => {
-                (range_mm(4) as f32 * RANGE_UNIT_M, reflectivity(second_at))
-            }
+            Some(second_at) if first_mm == 0 => (range_mm(4) as f32 * RANGE_UNIT_M, reflectivity(second_at)),
             _ => (first_mm as f32 * RANGE_UNIT_M, reflectivity(profile.reflectivity_at)),
         }
     }
@@ -226,9 +225,12 @@ impl Format for Ouster {
             _ => return Err(Refused::WrongSize),
         }
         let beams = model.beams.len();
-        let Some(turn) = model.turn.filter(|_| beams <= BEAMS_MAX) else { return Err(Refused::NotUnderstood) };
+        let Some(turn) = model.turn.filter(|_| beams <= BEAMS_MAX) else {
+            return Err(Refused::NotUnderstood);
+        };
         let [packet_head, column_head, ..] = self.frame_bytes();
-        let columns = || payload[packet_head..].chunks_exact(self.column_bytes(beams)).take(self.columns_per_packet);
+        let columns =
+            || payload[packet_head..].chunks_exact(self.column_bytes(beams)).take(self.columns_per_packet);
 
         // Times rise and lie within a frame's length, so that a broken one takes no others along.
         let mut times: Option<(u64, u64)> = None;

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::Health;
-use crate::lidar::packet::tests::{Decoded, decode_all, encoded, example};
 use crate::lidar::packet::encode;
+use crate::lidar::packet::tests::{Decoded, decode_all, encoded, example};
 
 #[test]
 fn fewer_columns_are_filled_up_without_returns() {

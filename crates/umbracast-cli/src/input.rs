@@ -10,6 +10,7 @@ use umbracast_io::recording::{Entry, RecordingReader};
 use crate::setup;
 
 mod captures;
+mod point_clouds;
 
 /// The recording without people, beside those of a simulation.
 pub const EMPTY: &str = "empty.mcap";
@@ -149,6 +150,10 @@ type Sink<'a> = &'a mut dyn FnMut(&Frame) -> Result<(), Error>;
 
 fn recording(file: &Path, site: &Site, health: &mut Health, sink: Sink) -> Result<Option<String>, Error> {
     let mut reader = RecordingReader::open(file)?;
+    if point_clouds::are_all_of(site) {
+        point_clouds::recording(&mut reader, site, health, sink)?;
+        return Ok(reader.lost().map(str::to_owned));
+    }
     let mut assembler = Assembler::new(site)?;
     while let Some(entry) = reader.next_entry()? {
         let Entry::Packets(name, packets) = entry else { continue };

@@ -122,9 +122,10 @@ impl<R: Read> Iterator for PcapReader<R> {
             let from = packet.from;
             let datagram = match packet.is_whole() {
                 true => udp_payload(packet.body).map(|(port, payload)| (port, payload.to_vec())),
-                false => self.fragments.put(&packet).and_then(|whole| {
-                    udp_payload(&whole).map(|(port, payload)| (port, payload.to_vec()))
-                }),
+                false => self
+                    .fragments
+                    .put(&packet)
+                    .and_then(|whole| udp_payload(&whole).map(|(port, payload)| (port, payload.to_vec()))),
             };
             if let Some((port, payload)) = datagram {
                 return Some(Datagram { time_ns, from, port, payload });
@@ -339,9 +340,12 @@ mod tests {
     fn what_is_no_datagram_is_passed_over() {
         let whole = written(&datagrams()[..2]);
         let ip = 40 + ETHERNET_BYTES;
-        for (at, value, why) in
-            [(52, 0x86, "not IPv4"), (ip, 0x65, "version 6"), (ip + 9, 6, "TCP"), (ip + 7, 1, "a last fragment")]
-        {
+        for (at, value, why) in [
+            (52, 0x86, "not IPv4"),
+            (ip, 0x65, "version 6"),
+            (ip + 9, 6, "TCP"),
+            (ip + 7, 1, "a last fragment"),
+        ] {
             let mut bytes = whole.clone();
             bytes[at] = value;
             let read: Vec<_> = PcapReader::new(bytes.as_slice(), "a.pcap").unwrap().collect();

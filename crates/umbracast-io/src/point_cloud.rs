@@ -42,12 +42,14 @@ pub fn read(bytes: &[u8]) -> Option<PointCloud> {
     let length = d.u32()? as usize;
     let data = d.array(length)?;
     let row_step = if height > 1 { row_step } else { point_step.checked_mul(width)? };
-    if point_step == 0 || row_step < point_step.checked_mul(width)? || data.len() < row_step.checked_mul(height)? {
+    if point_step == 0
+        || row_step < point_step.checked_mul(width)?
+        || data.len() < row_step.checked_mul(height)?
+    {
         return None;
     }
-    let field = |names: &[&str]| {
-        fields.iter().find(|(name, _)| names.contains(name)).map(|(_, field)| *field)
-    };
+    let field =
+        |names: &[&str]| fields.iter().find(|(name, _)| names.contains(name)).map(|(_, field)| *field);
     let [x, y, z] = [field(&["x"])?, field(&["y"])?, field(&["z"])?];
     let reflectivity = field(&["intensity", "reflectivity"]);
     let nanoseconds = field(&["t", "offset_time"]);
@@ -111,8 +113,10 @@ mod tests {
 
     /// Two points (1, 2, 3) and (NaN, 0, 0) with fields of these names, types and bytes.
     fn message(time: (&str, u8, &[u8]), big_endian: bool) -> Vec<u8> {
-        let order = |bytes: [u8; 4]| if big_endian { bytes.into_iter().rev().collect() } else { bytes.to_vec() };
-        let f32s = |values: [f32; 3]| values.into_iter().flat_map(|v| order(v.to_le_bytes())).collect::<Vec<u8>>();
+        let order =
+            |bytes: [u8; 4]| if big_endian { bytes.into_iter().rev().collect() } else { bytes.to_vec() };
+        let f32s =
+            |values: [f32; 3]| values.into_iter().flat_map(|v| order(v.to_le_bytes())).collect::<Vec<u8>>();
         let mut e = Encoder::default();
         e.header(STAMP_NS, "lidar");
         e.u32(1);

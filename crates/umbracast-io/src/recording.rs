@@ -65,7 +65,8 @@ impl RecordingWriter {
             .sensors
             .iter()
             .map(|sensor| {
-                let other = Model::of_sensor(sensor).is_ok_and(|m| m.packet_bytes() != messages::PACKET_BYTES);
+                let other =
+                    Model::of_sensor(sensor).is_ok_and(|m| m.packet_bytes() != messages::PACKET_BYTES);
                 let schema = if other { &messages::SENSOR_PACKETS } else { &messages::SCAN };
                 Ok((channel(&format!("/{}/packets", sensor.name), schema)?, !other))
             })
@@ -158,6 +159,8 @@ pub enum Entry {
     Config(String),
     /// Packets of the sensor of this name.
     Packets(String, Vec<Packet>),
+    /// A `sensor_msgs/PointCloud2` as it stands in the file: topic and message, for [`crate::point_cloud::read`].
+    Cloud(String, Vec<u8>),
     /// Anything else: topic, type, bytes.
     Other(String, String, usize),
 }
@@ -226,6 +229,9 @@ impl RecordingReader {
         if let Some(packets) = packets {
             let sensor = topic.trim_matches('/').trim_end_matches("packets").trim_end_matches('/');
             return Entry::Packets(sensor.to_owned(), packets);
+        }
+        if kind == messages::CLOUD.name {
+            return Entry::Cloud(topic.clone(), message.data.to_vec());
         }
         Entry::Other(topic.clone(), kind, message.data.len())
     }
@@ -296,7 +302,8 @@ mod tests {
         config.site.sensors[1].model = "xt32".to_owned();
         let angles: String = (1..=32).map(|c| format!("{c},{}.25,-0.01\n", 16 - c)).collect();
         config.site.sensors[1].calibration = Some(format!("Channel,Elevation,Azimuth\n{angles}"));
-        let packets = [1080, 512, 0, 3].map(|n| Packet { time_ns: 1_700_000_000_123_456_789, payload: vec![7; n] });
+        let packets =
+            [1080, 512, 0, 3].map(|n| Packet { time_ns: 1_700_000_000_123_456_789, payload: vec![7; n] });
         let mut writer = RecordingWriter::create(&path, &config.to_toml(), &config.site, false).unwrap();
         writer.write_packets(0, &[vec![packet(1)], packets.to_vec()]).unwrap();
         writer.finish().unwrap();

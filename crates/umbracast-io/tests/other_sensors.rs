@@ -149,13 +149,15 @@ fn xt32_point_by_point() {
     let mut revolution = 0;
     for firing in 0..8000 {
         let azimuth_cdeg = f64::from(every.columns[2 * firing].azimuth_cdeg);
-        revolution += usize::from(firing > 0 && azimuth_cdeg < f64::from(every.columns[2 * firing - 1].azimuth_cdeg));
+        revolution +=
+            usize::from(firing > 0 && azimuth_cdeg < f64::from(every.columns[2 * firing - 1].azimuth_cdeg));
         for b in 0..32 {
             let looks_cdeg = azimuth_cdeg + f64::from(every.beams[b].azimuth_offset_cdeg);
             let scan = revolution as f64 + (looks_cdeg / 36_000.0).floor();
             let pair = [2 * firing, 2 * firing + 1].map(|c| (c, every.range_m[c * 32 + b]));
             let same = pair[0].1 == pair[1].1;
-            for (c, range_m) in pair.into_iter().skip(usize::from(same)).filter(|(_, range_m)| *range_m > 0.0) {
+            for (c, range_m) in pair.into_iter().skip(usize::from(same)).filter(|(_, range_m)| *range_m > 0.0)
+            {
                 if scan == 3.0 {
                     ours.push((every.point_m(c, b, f64::from(range_m)), b));
                 }

@@ -27,7 +27,9 @@ pub(super) fn read(text: &str, model: &'static str) -> Result<Geometry, Error> {
     let format = &["lidar_data_format", "data_format"];
     let columns = metadata.count(format, "columns_per_frame", COLUMNS_MAX)?.unwrap_or(mode_columns);
     if columns != mode_columns {
-        return Err(Error::new(format!("columns_per_frame: expected {mode_columns} as in lidar_mode, found {columns}")));
+        return Err(Error::new(format!(
+            "columns_per_frame: expected {mode_columns} as in lidar_mode, found {columns}"
+        )));
     }
     let elevation_deg = metadata.angles("beam_altitude_angles", 90.0)?;
     let azimuth_deg = metadata.angles("beam_azimuth_angles", 180.0)?;
@@ -79,7 +81,10 @@ impl<'a> Metadata<'a> {
         let Some(value) = self.find(objects, key) else { return Ok(None) };
         match value.as_u64() {
             Some(count) if (1..=most).contains(&count) => Ok(Some(count)),
-            _ => Err(Error::new(format!("{key}: expected a whole number from 1 to {most}, found {}", short(value)))),
+            _ => Err(Error::new(format!(
+                "{key}: expected a whole number from 1 to {most}, found {}",
+                short(value)
+            ))),
         }
     }
 
@@ -92,9 +97,12 @@ impl<'a> Metadata<'a> {
 
     fn angles(&self, key: &str, most_deg: f64) -> Result<Vec<f64>, Error> {
         let angles = self.numbers(&["beam_intrinsics"], key)?;
-        let angles = angles.ok_or_else(|| Error::new(format!("{key}: expected one angle a beam, found none")))?;
+        let angles =
+            angles.ok_or_else(|| Error::new(format!("{key}: expected one angle a beam, found none")))?;
         if let Some(angle) = angles.iter().find(|angle| angle.abs() > most_deg) {
-            return Err(Error::new(format!("{key}: expected -{most_deg} to {most_deg} degrees, found {angle}")));
+            return Err(Error::new(format!(
+                "{key}: expected -{most_deg} to {most_deg} degrees, found {angle}"
+            )));
         }
         Ok(angles)
     }
@@ -105,11 +113,14 @@ impl<'a> Metadata<'a> {
         let mode = value.and_then(Value::as_str).and_then(|mode| {
             let (columns, rate_hz) = mode.split_once('x')?;
             let (columns, rate_hz) = (columns.parse::<u64>().ok()?, rate_hz.parse::<u32>().ok()?);
-            ((1..=COLUMNS_MAX).contains(&columns) && (1..=50).contains(&rate_hz)).then_some((columns, rate_hz))
+            ((1..=COLUMNS_MAX).contains(&columns) && (1..=50).contains(&rate_hz))
+                .then_some((columns, rate_hz))
         });
         let (columns, rate_hz) = mode.ok_or_else(|| {
             let found = value.map_or("none".to_owned(), short);
-            Error::new(format!("lidar_mode: expected columns and revolutions a second as 1024x10, found {found}"))
+            Error::new(format!(
+                "lidar_mode: expected columns and revolutions a second as 1024x10, found {found}"
+            ))
         })?;
         Ok((columns, f64::from(rate_hz)))
     }
@@ -140,7 +151,8 @@ impl<'a> Metadata<'a> {
         let value = self.find(intrinsics, key);
         let arm_mm = value.and_then(Value::as_f64).filter(|mm| mm.abs() < 1000.0);
         let found = || value.map_or("none".to_owned(), short);
-        let arm_mm = arm_mm.ok_or_else(|| Error::new(format!("{key}: expected a length, found {}", found())))?;
+        let arm_mm =
+            arm_mm.ok_or_else(|| Error::new(format!("{key}: expected a length, found {}", found())))?;
         Ok((arm_mm * 1e-3, 0.0))
     }
 

@@ -88,7 +88,8 @@ fn of_two_returns_the_first_is_given_and_the_second_where_it_is_none() {
             payload[cell + profile.second_at.unwrap()] = 99;
         }
         let mut found = Vec::new();
-        let mut sink = |_: Column, r: &[f32], f: &[u8]| found.extend([(r[0], f[0]), (r[1], f[1]), (r[2], f[2])]);
+        let mut sink =
+            |_: Column, r: &[f32], f: &[u8]| found.extend([(r[0], f[0]), (r[1], f[1]), (r[2], f[2])]);
         model.format.decode(&model, &Packet { time_ns: 0, payload }, &mut sink).unwrap();
         assert_eq!(found, [(2.0, 7), (4.0, 99), (2.0, 7)], "{}", profile.name);
     }
@@ -121,7 +122,11 @@ fn a_column_that_was_not_measured_is_left_out_and_broken_times_are_refused() {
     assert_eq!(decoded(&|p| p[at(3) + 9] = 0xff), Err(Refused::NotUnderstood), "a column beyond the turn");
     assert_eq!(decoded(&|p| p[at(3) + 7] = 0xff), Err(Refused::NotUnderstood), "a time beyond all");
     assert_eq!(decoded(&|p| p[at(3) + 4] = 1), Err(Refused::NotUnderstood), "a time seconds after");
-    assert_eq!(decoded(&|p| p.copy_within(at(2)..at(2) + 8, at(3))), Err(Refused::NotUnderstood), "a time twice");
+    assert_eq!(
+        decoded(&|p| p.copy_within(at(2)..at(2) + 8, at(3))),
+        Err(Refused::NotUnderstood),
+        "a time twice"
+    );
 }
 
 #[test]
@@ -138,8 +143,16 @@ fn metadata_that_cannot_be_are_refused_with_the_key() {
         ("512x20", "1024x20", "columns_per_frame: expected 1024 as in lidar_mode, found 512"),
         ("512x20", "99999999x20", "lidar_mode: expected"),
         ("RNG15_RFL8_NIR8", "RNG15", "udp_profile_lidar: expected one of LEGACY, "),
-        ("\"columns_per_packet\": 16", "\"columns_per_packet\": 512", "columns_per_packet: expected packets of at"),
-        ("\"columns_per_packet\": 16", "\"columns_per_packet\": 0", "columns_per_packet: expected a whole number"),
+        (
+            "\"columns_per_packet\": 16",
+            "\"columns_per_packet\": 512",
+            "columns_per_packet: expected packets of at",
+        ),
+        (
+            "\"columns_per_packet\": 16",
+            "\"columns_per_packet\": 0",
+            "columns_per_packet: expected a whole number",
+        ),
         ("[21,", "[", "beams: expected 32 as an os1-32 has, found 31 beam_altitude_angles, 32 beam_azimuth"),
         ("[21,", "[91,", "beam_altitude_angles: expected -90 to 90 degrees, found 91"),
         ("[21,", "[\"high\",", "beam_altitude_angles: expected a list of numbers, found [\"high\""),
@@ -175,13 +188,22 @@ fn every_profile_gives_back_what_was_put_into_it() {
             reflectivities.extend_from_slice(reflectivity);
         };
         model.format.decode(&model, &Packet { time_ns: 0, payload }, &mut sink).unwrap();
-        assert!(ranges_m.iter().zip(&range_m).all(|(got, sent)| (got - sent).abs() < 1e-5), "{}", profile.name);
+        assert!(
+            ranges_m.iter().zip(&range_m).all(|(got, sent)| (got - sent).abs() < 1e-5),
+            "{}",
+            profile.name
+        );
         // Of a second return without a first nothing is known.
         let known = |i: usize| range_m[i] > 0.0 || profile.second_at.is_none();
         let same = |i: usize| !known(i) || reflectivities[i] == reflectivity[i];
         assert!((0..reflectivity.len()).all(same), "{}", profile.name);
         for (got, sent) in got.iter().zip(&columns) {
-            assert_eq!((got.time_ns, got.azimuth_cdeg), (sent.time_ns, sent.azimuth_cdeg), "{}", profile.name);
+            assert_eq!(
+                (got.time_ns, got.azimuth_cdeg),
+                (sent.time_ns, sent.azimuth_cdeg),
+                "{}",
+                profile.name
+            );
         }
     }
 }

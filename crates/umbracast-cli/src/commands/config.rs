@@ -1,7 +1,7 @@
 //! `config`: the commented default, the complete values of a mode, or a check of a file.
 
-use umbracast::config::DEFAULT_TOML;
 use umbracast::Error;
+use umbracast::config::DEFAULT_TOML;
 
 use crate::ending::Ending;
 use crate::{args, say, setup};

@@ -74,7 +74,8 @@ impl Sender {
 /// # Errors
 /// Two of them whose datagrams cannot be told apart.
 fn whole_site(site: &Site) -> Result<Vec<Sender>, Error> {
-    let senders: Vec<Sender> = site.sensors.iter().enumerate().map(|(s, sensor)| Sender::of(s, sensor)).collect();
+    let senders: Vec<Sender> =
+        site.sensors.iter().enumerate().map(|(s, sensor)| Sender::of(s, sensor)).collect();
     for (i, one) in senders.iter().enumerate() {
         let same = |other: &&Sender| {
             let apart = matches!((one.address, other.address), (Some(a), Some(b)) if a != b);

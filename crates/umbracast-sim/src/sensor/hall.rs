@@ -30,8 +30,7 @@ impl HallImage {
     /// Traces the hall from a sensor that hangs within it.
     pub fn trace(site: &Site, model: &Model, site_from_sensor: &Pose) -> Self {
         let hall = Solids::new(site);
-        let (count, first_cdeg) =
-            model.turn.map_or((TURN_CDEG, 0.0), |turn| (turn.columns, turn.first_cdeg));
+        let (count, first_cdeg) = model.turn.map_or((TURN_CDEG, 0.0), |turn| (turn.columns, turn.first_cdeg));
         let rays = model.beams.len() * count as usize;
         let (mut ranges_m, mut reflectivities) = (Vec::with_capacity(rays), Vec::with_capacity(rays));
         let azimuth_rad = |i| first_cdeg * (TAU / 36_000.0) + f64::from(i) * (TAU / f64::from(count));

@@ -77,7 +77,8 @@ impl Painter {
             .map(|(beam, b)| SlopedBeam {
                 beam,
                 slope: b.elevation_rad.tan(),
-                turned_cdeg: head.rate_cdeg_per_ns * f64::from(b.turned_ns) + f64::from(b.azimuth_offset_cdeg),
+                turned_cdeg: head.rate_cdeg_per_ns * f64::from(b.turned_ns)
+                    + f64::from(b.azimuth_offset_cdeg),
             })
             .collect();
         beams.sort_by(|a, b| a.slope.total_cmp(&b.slope));
