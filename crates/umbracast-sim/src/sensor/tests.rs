@@ -108,7 +108,7 @@ fn assert_as_the_oracle_sees(
         bodies += view.owner.iter().filter(|&&owner| owner != NOBODY).count();
     }
     let apart = differences.len();
-    assert!(apart <= rays / 10_000, "{apart} of {rays} rays differ by more than 1 mm");
+    assert!(apart <= rays.div_ceil(10_000), "{apart} of {rays} rays differ by more than 1 mm");
     differences.retain(|d| !d.at_silhouette());
     assert!(differences.is_empty(), "away from silhouettes: {differences:?}");
     bodies
