@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;
 
-use super::packet::{TIME_LIMIT_NS, decode};
+use super::model::TIME_LIMIT_NS;
+use super::packet::decode;
 use super::{Cloud, Column, Frame, Model, Packet, RangeImage, Scan, sensor_model};
 use crate::geometry::Pose;
 use crate::{Error, Health, STEP_NS, Site};

@@ -19,9 +19,8 @@
 use std::sync::Arc;
 
 use super::beam::{beam, ranked};
-use super::model::Setting;
-use super::packet::{Format, Refused, Sink, TIME_LIMIT_NS, TURN_CDEG, units_of, whole_azimuth_cdeg};
-use super::{Beam, Column, Model, Packet};
+use super::model::{Format, Refused, Setting, Sink, TIME_LIMIT_NS, TURN_CDEG, units_of, whole_azimuth_cdeg};
+use super::{Beam, Column, Model};
 use crate::Error;
 use crate::geometry::DVec3;
 
@@ -113,8 +112,7 @@ impl Format for Xt32 {
         TAIL_AT + TAIL_BYTES + SEQUENCE_BYTES
     }
 
-    fn decode(&self, _: &Model, packet: &Packet, sink: Sink) -> Result<(), Refused> {
-        let payload = packet.payload.as_slice();
+    fn decode(&self, _: &Model, _: i64, payload: &[u8], sink: Sink) -> Result<(), Refused> {
         match payload.len().checked_sub(TAIL_AT + TAIL_BYTES) {
             Some(0 | SEQUENCE_BYTES) => {}
             _ if payload.len() == POSITION_BYTES => return Err(Refused::NoRanges),

@@ -58,7 +58,7 @@ fn of_two_returns_the_more_reflecting_is_given_four_firings_a_packet() {
     payload[TAIL_AT + 10] = 0x39;
     let mut found = Vec::new();
     let mut sink = |column: Column, range_m: &[f32], _: &[u8]| found.push((column.time_ns, range_m[5]));
-    Xt32.decode(&model, &Packet { time_ns: 0, payload }, &mut sink).unwrap();
+    Xt32.decode(&model, 0, &payload, &mut sink).unwrap();
     let (times, ranges): (Vec<i64>, Vec<f32>) = found.into_iter().unzip();
     assert_eq!(ranges, [8.0, 4.0, 8.0, 8.0]);
     // The last of four firings ends where the last of eight does.
@@ -76,6 +76,6 @@ fn the_last_firing_comes_with_the_packet_s_time() {
     payload.truncate(TAIL_AT + TAIL_BYTES);
     let mut times = Vec::new();
     let mut sink = |column: Column, _: &[f32], _: &[u8]| times.push(column.time_ns);
-    Xt32.decode(&model, &Packet { time_ns: 0, payload }, &mut sink).expect("old firmware numbers no packets");
+    Xt32.decode(&model, 0, &payload, &mut sink).expect("old firmware numbers no packets");
     assert_eq!((times.len(), times[7]), (8, 1_673_400_677_250_006_000));
 }

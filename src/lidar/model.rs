@@ -1,45 +1,14 @@
-//! Sensor models: their names, and what makes each of a site file's words. Angles and firing times stand in the
-//! family's file or in the sensor's own.
+//! What a sensor model is, and what a family of them has to give.
 
-use std::fmt;
+use std::fmt::{self, Debug};
 use std::sync::Arc;
 
-use super::packet::Format;
-use super::{Beam, hesai, ouster, velodyne};
-use crate::Error;
-use crate::site::Sensor;
+use super::{Beam, Column};
 
-/// A model's name in a site file, the UDP port its packets go to unless told otherwise, and what makes it.
-type Row = (&'static str, u16, fn(&Setting) -> Result<Model, Error>);
-
-/// Every model that sends packets.
-const MODELS: [Row; 12] = [
-    ("hdl-32e", velodyne::UDP_PORT, velodyne::hdl_32e),
-    ("vlp-16", velodyne::UDP_PORT, velodyne::vlp_16),
-    ("os0-128", ouster::UDP_PORT, ouster::model),
-    ("os0-64", ouster::UDP_PORT, ouster::model),
-    ("os0-32", ouster::UDP_PORT, ouster::model),
-    ("os1-128", ouster::UDP_PORT, ouster::model),
-    ("os1-64", ouster::UDP_PORT, ouster::model),
-    ("os1-32", ouster::UDP_PORT, ouster::model),
-    ("os2-128", ouster::UDP_PORT, ouster::model),
-    ("os2-64", ouster::UDP_PORT, ouster::model),
-    ("os2-32", ouster::UDP_PORT, ouster::model),
-    ("xt32", hesai::UDP_PORT, hesai::xt32),
-];
-
-/// The model of a sensor that is known only by its clouds.
-const POINTS: &str = "points";
-
-/// What a site file says of a model.
-pub(super) struct Setting<'a> {
-    /// As the table spells it.
-    pub name: &'static str,
-    /// Revolutions a second, where the sensor's own file does not say.
-    pub rate_hz: f64,
-    /// The text of the sensor's own file.
-    pub calibration: Option<&'a str>,
-}
+/// Times beyond this (146 years from the epoch) are no sensor's; below it sums of times cannot overflow.
+pub(super) const TIME_LIMIT_NS: u64 = 1 << 62;
+/// A whole turn, hundredths of a degree.
+pub(super) const TURN_CDEG: u32 = 36_000;
 
 /// A spinning sensor.
 ///
@@ -77,67 +46,6 @@ pub struct Turn {
 }
 
 impl Model {
-    /// The model of a name, as it is delivered and at ten revolutions a second.
-    ///
-    /// ```
-    /// use umbracast::lidar::Model;
-    ///
-    /// assert_eq!(Model::by_name("HDL-32E")?.beams, Model::hdl_32e().beams);
-    /// assert!(Model::by_name("camera").is_err());
-    /// # Ok::<(), umbracast::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// A name that is not known, with those that are.
-    pub fn by_name(name: &str) -> Result<Self, Error> {
-        Self::make(name, 10.0, None)
-    }
-
-    /// The model of a sensor of a site, with the angles of its own file where there is one.
-    ///
-    /// ```
-    /// use umbracast::{Config, lidar::Model};
-    ///
-    /// let mut sensor = Config::default().site.sensors[0].clone();
-    /// sensor.model = "xt32".to_owned();
-    /// let text: String = (1..=32).map(|c| format!("{c},{},0.05\n", 16 - c)).collect();
-    /// sensor.calibration = Some(format!("Channel,Elevation,Azimuth\n{text}"));
-    /// assert_eq!(Model::of_sensor(&sensor)?.beams[0].azimuth_offset_cdeg, 5.0);
-    /// # Ok::<(), umbracast::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// A name that is not known; a file of the sensor that is not understood, or is another sensor's.
-    pub fn of_sensor(sensor: &Sensor) -> Result<Self, Error> {
-        Self::make(&sensor.model, sensor.rate_hz, sensor.calibration.as_deref())
-    }
-
-    fn make(name: &str, rate_hz: f64, calibration: Option<&str>) -> Result<Self, Error> {
-        let (name, _, make) = row(name).ok_or_else(|| {
-            let known = MODELS.map(|(name, ..)| name).join(", ");
-            Error::new(format!("sensor model: expected one of {known}, found {name:?}"))
-        })?;
-        make(&Setting { name, rate_hz, calibration })
-    }
-
-    /// Velodyne HDL-32E.
-    ///
-    /// ```
-    /// assert_eq!(umbracast::lidar::Model::hdl_32e().beams.len(), 32);
-    /// ```
-    pub fn hdl_32e() -> Self {
-        Self::by_name("hdl-32e").expect("it needs no file")
-    }
-
-    /// Velodyne VLP-16.
-    ///
-    /// ```
-    /// assert_eq!(umbracast::lidar::Model::vlp_16().column_period_ns, 55_296.0);
-    /// ```
-    pub fn vlp_16() -> Self {
-        Self::by_name("vlp-16").expect("it needs no file")
-    }
-
     /// Length of a whole packet of columns, bytes.
     ///
     /// ```
@@ -161,81 +69,59 @@ impl fmt::Debug for Model {
     }
 }
 
-/// The models that a site file may name; of `points` only clouds are known.
-///
-/// ```
-/// assert!(umbracast::lidar::sensor_models().any(|name| name == "points"));
-/// ```
-pub fn sensor_models() -> impl Iterator<Item = &'static str> {
-    MODELS.into_iter().map(|(name, ..)| name).chain([POINTS])
+/// What a site file says of a model.
+pub(super) struct Setting<'a> {
+    /// As the table spells it.
+    pub name: &'static str,
+    /// Revolutions a second, where the sensor's own file does not say.
+    pub rate_hz: f64,
+    /// The text of the sensor's own file.
+    pub calibration: Option<&'a str>,
 }
 
-/// The model of that name, with or without capitals and dashes: `vlp-16` of `VLP-16` and `vlp16`.
-///
-/// ```
-/// use umbracast::lidar::sensor_model;
-///
-/// assert_eq!(sensor_model("VLP16"), Some("vlp-16"));
-/// assert_eq!(sensor_model("OS-0-128"), Some("os0-128"));
-/// assert_eq!(sensor_model("camera"), None);
-/// ```
-pub fn sensor_model(name: &str) -> Option<&'static str> {
-    sensor_models().find(|model| letters(model) == letters(name))
+/// Takes a column with its ranges and reflectivities.
+pub(super) type Sink<'a> = &'a mut dyn FnMut(Column, &[f32], &[u8]);
+
+/// How columns stand in the packets of a family.
+pub(super) trait Format: Debug + Send + Sync {
+    /// Of a whole packet.
+    fn columns_per_packet(&self, model: &Model) -> usize;
+    /// Length of a whole packet.
+    fn packet_bytes(&self, model: &Model) -> usize;
+    /// Gives each column, in order of time, to `sink`, or none and why.
+    fn decode(&self, model: &Model, received_ns: i64, payload: &[u8], sink: Sink) -> Result<(), Refused>;
+    /// The payload of columns that follow one another: what `packet::encode` promises.
+    fn encode(&self, model: &Model, columns: &[Column], range_m: &[f32], reflectivity: &[u8]) -> Vec<u8>;
 }
 
-/// The UDP port that a sensor's packets go to: the one its site file names, or its model's; none for a sensor that is
-/// known by its clouds.
-///
-/// ```
-/// use umbracast::{Config, lidar::udp_port};
-///
-/// let mut sensor = Config::default().site.sensors[0].clone();
-/// assert_eq!(udp_port(&sensor), Some(2368));
-/// sensor.model = "os1-64".to_owned();
-/// assert_eq!(udp_port(&sensor), Some(7502));
-/// sensor.udp_port = Some(7000);
-/// assert_eq!(udp_port(&sensor), Some(7000));
-/// ```
-pub fn udp_port(sensor: &Sensor) -> Option<u16> {
-    let (_, port, _) = row(&sensor.model)?;
-    Some(sensor.udp_port.unwrap_or(port))
+/// Why a packet gives no column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Refused {
+    /// The sensor sends it too, but it holds no ranges: its position, its motion.
+    NoRanges,
+    /// Longer or shorter than a packet of this sensor.
+    WrongSize,
+    /// Of the right length, and not what this sensor sends.
+    NotUnderstood,
 }
 
-fn row(name: &str) -> Option<Row> {
-    MODELS.into_iter().find(|(known, ..)| letters(known) == letters(name))
+/// Whole units of a range, 0 for what is negative, not a number or more than `most`.
+pub(super) fn units_of(range_m: f32, unit_m: f32, most: u32) -> u32 {
+    // The cast takes what is negative or not a number to 0.
+    let units = (range_m / unit_m).round() as u32;
+    if units > most { 0 } else { units }
+}
+
+/// The azimuth of column `c` of a packet in whole hundredths of a degree; past the last one the head turns on.
+pub(super) fn whole_azimuth_cdeg(model: &Model, columns: &[Column], c: usize) -> u16 {
+    let last = c.min(columns.len() - 1);
+    let past_ns = (c - last) as f64 * model.column_period_ns;
+    let column = &columns[last];
+    let azimuth_cdeg = f64::from(column.azimuth_cdeg) + f64::from(column.azimuth_rate_cdeg_per_ns) * past_ns;
+    (azimuth_cdeg.round() as i64).rem_euclid(i64::from(TURN_CDEG)) as u16
 }
 
 /// A name as it is compared.
 pub(super) fn letters(name: &str) -> String {
     name.to_ascii_lowercase().replace(['-', '_', ' '], "")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_model_is_known_with_or_without_capitals_and_dashes() {
-        let written =
-            [("VLP-16", "vlp-16"), ("vlp16", "vlp-16"), ("HDL-32E", "hdl-32e"), ("OS-1-64", "os1-64")];
-        for (written, name) in written {
-            assert_eq!(Model::by_name(written).unwrap().name, name);
-        }
-        let message = Model::by_name("hdl-64").unwrap_err().to_string();
-        assert!(message.starts_with("sensor model: expected one of hdl-32e, vlp-16, os0-128,"), "{message}");
-        assert!(message.ends_with("found \"hdl-64\""), "{message}");
-        assert!(Model::by_name("points").is_err(), "a sensor known only by its clouds sends no packets");
-    }
-
-    #[test]
-    fn every_model_is_made_as_it_is_delivered() {
-        for (name, ..) in MODELS {
-            let model = Model::by_name(name).unwrap();
-            let mut rings: Vec<u16> = model.beams.iter().map(|beam| beam.ring).collect();
-            rings.sort_unstable();
-            assert!(rings.iter().copied().eq(0..model.beams.len() as u16), "{name}");
-            assert!(model.beams.iter().all(|b| (b.direction.length() - 1.0).abs() < 1e-12), "{name}");
-            assert!(name.ends_with(&model.beams.len().to_string()) || name == "hdl-32e", "{name}");
-        }
-    }
 }

@@ -15,90 +15,25 @@
 //! Of the two returns of a dual profile the first is given, the strongest unless the sensor was told another order;
 //! the second where the first is none. What the sensor says of its motion (48 bytes) holds no ranges.
 
+mod geometry;
 mod metadata;
 
 use std::sync::Arc;
 
 use super::beam::{beam, ranked};
-use super::model::{Setting, Turn};
-use super::packet::{Format, Refused, Sink, TIME_LIMIT_NS, TURN_CDEG, units_of};
-use super::{Column, Model, Packet};
+use super::model::{Format, Refused, Setting, Sink, TIME_LIMIT_NS, TURN_CDEG, Turn, units_of};
+use super::{Column, Model};
 use crate::geometry::DVec3;
 use crate::{Error, STEP_NS};
+use geometry::{BEAMS_MAX, Geometry, Layout, Profile};
 
 /// Where the sensors send their packets unless told otherwise.
 pub(super) const UDP_PORT: u16 = 7502;
 
 const MOTION_BYTES: usize = 48;
-const BEAMS_MAX: usize = 256;
 const RANGE_UNIT_M: f32 = 0.001;
 /// Encoder counts in a turn, in legacy packets.
 const ENCODER_TURN: u64 = 90_112;
-
-/// What a cell of a packet holds. Ranges stand at its beginning, the second one 4 bytes further.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Profile {
-    /// As the metadata names it.
-    name: &'static str,
-    /// Length of a cell.
-    cell_bytes: usize,
-    /// Bits of a range.
-    range_bits: u32,
-    /// Its unit, mm.
-    range_mm: u32,
-    /// Where the reflectivity stands, and that of the second return.
-    reflectivity_at: usize,
-    second_at: Option<usize>,
-    layout: Layout,
-}
-
-/// What stands around the cells.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Layout {
-    Legacy,
-    Standard,
-    /// As standard, but for the places of the header's numbers.
-    FunctionalSafety,
-}
-
-const PROFILES: [Profile; 6] = [
-    profile("LEGACY", 12, (20, 1), 4, None, Layout::Legacy),
-    profile("RNG15_RFL8_NIR8", 4, (15, 8), 2, None, Layout::Standard),
-    profile("RNG15_RFL8_NIR8_DUAL", 8, (15, 8), 2, Some(6), Layout::Standard),
-    profile("RNG19_RFL8_SIG16_NIR16", 12, (19, 1), 4, None, Layout::Standard),
-    profile("RNG19_RFL8_SIG16_NIR16_DUAL", 16, (19, 1), 3, Some(7), Layout::Standard),
-    profile("FUSA_RNG15_RFL8_NIR8_DUAL", 8, (15, 8), 2, Some(6), Layout::FunctionalSafety),
-];
-
-const fn profile(
-    name: &'static str,
-    cell_bytes: usize,
-    (range_bits, range_mm): (u32, u32),
-    reflectivity_at: usize,
-    second_at: Option<usize>,
-    layout: Layout,
-) -> Profile {
-    Profile { name, cell_bytes, range_bits, range_mm, reflectivity_at, second_at, layout }
-}
-
-/// All that differs between two sensors.
-#[derive(Debug, Clone)]
-struct Geometry {
-    profile: Profile,
-    columns: u32,
-    columns_per_packet: usize,
-    rate_hz: f64,
-    /// From the highest beam down, as cells come.
-    elevation_deg: Vec<f64>,
-    /// To the right of the column.
-    azimuth_deg: Vec<f64>,
-    /// From the lidar's middle to where a beam starts: outwards and up.
-    arm_m: f64,
-    lift_m: f64,
-    /// From the lidar to the sensor's frame: a turn about z, counter-clockwise from above, and a step up.
-    yaw_rad: f64,
-    up_m: f64,
-}
 
 pub(super) fn model(setting: &Setting) -> Result<Model, Error> {
     let geometry = match setting.calibration {
@@ -127,34 +62,6 @@ pub(super) fn model(setting: &Setting) -> Result<Model, Error> {
             columns_per_packet: geometry.columns_per_packet,
         }),
     })
-}
-
-impl Geometry {
-    /// The data sheet's: beams evenly over the field of view, four azimuths in turn as the captures of an OS-0-128 and
-    /// an OS-1-128 have them, and the manufacturer's design values for the rest. Each sensor departs from it by
-    /// up to a degree: its own metadata tell.
-    fn nominal(name: &'static str, rate_hz: f64) -> Self {
-        let (line, rows) = name.split_once('-').unwrap_or((name, "128"));
-        let rows: usize = rows.parse().unwrap_or(128);
-        let (half_fov_deg, aside_deg, arm_m) = match line {
-            "os0" => (45.0, 3.6, 0.027_67),
-            "os1" => (22.5, 1.4, 0.015_806),
-            _ => (11.25, 0.7, 0.013_762),
-        };
-        let elevation = |row: usize| half_fov_deg * (1.0 - 2.0 * row as f64 / (rows - 1) as f64);
-        Self {
-            profile: PROFILES[1],
-            columns: 1024,
-            columns_per_packet: 16,
-            rate_hz,
-            elevation_deg: (0..rows).map(elevation).collect(),
-            azimuth_deg: (0..rows).map(|row| aside_deg * [3.0, 1.0, -1.0, -3.0][row % 4]).collect(),
-            arm_m,
-            lift_m: 0.0,
-            yaw_rad: std::f64::consts::PI,
-            up_m: 0.036_18,
-        }
-    }
 }
 
 /// The codec.
@@ -217,8 +124,7 @@ impl Format for Ouster {
         head + self.columns_per_packet * self.column_bytes(model.beams.len()) + foot
     }
 
-    fn decode(&self, model: &Model, packet: &Packet, sink: Sink) -> Result<(), Refused> {
-        let payload = packet.payload.as_slice();
+    fn decode(&self, model: &Model, _: i64, payload: &[u8], sink: Sink) -> Result<(), Refused> {
         match payload.len() {
             length if length == self.packet_bytes(model) => {}
             MOTION_BYTES => return Err(Refused::NoRanges),

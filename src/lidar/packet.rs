@@ -1,15 +1,9 @@
 //! A sensor's packet, and the codec: bytes to columns and back. The layouts stand in the families' files.
 
-use std::fmt::Debug;
-
+use super::model::Refused;
 pub use super::velodyne::PAYLOAD_BYTES;
 use super::{Column, Model};
 use crate::Health;
-
-/// Times beyond this (146 years from the epoch) are no sensor's; below it sums of times cannot overflow.
-pub(super) const TIME_LIMIT_NS: u64 = 1 << 62;
-/// A whole turn, hundredths of a degree.
-pub(super) const TURN_CDEG: u32 = 36_000;
 
 /// A sensor's UDP payload with the time it was received (simulation: sent).
 ///
@@ -26,32 +20,6 @@ pub struct Packet {
     pub time_ns: i64,
     /// The payload: 1206 bytes of a Velodyne, 1080 of an XT32, up to 33,024 of an Ouster.
     pub payload: Vec<u8>,
-}
-
-/// Takes a column with its ranges and reflectivities.
-pub(super) type Sink<'a> = &'a mut dyn FnMut(Column, &[f32], &[u8]);
-
-/// How columns stand in the packets of a family.
-pub(super) trait Format: Debug + Send + Sync {
-    /// Of a whole packet.
-    fn columns_per_packet(&self, model: &Model) -> usize;
-    /// Length of a whole packet.
-    fn packet_bytes(&self, model: &Model) -> usize;
-    /// Gives each column, in order of time, to `sink`, or none and why.
-    fn decode(&self, model: &Model, packet: &Packet, sink: Sink) -> Result<(), Refused>;
-    /// The payload of columns that follow one another: what [`encode`] promises.
-    fn encode(&self, model: &Model, columns: &[Column], range_m: &[f32], reflectivity: &[u8]) -> Vec<u8>;
-}
-
-/// Why a packet gives no column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refused {
-    /// The sensor sends it too, but it holds no ranges: its position, its motion.
-    NoRanges,
-    /// Longer or shorter than a packet of this sensor.
-    WrongSize,
-    /// Of the right length, and not what this sensor sends.
-    NotUnderstood,
 }
 
 /// How many columns a whole packet of a sensor holds.
@@ -86,7 +54,7 @@ pub fn decode(
     health: &mut Health,
     mut sink: impl FnMut(Column, &[f32], &[u8]),
 ) {
-    match model.format.decode(model, packet, &mut sink) {
+    match model.format.decode(model, packet.time_ns, &packet.payload, &mut sink) {
         Ok(()) | Err(Refused::NoRanges) => {}
         Err(Refused::WrongSize) => health.packets_wrong_size += 1,
         Err(Refused::NotUnderstood) => health.packets_not_understood += 1,
@@ -116,22 +84,6 @@ pub fn encode(
     assert_eq!(range_m.len(), columns.len() * model.beams.len(), "one range a column and beam");
     assert_eq!(reflectivity.len(), range_m.len(), "one reflectivity a range");
     Packet { time_ns: packet_time_ns, payload: model.format.encode(model, columns, range_m, reflectivity) }
-}
-
-/// Whole units of a range, 0 for what is negative, not a number or more than `most`.
-pub(super) fn units_of(range_m: f32, unit_m: f32, most: u32) -> u32 {
-    // The cast takes what is negative or not a number to 0.
-    let units = (range_m / unit_m).round() as u32;
-    if units > most { 0 } else { units }
-}
-
-/// The azimuth of column `c` of a packet in whole hundredths of a degree; past the last one the head turns on.
-pub(super) fn whole_azimuth_cdeg(model: &Model, columns: &[Column], c: usize) -> u16 {
-    let last = c.min(columns.len() - 1);
-    let past_ns = (c - last) as f64 * model.column_period_ns;
-    let column = &columns[last];
-    let azimuth_cdeg = f64::from(column.azimuth_cdeg) + f64::from(column.azimuth_rate_cdeg_per_ns) * past_ns;
-    (azimuth_cdeg.round() as i64).rem_euclid(i64::from(TURN_CDEG)) as u16
 }
 
 #[cfg(test)]

@@ -18,9 +18,8 @@
 use std::sync::Arc;
 
 use super::beam::{beam, ranked};
-use super::model::Setting;
-use super::packet::{Format, Refused, Sink, TIME_LIMIT_NS, TURN_CDEG, units_of, whole_azimuth_cdeg};
-use super::{Beam, Column, Model, Packet};
+use super::model::{Format, Refused, Setting, Sink, TIME_LIMIT_NS, TURN_CDEG, units_of, whole_azimuth_cdeg};
+use super::{Beam, Column, Model};
 use crate::Error;
 use crate::geometry::DVec3;
 
@@ -107,13 +106,13 @@ impl Format for Velodyne {
         PAYLOAD_BYTES
     }
 
-    fn decode(&self, model: &Model, packet: &Packet, sink: Sink) -> Result<(), Refused> {
-        let payload = match <&[u8; PAYLOAD_BYTES]>::try_from(packet.payload.as_slice()) {
+    fn decode(&self, model: &Model, received_ns: i64, payload: &[u8], sink: Sink) -> Result<(), Refused> {
+        let payload = match <&[u8; PAYLOAD_BYTES]>::try_from(payload) {
             Ok(payload) => payload,
-            Err(_) if packet.payload.len() == POSITION_BYTES => return Err(Refused::NoRanges),
+            Err(_) if payload.len() == POSITION_BYTES => return Err(Refused::NoRanges),
             Err(_) => return Err(Refused::WrongSize),
         };
-        let head = self.head(model, packet.time_ns, payload).ok_or(Refused::NotUnderstood)?;
+        let head = self.head(model, received_ns, payload).ok_or(Refused::NotUnderstood)?;
         let beams = model.beams.len();
         for firing in 0..BLOCKS / head.blocks_per_firing {
             let mut range_m = [0.0; RETURNS_PER_BLOCK];

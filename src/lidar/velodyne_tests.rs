@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::Health;
+use crate::lidar::Packet;
 use crate::lidar::packet::encode;
 use crate::lidar::packet::tests::{Decoded, decode_all, encoded, example};
 

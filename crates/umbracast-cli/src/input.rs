@@ -9,8 +9,11 @@ use umbracast_io::recording::{Entry, RecordingReader};
 
 use crate::setup;
 
+mod sink;
 mod captures;
 mod point_clouds;
+
+use sink::{Sink, drain};
 
 /// The recording without people, beside those of a simulation.
 pub const EMPTY: &str = "empty.mcap";
@@ -146,8 +149,6 @@ impl Input {
     }
 }
 
-type Sink<'a> = &'a mut dyn FnMut(&Frame) -> Result<(), Error>;
-
 fn recording(file: &Path, site: &Site, health: &mut Health, sink: Sink) -> Result<Option<String>, Error> {
     let mut reader = RecordingReader::open(file)?;
     if point_clouds::are_all_of(site) {
@@ -168,13 +169,6 @@ fn recording(file: &Path, site: &Site, health: &mut Health, sink: Sink) -> Resul
     assembler.finish();
     drain(&mut assembler, sink)?;
     Ok(reader.lost().map(str::to_owned))
-}
-
-fn drain(assembler: &mut Assembler, sink: Sink) -> Result<(), Error> {
-    while let Some(frame) = assembler.pop() {
-        sink(&frame)?;
-    }
-    Ok(())
 }
 
 /// Clouds carry no time: one period between them. A file named by a number gives its frame that number.

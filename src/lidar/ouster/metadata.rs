@@ -4,7 +4,7 @@
 
 use serde_json::Value;
 
-use super::{BEAMS_MAX, Geometry, Layout, PROFILES, Profile};
+use super::geometry::{BEAMS_MAX, Geometry, Layout, PROFILES, Profile};
 use crate::Error;
 use crate::lidar::model::letters;
 

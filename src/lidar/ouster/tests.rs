@@ -1,5 +1,6 @@
 //! Tests of Ouster packets and metadata; those of all models stand beside the codec.
 
+use super::geometry::PROFILES;
 use super::*;
 
 /// Metadata of an OS-1-32 of this profile, as firmware 2 spells them.
@@ -90,7 +91,7 @@ fn of_two_returns_the_first_is_given_and_the_second_where_it_is_none() {
         let mut found = Vec::new();
         let mut sink =
             |_: Column, r: &[f32], f: &[u8]| found.extend([(r[0], f[0]), (r[1], f[1]), (r[2], f[2])]);
-        model.format.decode(&model, &Packet { time_ns: 0, payload }, &mut sink).unwrap();
+        model.format.decode(&model, 0, &payload, &mut sink).unwrap();
         assert_eq!(found, [(2.0, 7), (4.0, 99), (2.0, 7)], "{}", profile.name);
     }
 }
@@ -110,8 +111,8 @@ fn a_column_that_was_not_measured_is_left_out_and_broken_times_are_refused() {
     let decoded = |change: &dyn Fn(&mut Vec<u8>)| {
         let (mut payload, mut count) = (whole.clone(), 0);
         change(&mut payload);
-        let packet = Packet { time_ns: 0, payload };
-        let taken = model.format.decode(&model, &packet, &mut |_: Column, _: &[f32], _: &[u8]| count += 1);
+        let taken =
+            model.format.decode(&model, 0, &payload, &mut |_: Column, _: &[f32], _: &[u8]| count += 1);
         taken.map(|()| count)
     };
     assert_eq!(decoded(&|_| {}), Ok(16));
@@ -187,7 +188,7 @@ fn every_profile_gives_back_what_was_put_into_it() {
             ranges_m.extend_from_slice(range_m);
             reflectivities.extend_from_slice(reflectivity);
         };
-        model.format.decode(&model, &Packet { time_ns: 0, payload }, &mut sink).unwrap();
+        model.format.decode(&model, 0, &payload, &mut sink).unwrap();
         assert!(
             ranges_m.iter().zip(&range_m).all(|(got, sent)| (got - sent).abs() < 1e-5),
             "{}",

@@ -9,7 +9,7 @@ use umbracast::site::Sensor;
 use umbracast::{Error, Health, Site};
 use umbracast_io::pcap::{Datagram, PcapReader};
 
-use super::{Sink, drain};
+use super::sink::{Sink, drain};
 
 /// Gives the frames of captures; says which one is cut.
 pub fn captures(

@@ -5,7 +5,7 @@ use umbracast::{Error, Health, STEP_NS, Site};
 use umbracast_io::point_cloud::{self, PointCloud};
 use umbracast_io::recording::{Entry, RecordingReader};
 
-use super::Sink;
+use super::sink::Sink;
 
 /// Whether a site's input is the clouds of one sensor.
 pub fn are_all_of(site: &Site) -> bool {

@@ -1,6 +1,6 @@
 //! Datagrams that came in pieces: a sensor's packet of 8 or 25 kB does not fit into an Ethernet frame (RFC 791, 3.2).
 
-use super::Ipv4;
+use super::ip::Ipv4;
 
 /// So many datagrams may be under way: some of each of a dozen sensors. The oldest gives way; half a megabyte or so.
 const UNDER_WAY_MAX: usize = 16;
