@@ -35,8 +35,8 @@ pub mod error;
 pub mod geometry;
 pub mod health;
 pub mod site;
-pub mod config;
 pub mod lidar;
+pub mod config;
 #[doc(hidden)] // What walking bodies have in common, for tracks, casts and their scores; users meet `track::GaitPhase`.
 pub mod gait;
 pub mod detect;

@@ -102,7 +102,8 @@ pub struct Furniture {
 pub struct Sensor {
     /// Its name, also the topic's.
     pub name: String,
-    /// `hdl-32e`, `vlp-16`, or `points` for a sensor known only by its clouds.
+    /// As `lidar::sensor_models` names them: `hdl-32e`, `os0-128`, ..., or `points` for a sensor known only by its
+    /// clouds.
     #[serde(default = "hdl_32e")]
     pub model: String,
     /// Where it hangs, metres.
@@ -124,6 +125,19 @@ pub struct Sensor {
     /// Standard deviation of its range, metres: how near the background a return may lie and still be new follows.
     #[serde(default = "noise_m")]
     pub range_noise_m: f64,
+    /// The sensor's own file, which says where its beams look: an Ouster's metadata, an XT32's angles. Whoever reads
+    /// the site file reads it and puts its text into `calibration`; the path goes from the site file's folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_file: Option<String>,
+    /// The text of that file; without one the beams look as the manufacturer designs them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
+    /// The UDP port that its packets go to, where it is not its model's usual one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub udp_port: Option<u16>,
+    /// The IPv4 address that its packets come from, where several sensors send to one port.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub address: Option<String>,
 }
 
 // What a site file need not say of a sensor: an HDL-32E as it is delivered, cut behind, as the default site has two.
@@ -232,22 +246,6 @@ impl Ue {
     }
 }
 
-/// The models that a site file may name; of `points` only clouds are known.
-pub const SENSOR_MODELS: [&str; 3] = ["hdl-32e", "vlp-16", "points"];
-
-/// The model of that name, with or without capitals and dashes: `vlp-16` of `VLP-16` and `vlp16`.
-///
-/// ```
-/// use umbracast::site::sensor_model;
-///
-/// assert_eq!(sensor_model("VLP16"), Some("vlp-16"));
-/// assert_eq!(sensor_model("camera"), None);
-/// ```
-pub fn sensor_model(name: &str) -> Option<&'static str> {
-    let letters = |name: &str| name.to_ascii_lowercase().replace(['-', '_', ' '], "");
-    SENSOR_MODELS.into_iter().find(|model| letters(model) == letters(name))
-}
-
 impl Sensor {
     /// The pose of the sensor's frame in the site.
     ///
@@ -258,6 +256,20 @@ impl Sensor {
     pub fn site_from_sensor(&self) -> Pose {
         let Rotation { yaw, pitch, roll } = self.rotation_deg;
         Pose::from_yaw_pitch_roll_deg(DVec3::from_array(self.position_m), yaw, pitch, roll)
+    }
+
+    /// The four numbers of its address; none where the site file names none, or no address.
+    ///
+    /// ```
+    /// let mut east = umbracast::Config::default().site.sensors[0].clone();
+    /// assert_eq!(east.address_bytes(), None);
+    /// east.address = Some("192.168.1.201".to_owned());
+    /// assert_eq!(east.address_bytes(), Some([192, 168, 1, 201]));
+    /// ```
+    pub fn address_bytes(&self) -> Option<[u8; 4]> {
+        let numbers: Vec<u8> =
+            self.address.as_deref()?.split('.').map(|number| number.parse().ok()).collect::<Option<_>>()?;
+        numbers.try_into().ok()
     }
 }
 

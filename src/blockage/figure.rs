@@ -45,7 +45,7 @@ impl Figure {
     pub(super) fn new(body: &BodyModel) -> Self {
         Self {
             slices: body.slices.clone(),
-            arms: body.arms.clone(),
+            arms: body.arms,
             sway_left: body.sway_left,
             sway_ahead: body.sway_ahead,
         }

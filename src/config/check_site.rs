@@ -1,6 +1,7 @@
 //! A site that cannot be: what stands outside the hall, angles and shares out of their range, unknown models.
 
-use crate::site::{AccessPoint, Furniture, Pillar, SENSOR_MODELS, Sensor, Ue, sensor_model};
+use crate::lidar::{Model, sensor_model, sensor_models};
+use crate::site::{AccessPoint, Furniture, Pillar, Sensor, Ue};
 use crate::{Error, Site};
 
 /// No hall is longer; a longer one is in another unit.
@@ -33,7 +34,7 @@ pub(super) fn check_site(site: &Site) -> Result<(), Error> {
 fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
     let key = |key: &str| format!("site.sensors.{}.{key}", sensor.name);
     if sensor_model(&sensor.model).is_none() {
-        let (known, found) = (SENSOR_MODELS.join(", "), &sensor.model);
+        let (known, found) = (sensor_models().collect::<Vec<_>>().join(", "), &sensor.model);
         return Err(Error::new(format!("{}: expected one of {known}, found {found:?}", key("model"))));
     }
     // Outdoors, the hall is the part that is watched, and a sensor known by its clouds may stand beside it.
@@ -54,7 +55,21 @@ fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
         let story = format!("{}: expected more than range_min_m, {min_m}, found {max_m}", key("range_max_m"));
         return Err(Error::new(story));
     }
-    within(&key("range_noise_m"), sensor.range_noise_m, 0.0, 1.0)
+    within(&key("range_noise_m"), sensor.range_noise_m, 0.0, 1.0)?;
+    if sensor.address.is_some() && sensor.address_bytes().is_none() {
+        let found = sensor.address.as_deref().unwrap_or_default();
+        return Err(Error::new(format!("{}: expected an IPv4 address, found {found:?}", key("address"))));
+    }
+    let file = sensor.calibration_file.as_deref().map(|file| format!(" ({file})")).unwrap_or_default();
+    match sensor_model(&sensor.model) {
+        Some("points") if sensor.calibration.is_some() || sensor.calibration_file.is_some() => {
+            Err(Error::new(format!("{}: expected none, for clouds are points already", key("calibration"))))
+        }
+        Some("points") => Ok(()),
+        _ => Model::of_sensor(sensor)
+            .map(|_| ())
+            .map_err(|e| e.within(format_args!("site.sensors.{}{file}", sensor.name))),
+    }
 }
 
 fn simulation(site: &Site) -> Result<(), Error> {
@@ -141,8 +156,9 @@ mod tests {
     use super::*;
     use crate::{Config, Mode};
 
-    const SITES: [&str; 2] = [
+    const SITES: [&str; 3] = [
         include_str!("../../config/sites/logictronix.toml"),
+        include_str!("../../config/sites/ouster.toml"),
         include_str!("../../config/sites/lost-sensor.toml"),
     ];
 
@@ -157,7 +173,7 @@ mod tests {
     #[test]
     fn what_cannot_be_is_refused_with_key_name_expected_and_found() {
         type Change = fn(&mut Site);
-        let wrong: [(Change, &str); 24] = [
+        let wrong: [(Change, &str); 29] = [
             (|s| s.hall.height_m = 0.0, "site.hall.height_m: expected more than 0 and 1000 at most, found 0"),
             (|s| s.hall.width_m = f64::NAN, "site.hall.width_m: expected more than 0"),
             (|s| s.sensors.clear(), "site.sensors: expected one or more, found none"),
@@ -165,7 +181,7 @@ mod tests {
             (|s| s.access_points[0].name.clear(), "site.access_points: expected a name of its own"),
             (
                 |s| s.sensors[0].model = "hdl-64".into(),
-                "site.sensors.lidar_east.model: expected one of hdl-32e, vlp-16, points, found \"hdl-64\"",
+                "site.sensors.lidar_east.model: expected one of hdl-32e, vlp-16, os0-128,",
             ),
             (
                 |s| s.sensors[0].position_m[2] = -1.0,
@@ -195,6 +211,36 @@ mod tests {
                 "site.sensors.lidar_east.range_max_m: expected more than range_min_m, 60, found 50",
             ),
             (|s| s.sensors[0].range_noise_m = -0.1, "site.sensors.lidar_east.range_noise_m: expected 0 to 1"),
+            (
+                |s| s.sensors[0].address = Some("192.168.1".into()),
+                "site.sensors.lidar_east.address: expected an IPv4 address, found \"192.168.1\"",
+            ),
+            (
+                |s| s.sensors[0].calibration = Some("{}".into()),
+                "site.sensors.lidar_east: calibration: expected none, for every hdl-32e is built alike",
+            ),
+            (
+                |s| {
+                    s.sensors[0].model = "points".into();
+                    s.sensors[0].calibration = Some("{}".into());
+                },
+                "site.sensors.lidar_east.calibration: expected none",
+            ),
+            (
+                |s| {
+                    s.sensors[1].model = "os0-128".into();
+                    s.sensors[1].calibration_file = Some("lidar.json".into());
+                    s.sensors[1].calibration = Some("{".into());
+                },
+                "site.sensors.lidar_west (lidar.json): calibration: expected the sensor's metadata as JSON, found EOF",
+            ),
+            (
+                |s| {
+                    s.sensors[1].model = "xt32".into();
+                    s.sensors[1].calibration = Some("Channel,Elevation,Azimuth\n1,15.0".into());
+                },
+                "site.sensors.lidar_west: calibration: line 2: expected channel 1 of 32, its elevation and azimuth",
+            ),
             (|s| s.simulation.dropout = 2.0, "site.simulation.dropout: expected 0 to 1, found 2"),
             (
                 |s| s.simulation.lost_after_s = [("door".to_owned(), 3.0)].into(),
@@ -213,6 +259,32 @@ mod tests {
             let found = check_site(&site).unwrap_err().to_string();
             assert!(found.starts_with(story), "{found}");
         }
+    }
+
+    #[test]
+    fn what_a_sensor_may_have_beside_is_understood_and_survives_a_recording() {
+        let text = "[[site.sensors]]\nname = \"door\"\nmodel = \"xt32\"\nposition_m = [16.0, 0.0, 9.0]\n\
+                    rotation_deg = { yaw = 180.0, pitch = 35.0, roll = 0.0 }\ncalibration_file = \"a.csv\"\n\
+                    udp_port = 2370\naddress = \"10.0.0.7\"\n";
+        let config = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap();
+        let angles: String = (1..=32).map(|c| format!("{c},{}.5,-0.1\n", 15 - c)).collect();
+        let config =
+            config.with_calibrations(|_| Ok(format!("Channel,Elevation,Azimuth\n{angles}"))).unwrap();
+        assert_eq!(Config::of_run(&config.to_toml(), "config.toml").unwrap(), config);
+        let again =
+            config.clone().with_calibrations(|_| panic!("its text stands in the file already")).unwrap();
+        assert_eq!(again, config);
+
+        let message =
+            |text: &str| Config::with_overlay(Mode::Default, text, "lab.toml").unwrap_err().to_string();
+        let found = message(&text.replace("2370", "\"2370\""));
+        assert_eq!(found, "lab.toml:7:12: site.sensors.udp_port: expected a whole number, found a string");
+        let config = Config::with_overlay(Mode::Default, text, "lab.toml").unwrap();
+        let found = config.with_calibrations(|_| Ok("1,2".to_owned())).unwrap_err().to_string();
+        assert!(
+            found.starts_with("site.sensors.door (a.csv): calibration: line 1: expected channel 1"),
+            "{found}"
+        );
     }
 
     /// Six values were to be repeated for each sensor though all are defaults.

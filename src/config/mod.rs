@@ -152,6 +152,39 @@ impl Config {
         check_site::check_site(&self.site)
     }
 
+    /// The same with the text of every sensor's own file in its place (`calibration`). `read` gives the text of a file
+    /// that `calibration_file` names; where the text stands in the configuration already, nothing is read.
+    ///
+    /// ```
+    /// use umbracast::{Config, Error, Mode};
+    ///
+    /// let mut config = Config::default();
+    /// config.site.sensors[0].model = "xt32".to_owned();
+    /// config.site.sensors[0].calibration_file = Some("angles.csv".to_owned());
+    /// let angles = |file: &str| {
+    ///     assert_eq!(file, "angles.csv");
+    ///     Ok((1..=32).map(|channel| format!("{channel},{},0.1\n", 16 - channel)).collect())
+    /// };
+    /// let config = config.with_calibrations(angles)?;
+    /// assert!(config.site.sensors[0].calibration.as_deref().is_some_and(|text| text.starts_with("1,15,0.1")));
+    /// # Ok::<(), Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// What `read` fails with, and a text that is no such file, with the sensor's name.
+    pub fn with_calibrations(
+        mut self,
+        mut read: impl FnMut(&str) -> Result<String, Error>,
+    ) -> Result<Self, Error> {
+        for sensor in self.site.sensors.iter_mut().filter(|sensor| sensor.calibration.is_none()) {
+            let Some(file) = &sensor.calibration_file else { continue };
+            let key = format!("site.sensors.{}.calibration_file", sensor.name);
+            sensor.calibration = Some(read(file).map_err(|e| e.within(key))?);
+        }
+        self.check()?;
+        Ok(self)
+    }
+
     /// The configuration that a run wrote beside its output: its mode is the one it names.
     ///
     /// ```

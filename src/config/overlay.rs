@@ -46,6 +46,14 @@ fn merge(base: &mut Table, over: Table) {
     }
 }
 
+/// Keys that the defaults leave out, with their kinds.
+const OPTIONAL: [(&str, &str, &str); 4] = [
+    ("site.sensors", "address", "a string"),
+    ("site.sensors", "calibration", "a string"),
+    ("site.sensors", "calibration_file", "a string"),
+    ("site.sensors", "udp_port", "a whole number"),
+];
+
 type Complain<'a> = &'a dyn Fn(usize, String) -> Error;
 
 fn check_table(found: &DeTable<'_>, known: &Table, path: &str, complain: Complain<'_>) -> Result<(), Error> {
@@ -56,7 +64,17 @@ fn check_table(found: &DeTable<'_>, known: &Table, path: &str, complain: Complai
     for (key, value) in found {
         let name = key.get_ref();
         let Some(expected) = known.get(name.as_ref()) else {
-            let keys: Vec<&str> = known.keys().map(String::as_str).collect();
+            let optional = || OPTIONAL.iter().filter(|(place, ..)| *place == path);
+            if let Some((_, _, expected)) = optional().find(|(_, key, _)| key == name) {
+                if kind(value.get_ref()) == *expected {
+                    continue;
+                }
+                let found = kind(value.get_ref());
+                let story = format!("{path}.{name}: expected {expected}, found {found}");
+                return Err(complain(value.span().start, story));
+            }
+            let keys = known.keys().map(String::as_str).chain(optional().map(|(_, key, _)| *key));
+            let keys: Vec<&str> = keys.collect();
             let place = if path.is_empty() { "the file" } else { path };
             return Err(complain(
                 key.span().start,

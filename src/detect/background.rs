@@ -5,12 +5,15 @@ use super::voxel::{VoxelMap, thin};
 use super::{Point, Prior};
 use crate::config::{BackgroundMethod, DetectConfig};
 use crate::geometry::{DVec3, Pose};
-use crate::lidar::{Azimuths, Cloud, RangeImage, Scan, SensorPoint};
+use crate::lidar::{Azimuths, Cloud, Model, RangeImage, Scan, SensorPoint};
 use crate::site::Sensor;
 use crate::{Frame, Health, Site};
 
 /// Width of a pixel of an organised scan: a little more than one column of a sensor at 10 Hz.
 const AZIMUTH_BIN_DEG: f64 = 0.2;
+/// The same of a sensor whose columns lie farther apart and always at the same azimuths: with narrower pixels some would
+/// never see anything.
+const BIN_COLUMNS: f64 = 1.02;
 /// The same of an unorganised cloud, whose columns are not known: a VLP-16 at 20 Hz fires every 0.4 degrees.
 const CLOUD_AZIMUTH_BIN_DEG: f64 = 1.0;
 const CLOUD_ELEVATION_BIN_DEG: f64 = 0.5;
@@ -102,7 +105,7 @@ impl Background {
         let sensor = |sensor: &Sensor| SensorModel {
             range_min_m: sensor.range_min_m as f32,
             range_max_m: sensor.range_max_m as f32,
-            ranges: ranges(sensor, AZIMUTH_BIN_DEG),
+            ranges: ranges(sensor, azimuth_bin_deg(sensor)),
             cloud_ranges: ranges(sensor, CLOUD_AZIMUTH_BIN_DEG),
             row_of_elevation: vec![None; (180.0 / CLOUD_ELEVATION_BIN_DEG) as usize + 3],
             elevation_bins_per_rad: 1.0_f64.to_degrees() / CLOUD_ELEVATION_BIN_DEG,
@@ -328,8 +331,8 @@ impl SensorModel {
                 if range_m == 0.0 {
                     continue;
                 }
-                let azimuth_cdeg =
-                    column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * beam.fire_offset_ns as f32;
+                let turned_cdeg = column.azimuth_rate_cdeg_per_ns * beam.turned_ns as f32;
+                let azimuth_cdeg = column.azimuth_cdeg + turned_cdeg + beam.azimuth_offset_cdeg;
                 let pixel = self.ranges.pixel(b, azimuth_cdeg);
                 // Written so that NaN is caught: it is neither beyond the limit nor in the range.
                 let background = range_m >= self.ranges.limit_m(pixel);
@@ -421,6 +424,12 @@ impl SensorModel {
             key(a).cmp(&key(b)).then_with(|| place(a).cmp(&place(b)))
         });
     }
+}
+
+/// A sensor that is not known has no pixels to fill.
+fn azimuth_bin_deg(sensor: &Sensor) -> f64 {
+    let turn = Model::of_sensor(sensor).ok().and_then(|model| model.turn);
+    turn.map_or(AZIMUTH_BIN_DEG, |turn| AZIMUTH_BIN_DEG.max(BIN_COLUMNS * 360.0 / f64::from(turn.columns)))
 }
 
 /// An order that does not depend on how the points came.

@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;
 
-use super::packet::{TIME_LIMIT_NS, decode};
-use super::{Cloud, Column, Frame, Model, Packet, RangeImage, Scan};
+use super::model::TIME_LIMIT_NS;
+use super::packet::decode;
+use super::{Cloud, Column, Frame, Model, Packet, RangeImage, Scan, sensor_model};
 use crate::geometry::Pose;
-use crate::site::sensor_model;
 use crate::{Error, Health, STEP_NS, Site};
 
 /// Collects packets and gives frames of 100 ms, counted from the first packet's time rounded down to a whole
@@ -94,14 +94,13 @@ impl Assembler {
     /// ```
     ///
     /// # Errors
-    /// A sensor model that is not known.
+    /// A sensor model that is not known, or a file of the sensor's own that is not understood.
     pub fn new(site: &Site) -> Result<Self, Error> {
         let intake = |sensor: &crate::site::Sensor| {
             let model = match sensor_model(&sensor.model) {
                 Some("points") => None,
                 _ => Some(
-                    Model::by_name(&sensor.model)
-                        .map_err(|e| e.within(format!("sensor {:?}", sensor.name)))?,
+                    Model::of_sensor(sensor).map_err(|e| e.within(format!("sensor {:?}", sensor.name)))?,
                 ),
             };
             Ok(Intake {

@@ -11,8 +11,12 @@ const MS: i64 = 1_000_000;
 
 /// Packets of one HDL-32E from `start_ns` on, for `length_ns`, all ranges 5 m, received 1 ms after.
 fn packets(start_ns: i64, length_ns: i64) -> Vec<Packet> {
-    let model = Model::hdl_32e();
-    let per_packet = columns_per_packet(&model);
+    packets_of(&Model::hdl_32e(), start_ns, length_ns)
+}
+
+/// The same of any model.
+fn packets_of(model: &Model, start_ns: i64, length_ns: i64) -> Vec<Packet> {
+    let per_packet = columns_per_packet(model);
     let count = (length_ns as f64 / (per_packet as f64 * model.column_period_ns)) as usize;
     (0..count)
         .map(|p| {
@@ -27,7 +31,7 @@ fn packets(start_ns: i64, length_ns: i64) -> Vec<Packet> {
                 })
                 .collect();
             let returns = per_packet * model.beams.len();
-            encode(&model, &columns, &vec![5.0; returns], &vec![7; returns], columns[0].time_ns + MS)
+            encode(model, &columns, &vec![5.0; returns], &vec![7; returns], columns[0].time_ns + MS)
         })
         .collect()
 }
@@ -247,7 +251,59 @@ fn an_unknown_sensor_is_counted_and_an_unknown_model_refused() {
     assert_eq!(health.packets_not_understood, 1);
     site.sensors[1].model = "hdl-64".into();
     let message = Assembler::new(&site).unwrap_err().to_string();
-    assert_eq!(message, "sensor \"lidar_west\": sensor model: expected hdl-32e or vlp-16, found \"hdl-64\"");
+    assert!(
+        message.starts_with("sensor \"lidar_west\": sensor model: expected one of hdl-32e,"),
+        "{message}"
+    );
+}
+
+/// An Ouster counts nanoseconds since it was switched on, an XT32 tells the date, an HDL-32E the time in the hour.
+#[test]
+fn sensors_of_several_families_give_frames_whatever_their_clocks_say() {
+    let received_ns = 1_700_000_000_000 * MS;
+    let (os0, xt32) = (Model::by_name("os0-32").unwrap(), Model::by_name("xt32").unwrap());
+    let at = |model: &Model, own_ns: i64| {
+        let mut packets = packets_of(model, own_ns, 500 * MS);
+        packets.iter_mut().for_each(|packet| packet.time_ns += received_ns - own_ns);
+        packets
+    };
+    for (names, own_ns, jumps) in [
+        (["hdl-32e", "os0-32"], [received_ns, 1_462_562 * MS], 1),
+        (["os0-32", "hdl-32e"], [1_462_562 * MS, received_ns], 1),
+        (["os0-32", "os0-32"], [77 * MS, 99_000 * MS], 1),
+        (["xt32", "os0-32"], [received_ns, received_ns], 0),
+        (["os0-32", "xt32"], [77 * MS, 946_684_800_000 * MS], 1),
+    ] {
+        let mut site = Config::default().site;
+        let sent = [0, 1].map(|s| {
+            site.sensors[s].model = names[s].to_owned();
+            match names[s] {
+                "os0-32" => at(&os0, own_ns[s]),
+                "xt32" => at(&xt32, own_ns[s]),
+                _ => at(&Model::hdl_32e(), own_ns[s]),
+            }
+        });
+        let [first, second] = sent;
+        let (mut assembler, mut health) = (Assembler::new(&site).unwrap(), Health::default());
+        let mut frames = Vec::new();
+        for (sensor, packet) in both(first, second) {
+            assembler.push(sensor, &packet, &mut health);
+            frames.extend(std::iter::from_fn(|| assembler.pop()));
+        }
+        assert_eq!(health, Health { clock_jumps: jumps, ..Health::default() }, "{names:?}");
+        assert!(frames.len() >= 4, "{names:?}: {} frames", frames.len());
+        for frame in &frames[1..4] {
+            for (sensor, columns) in columns_of(frame) {
+                let whole = match names[sensor] {
+                    "os0-32" => 1023..=1025,
+                    "xt32" => 1999..=2001,
+                    _ => 2169..=2171,
+                };
+                assert!(whole.contains(&columns), "{names:?}: {columns} columns of sensor {sensor}");
+            }
+            assert_eq!(frame.scans.len(), 2, "{names:?}");
+        }
+    }
 }
 
 /// Time stamps, times of reception and order at random: no panic, frames in order, memory bounded.

@@ -1,15 +1,25 @@
-//! From a sensor's packets to a frame: sensor models, the packet codec, one revolution ([`Scan`]) and all
-//! sensors together ([`Frame`]). Nothing after this module knows a sensor model.
+//! From a sensor's packets to a frame: sensor models, a codec for each family of them, one revolution ([`Scan`]) and
+//! all sensors together ([`Frame`]). Nothing after this module knows a sensor model.
+//!
+//! A family is one file (`velodyne`, `ouster`, `hesai`): bytes to columns and back. The table in `table` names the
+//! models; whoever adds a sensor writes a line there and, where its packets are new, a file.
 
-mod model;
+mod beam;
 mod scan;
+mod model;
+mod velodyne;
+mod ouster;
+mod hesai;
+mod table;
 pub mod packet;
 mod assemble;
 
 pub use assemble::Assembler;
-pub use model::{Beam, Model};
+pub use beam::Beam;
+pub use model::{Model, Turn};
 pub use packet::Packet;
 #[doc(hidden)]
 // A table for those who place a hundred thousand points a frame: the voxels and the simulator.
 pub use scan::Azimuths;
 pub use scan::{Cloud, Column, Frame, RangeImage, Scan, SensorPoint};
+pub use table::{sensor_model, sensor_models, udp_port};

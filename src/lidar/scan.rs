@@ -99,7 +99,7 @@ pub struct RangeImage {
 pub struct Column {
     /// When the first beam fired.
     pub time_ns: i64,
-    /// Azimuth of the first beam, hundredths of a degree, clockwise from above.
+    /// Azimuth of the head, hundredths of a degree, clockwise from above.
     pub azimuth_cdeg: f32,
     /// How fast the head turns, hundredths of a degree a nanosecond.
     pub azimuth_rate_cdeg_per_ns: f32,
@@ -142,8 +142,8 @@ fn azimuth_sin_cos(azimuth_cdeg: u32) -> (f64, f64) {
 }
 
 impl RangeImage {
-    /// Azimuth of beam `b` in column `c`, hundredths of a degree in [0, 36000), rounded to a whole one as the
-    /// manufacturer's decoder does.
+    /// Azimuth of the head when beam `b` of column `c` fires, hundredths of a degree in [0, 36000), rounded to a whole
+    /// one; [`Beam`] says what the beam adds to it.
     ///
     /// ```
     /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
@@ -154,14 +154,14 @@ impl RangeImage {
     /// ```
     pub fn azimuth_cdeg(&self, c: usize, b: usize) -> u32 {
         let column = &self.columns[c];
-        let azimuth =
-            column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * self.beams[b].fire_offset_ns as f32;
+        let azimuth = column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * self.beams[b].turned_ns as f32;
         // Rounds half away from zero as `round` does, which is a call where it is no instruction.
         let azimuth = f64::from(azimuth);
         ((azimuth + 0.5_f64.copysign(azimuth)) as i64).rem_euclid(TURN_CDEG) as u32
     }
 
-    /// The point of beam `b` in column `c` at `range_m`, in the sensor's frame.
+    /// The point of beam `b` in column `c` at `range_m`, in the sensor's frame: where the manufacturer's decoder puts
+    /// it, which rounds azimuths or does not.
     ///
     /// ```
     /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
@@ -171,13 +171,30 @@ impl RangeImage {
     /// assert!((image.point_m(0, 15, 8.0).y + 8.0).abs() < 0.01);
     /// ```
     pub fn point_m(&self, c: usize, b: usize, range_m: f64) -> DVec3 {
-        self.beams[b].point_m(azimuth_sin_cos(self.azimuth_cdeg(c, b)), range_m)
+        let beam = &self.beams[b];
+        let head_sin_cos = match beam.whole_cdeg {
+            true => azimuth_sin_cos(self.azimuth_cdeg(c, b)),
+            false => self.exact_sin_cos(c, b),
+        };
+        beam.point_m(head_sin_cos, range_m)
     }
 
     /// The same point, to the last bit, where there are many.
     #[doc(hidden)] // See `Azimuths`.
     pub fn tabled_point_m(&self, azimuths: &Azimuths, c: usize, b: usize, range_m: f64) -> DVec3 {
-        self.beams[b].point_m(azimuths.sin_cos[self.azimuth_cdeg(c, b) as usize], range_m)
+        let beam = &self.beams[b];
+        let head_sin_cos = match beam.whole_cdeg {
+            true => azimuths.sin_cos[self.azimuth_cdeg(c, b) as usize],
+            false => self.exact_sin_cos(c, b),
+        };
+        beam.point_m(head_sin_cos, range_m)
+    }
+
+    /// Of the head's azimuth without rounding.
+    fn exact_sin_cos(&self, c: usize, b: usize) -> (f64, f64) {
+        let column = &self.columns[c];
+        let turned_cdeg = f64::from(column.azimuth_rate_cdeg_per_ns) * f64::from(self.beams[b].turned_ns);
+        ((f64::from(column.azimuth_cdeg) + turned_cdeg) * 0.01).to_radians().sin_cos()
     }
 
     /// When beam `b` of column `c` fired.
@@ -200,15 +217,18 @@ mod tests {
 
     #[test]
     fn tabled_points_are_the_computed_ones_to_the_last_bit() {
-        let beams = Model::hdl_32e().beams;
         let column =
             |i| Column { time_ns: 0, azimuth_cdeg: i as f32 * 7.3, azimuth_rate_cdeg_per_ns: 3.6e-4 };
         let columns: Vec<Column> = (0..5000).map(column).collect();
-        let rays = columns.len() * beams.len();
-        let image = RangeImage { beams, columns, range_m: vec![0.0; rays], reflectivity: vec![0; rays] };
         let azimuths = Azimuths::of_a_turn();
-        for (c, b) in (0..image.columns.len()).map(|c| (c, c % image.beams.len())) {
-            assert_eq!(image.tabled_point_m(&azimuths, c, b, 12.34), image.point_m(c, b, 12.34));
+        for model in ["hdl-32e", "os0-32", "xt32"] {
+            let beams = Model::by_name(model).unwrap().beams;
+            let rays = columns.len() * beams.len();
+            let (range_m, reflectivity) = (vec![0.0; rays], vec![0; rays]);
+            let image = RangeImage { beams, columns: columns.clone(), range_m, reflectivity };
+            for (c, b) in (0..image.columns.len()).map(|c| (c, c % image.beams.len())) {
+                assert_eq!(image.tabled_point_m(&azimuths, c, b, 12.34), image.point_m(c, b, 12.34));
+            }
         }
     }
 

@@ -1,16 +1,19 @@
 //! What `run` reads: recordings, PCD clouds, captures. Each gives frames, one after the other.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use umbracast::lidar::{Assembler, Cloud, Frame, Packet, Scan};
 use umbracast::{Config, Error, Health, STEP_NS, Site};
-use umbracast_io::pcap::{DATA_PORT, PcapReader};
 use umbracast_io::pcd::read_pcd;
 use umbracast_io::recording::{Entry, RecordingReader};
 
 use crate::setup;
+
+mod sink;
+mod captures;
+mod point_clouds;
+
+use sink::{PacketSink, Sink, drain};
 
 /// The recording without people, beside those of a simulation.
 pub const EMPTY: &str = "empty.mcap";
@@ -33,7 +36,7 @@ pub enum Input {
     Recording(PathBuf),
     /// PCD clouds of one sensor, a frame each, in natural order of their names.
     Clouds(Vec<PathBuf>),
-    /// Captures, one for each sensor in the site's order.
+    /// Captures: one for each sensor in the site's order, or one of all.
     Captures(Vec<PathBuf>),
 }
 
@@ -194,12 +197,17 @@ impl Input {
         mut sink: impl FnMut(&Frame) -> Result<(), Error>,
     ) -> Result<Option<String>, Error> {
         match self {
+            Self::Recording(file) if point_clouds::are_all_of(site) => {
+                let mut reader = RecordingReader::open(file)?;
+                point_clouds::recording(&mut reader, site, health, &mut sink)?;
+                Ok(reader.lost().map(str::to_owned))
+            }
             Self::Recording(file) => {
                 assembled(site, health, &mut sink, |packets| recorded_packets(file, site, packets))
             }
             Self::Clouds(files) => clouds(files, site, health, &mut sink),
             Self::Captures(files) => {
-                assembled(site, health, &mut sink, |packets| captured_packets(files, site, packets))
+                assembled(site, health, &mut sink, |packets| captures::packets(files, site, packets))
             }
         }
     }
@@ -216,16 +224,13 @@ impl Input {
     ) -> Result<Option<String>, Error> {
         match self {
             Self::Recording(file) => recorded_packets(file, site, &mut sink),
-            Self::Captures(files) => captured_packets(files, site, &mut sink),
+            Self::Captures(files) => captures::packets(files, site, &mut sink),
             Self::Clouds(files) => {
                 Err(Error::new("expected packets, found clouds").within(files[0].display()))
             }
         }
     }
 }
-
-type Sink<'a> = &'a mut dyn FnMut(&Frame) -> Result<(), Error>;
-type PacketSink<'a> = &'a mut dyn FnMut(usize, Packet) -> Result<(), Error>;
 
 /// The packets of all sensors in the order in which they came: a recording keeps a list for each sensor and frame.
 fn recorded_packets(file: &Path, site: &Site, sink: PacketSink) -> Result<Option<String>, Error> {
@@ -272,13 +277,6 @@ fn assembled(
     Ok(lost)
 }
 
-fn drain(assembler: &mut Assembler, sink: Sink) -> Result<(), Error> {
-    while let Some(frame) = assembler.pop() {
-        sink(&frame)?;
-    }
-    Ok(())
-}
-
 /// Clouds carry no time: one period between them. A file named by a number gives its frame that number.
 fn clouds(files: &[PathBuf], site: &Site, health: &mut Health, sink: Sink) -> Result<Option<String>, Error> {
     let [sensor] = &site.sensors[..] else {
@@ -303,39 +301,4 @@ fn clouds(files: &[PathBuf], site: &Site, health: &mut Health, sink: Sink) -> Re
         sink(&Frame { index, time_ns, scans: vec![scan] })?;
     }
     Ok(None)
-}
-
-fn captured_packets(files: &[PathBuf], site: &Site, sink: PacketSink) -> Result<Option<String>, Error> {
-    if files.len() != site.sensors.len() {
-        let (expected, found) = (site.sensors.len(), files.len());
-        return Err(Error::new(format!(
-            "expected {expected} captures, one for each sensor of the site in its order, found {found}"
-        ))
-        .within(files[0].display()));
-    }
-    let mut readers = files
-        .iter()
-        .map(|file| {
-            let open = File::open(file).map_err(|e| Error::new(e.to_string()).within(file.display()))?;
-            PcapReader::new(BufReader::new(open), &file.display().to_string())
-        })
-        .collect::<Result<Vec<_>, Error>>()?;
-    let mut next: Vec<Option<Packet>> = readers.iter_mut().map(next_packet).collect();
-    // The packets of all sensors in the order of their times.
-    while let Some(sensor) = (0..next.len())
-        .filter(|&sensor| next[sensor].is_some())
-        .min_by_key(|&sensor| next[sensor].as_ref().map(|packet| packet.time_ns))
-    {
-        if let Some(packet) = next[sensor].take() {
-            sink(sensor, packet)?;
-        }
-        next[sensor] = next_packet(&mut readers[sensor]);
-    }
-    let cut = files.iter().zip(&readers).find(|(_, reader)| reader.truncated());
-    Ok(cut.map(|(file, _)| format!("{}: ends within a record", file.display())))
-}
-
-fn next_packet(reader: &mut PcapReader<BufReader<File>>) -> Option<Packet> {
-    let datagram = reader.by_ref().find(|datagram| datagram.port == DATA_PORT)?;
-    Some(Packet { time_ns: datagram.time_ns, payload: datagram.payload })
 }

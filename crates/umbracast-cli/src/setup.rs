@@ -18,13 +18,25 @@ pub const TEST_SEED: u64 = 200_000;
 /// The mode's values with the user's file laid over them.
 pub fn config(mode: Mode, site: Option<&Path>) -> Result<Config, Error> {
     let Some(path) = site else { return Ok(Config::for_mode(mode)) };
-    Config::with_overlay(mode, &read_text(path)?, &path.display().to_string())
+    let config = Config::with_overlay(mode, &read_text(path)?, &path.display().to_string())?;
+    with_calibrations(config, path)
+}
+
+/// The configuration of a file, of the mode that it names.
+pub fn config_of_file(path: &Path) -> Result<Config, Error> {
+    let config = Config::of_run(&read_text(path)?, &path.display().to_string())?;
+    with_calibrations(config, path)
+}
+
+/// With the sensors' own files, whose paths go from the site file's folder.
+fn with_calibrations(config: Config, site: &Path) -> Result<Config, Error> {
+    let folder = site.parent().unwrap_or(Path::new(""));
+    config.with_calibrations(|file| read_text(&folder.join(file))).map_err(|e| e.within(site.display()))
 }
 
 /// The configuration that a run wrote into its folder.
 pub fn config_of_run(folder: &Path) -> Result<Config, Error> {
-    let path = folder.join("config.toml");
-    Config::of_run(&read_text(&path)?, &path.display().to_string())
+    config_of_file(&folder.join("config.toml"))
 }
 
 /// The weights given, or the embedded ones.

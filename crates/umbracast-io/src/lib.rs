@@ -6,6 +6,7 @@ pub mod pcd;
 pub mod rows;
 pub mod cdr;
 pub mod messages;
+pub mod point_cloud;
 pub mod recording;
 pub mod tables;
 pub mod wire;

@@ -56,6 +56,17 @@ pub const SCAN: Schema = Schema::new(
     ),
 );
 
+/// One sensor's packets of one frame, of any length: `velodyne_msgs` has room for Velodynes alone.
+pub const SENSOR_PACKETS: Schema = Schema {
+    name: "umbracast_msgs/msg/SensorPackets",
+    definition: with_header!(
+        "# UDP payloads of one sensor, as they came; header.frame_id is the sensor's name.\n\
+         std_msgs/Header header\nSensorPacket[] packets\n\
+         ================================================================================\n\
+         MSG: umbracast_msgs/SensorPacket\n# When it was received.\nbuiltin_interfaces/Time stamp\nuint8[] data\n"
+    ),
+};
+
 /// Poses of the sensors.
 pub const TRANSFORMS: Schema = Schema::new(
     "tf2_msgs/msg/TFMessage",
@@ -127,6 +138,34 @@ pub fn scan(time_ns: i64, sensor: &str, packets: &[Packet]) -> Vec<u8> {
         e.array(&packet.payload);
     }
     e.finish()
+}
+
+/// The packets of one frame in a [`SENSOR_PACKETS`] message.
+pub fn sensor_packets(time_ns: i64, sensor: &str, packets: &[Packet]) -> Vec<u8> {
+    let mut e = Encoder::default();
+    e.header(time_ns, sensor);
+    e.u32(packets.len() as u32);
+    for packet in packets {
+        e.time(packet.time_ns);
+        e.u32(packet.payload.len() as u32);
+        e.array(&packet.payload);
+    }
+    e.finish()
+}
+
+/// The packets of [`sensor_packets`], or `None` where the bytes are something else.
+pub fn read_sensor_packets(bytes: &[u8]) -> Option<Vec<Packet>> {
+    let mut d = Decoder::new(bytes)?;
+    d.time()?;
+    d.string()?;
+    let count = d.u32()?;
+    (0..count)
+        .map(|_| {
+            let time_ns = d.time()?;
+            let length = d.u32()? as usize;
+            Some(Packet { time_ns, payload: d.array(length)?.to_vec() })
+        })
+        .collect()
 }
 
 /// The packets of [`scan`], or `None` where the bytes are something else.

@@ -1,11 +1,17 @@
 //! UDP payloads from and to captures: classic pcap, either byte order, micro- or nanoseconds, Ethernet with or
-//! without VLAN tags, IPv4. Format: draft-ietf-opsawg-pcap.
+//! without VLAN tags, IPv4, whole or in fragments. Format: draft-ietf-opsawg-pcap, RFC 791.
 //!
 //! By hand: UDP over IPv4 alone is read, and a capture cut off or broken anywhere gives what is whole before it.
+
+mod ip;
+mod fragments;
 
 use std::io::{ErrorKind, Read, Write};
 
 use umbracast::Error;
+
+use fragments::Fragments;
+use ip::{IPV4_BYTES, Ipv4};
 
 /// Where Velodyne sensors send their packets unless told otherwise.
 pub const DATA_PORT: u16 = 2368;
@@ -17,7 +23,6 @@ const LINK_ETHERNET: u32 = 1;
 /// No capture has longer records; a longer one is a broken length.
 const RECORD_LIMIT_BYTES: usize = 262_144;
 const ETHERNET_BYTES: usize = 14;
-const IPV4_BYTES: usize = 20;
 const UDP_BYTES: usize = 8;
 
 /// A UDP payload as it was captured.
@@ -41,6 +46,7 @@ pub struct PcapReader<R> {
     nanoseconds: bool,
     truncated: bool,
     done: bool,
+    fragments: Fragments,
 }
 
 impl<R: Read> PcapReader<R> {
@@ -66,7 +72,14 @@ impl<R: Read> PcapReader<R> {
         if link != LINK_ETHERNET {
             return Err(Error::new(format!("{name}: link type: expected 1 (Ethernet), found {link}")));
         }
-        Ok(Self { input, big_endian, nanoseconds: magic == MAGIC_NANOSECONDS, truncated: false, done: false })
+        Ok(Self {
+            input,
+            big_endian,
+            nanoseconds: magic == MAGIC_NANOSECONDS,
+            truncated: false,
+            done: false,
+            fragments: Fragments::default(),
+        })
     }
 
     /// True once the file has ended or failed within a record: what came before is whole, what followed is lost.
@@ -106,8 +119,17 @@ impl<R: Read> Iterator for PcapReader<R> {
                 self.done = true;
                 break;
             };
-            if let Some((from, port, payload)) = udp_payload(&frame) {
-                return Some(Datagram { time_ns, from, port, payload: payload.to_vec() });
+            let Some(packet) = Ipv4::of(&frame) else { continue };
+            let from = packet.from;
+            let datagram = match packet.is_whole() {
+                true => udp_payload(packet.body).map(|(port, payload)| (port, payload.to_vec())),
+                false => self
+                    .fragments
+                    .put(&packet)
+                    .and_then(|whole| udp_payload(&whole).map(|(port, payload)| (port, payload.to_vec()))),
+            };
+            if let Some((port, payload)) = datagram {
+                return Some(Datagram { time_ns, from, port, payload });
             }
         }
         None
@@ -179,26 +201,12 @@ impl<W: Write> PcapWriter<W> {
     }
 }
 
-/// Sender, port and payload of an Ethernet frame that holds the start of an IPv4 UDP datagram.
-fn udp_payload(frame: &[u8]) -> Option<([u8; 4], u16, &[u8])> {
-    let mut at = 12;
-    let mut kind = frame.get(at..at + 2)?;
-    while kind == [0x81, 0x00] || kind == [0x88, 0xa8] {
-        at += 4;
-        kind = frame.get(at..at + 2)?;
-    }
-    let ip = frame.get(at + 2..).filter(|_| kind == [0x08, 0x00])?;
-    let head_bytes = usize::from(ip.first()? & 0x0f) * 4;
-    let is_first_of_udp = ip.get(9)? == &17 && u16::from_be_bytes([ip[6], ip[7]]) & 0x1fff == 0;
-    if ip[0] >> 4 != 4 || head_bytes < IPV4_BYTES || !is_first_of_udp {
-        return None;
-    }
-    let from = ip.get(12..16)?.try_into().ok()?;
-    let udp = ip.get(head_bytes..)?;
+/// Port and payload of a UDP datagram, shorter than it says where the capture cut it.
+fn udp_payload(udp: &[u8]) -> Option<(u16, &[u8])> {
     let head = udp.get(..UDP_BYTES)?;
     let udp_bytes = usize::from(u16::from_be_bytes([head[4], head[5]]));
     let payload = &udp[UDP_BYTES..udp_bytes.clamp(UDP_BYTES, udp.len())];
-    Some((from, u16::from_be_bytes([head[2], head[3]]), payload))
+    Some((u16::from_be_bytes([head[2], head[3]]), payload))
 }
 
 /// Reads until the buffer is full or the input ends.
@@ -285,9 +293,12 @@ mod tests {
     fn what_is_no_datagram_is_passed_over() {
         let whole = written(&datagrams()[..2]);
         let ip = 40 + ETHERNET_BYTES;
-        for (at, value, why) in
-            [(52, 0x86, "not IPv4"), (ip, 0x65, "version 6"), (ip + 9, 6, "TCP"), (ip + 7, 1, "a fragment")]
-        {
+        for (at, value, why) in [
+            (52, 0x86, "not IPv4"),
+            (ip, 0x65, "version 6"),
+            (ip + 9, 6, "TCP"),
+            (ip + 7, 1, "a last fragment"),
+        ] {
             let mut bytes = whole.clone();
             bytes[at] = value;
             let read: Vec<_> = PcapReader::new(bytes.as_slice(), "a.pcap").unwrap().collect();

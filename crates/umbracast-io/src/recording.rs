@@ -5,7 +5,8 @@
 //! |---|---|
 //! | `/umbracast/config` | `std_msgs/msg/String`: the configuration as TOML, the first message |
 //! | `/tf_static` | `tf2_msgs/msg/TFMessage`: the sensors in the frame `site` |
-//! | `/NAME/packets` | `velodyne_msgs/msg/VelodyneScan`, one a frame and sensor |
+//! | `/NAME/packets` | `velodyne_msgs/msg/VelodyneScan`, one a frame and sensor; where packets are not of 1206 bytes,
+//! `umbracast_msgs/msg/SensorPackets` |
 //! | `/NAME/points` | `sensor_msgs/msg/PointCloud2` |
 //! | `/truth/people`, `/truth/links` | `umbracast_msgs/msg/People`, `umbracast_msgs/msg/Links` |
 //! | `/umbracast/detections`, `/umbracast/tracks`, `/umbracast/blockages` | what a live run made of them: see [`crate::wire`] |
@@ -16,7 +17,7 @@ use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
-use umbracast::lidar::{Frame, Packet};
+use umbracast::lidar::{Frame, Model, Packet};
 use umbracast::{Error, Site};
 
 use crate::messages::{self, Schema};
@@ -30,8 +31,8 @@ pub struct RecordingWriter {
     path: PathBuf,
     mcap: mcap::Writer<BufWriter<File>>,
     site: Site,
-    /// By sensor.
-    packets: Vec<u16>,
+    /// By sensor: the channel, and whether its packets are of a Velodyne's length.
+    packets: Vec<(u16, bool)>,
     /// By sensor; none where no clouds are asked for.
     points: Vec<u16>,
     /// Of every topic that was written to after the beginning.
@@ -84,7 +85,12 @@ impl RecordingWriter {
         let packets = site
             .sensors
             .iter()
-            .map(|sensor| channel(&format!("/{}/packets", sensor.name), &messages::SCAN))
+            .map(|sensor| {
+                let other =
+                    Model::of_sensor(sensor).is_ok_and(|m| m.packet_bytes() != messages::PACKET_BYTES);
+                let schema = if other { &messages::SENSOR_PACKETS } else { &messages::SCAN };
+                Ok((channel(&format!("/{}/packets", sensor.name), schema)?, !other))
+            })
             .collect::<Result<_, _>>()?;
         let points = site
             .sensors
@@ -108,8 +114,10 @@ impl RecordingWriter {
     pub fn write_packets(&mut self, time_ns: i64, packets: &[Vec<Packet>]) -> Result<(), Error> {
         for (sensor, packets) in packets.iter().enumerate() {
             if !packets.is_empty() {
-                let message = messages::scan(time_ns, &self.site.sensors[sensor].name, packets);
-                self.put(self.packets[sensor], time_ns, &message)?;
+                let (channel, of_velodyne) = self.packets[sensor];
+                let message = if of_velodyne { messages::scan } else { messages::sensor_packets };
+                let message = message(time_ns, &self.site.sensors[sensor].name, packets);
+                self.put(channel, time_ns, &message)?;
             }
         }
         Ok(())
@@ -221,6 +229,8 @@ pub enum Entry {
     Config(String),
     /// Packets of the sensor of this name.
     Packets(String, Vec<Packet>),
+    /// A `sensor_msgs/PointCloud2` as it stands in the file: topic and message, for [`crate::point_cloud::read`].
+    Cloud(String, Vec<u8>),
     /// Anything else: topic, type, message.
     Other(String, String, Vec<u8>),
 }
@@ -281,11 +291,17 @@ impl RecordingReader {
                 return Entry::Config(text.to_owned());
             }
         }
-        if kind == messages::SCAN.name {
+        let packets = match kind.as_str() {
+            name if name == messages::SCAN.name => messages::read_scan(&message.data),
+            name if name == messages::SENSOR_PACKETS.name => messages::read_sensor_packets(&message.data),
+            _ => None,
+        };
+        if let Some(packets) = packets {
             let sensor = topic.trim_matches('/').trim_end_matches("packets").trim_end_matches('/');
-            if let Some(packets) = messages::read_scan(&message.data) {
-                return Entry::Packets(sensor.to_owned(), packets);
-            }
+            return Entry::Packets(sensor.to_owned(), packets);
+        }
+        if kind == messages::CLOUD.name {
+            return Entry::Cloud(topic.clone(), message.data.to_vec());
         }
         Entry::Other(topic.clone(), kind, message.data.to_vec())
     }
@@ -346,6 +362,26 @@ mod tests {
             .collect();
         assert_eq!(east.len(), 8);
         assert_eq!(*east[3], vec![packet(3); 400]);
+    }
+
+    #[test]
+    fn packets_of_any_length_survive_and_bring_their_sensor_s_own_file() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.mcap");
+        let mut config = Config::default();
+        config.site.sensors[1].model = "xt32".to_owned();
+        let angles: String = (1..=32).map(|c| format!("{c},{}.25,-0.01\n", 16 - c)).collect();
+        config.site.sensors[1].calibration = Some(format!("Channel,Elevation,Azimuth\n{angles}"));
+        let packets =
+            [1080, 512, 0, 3].map(|n| Packet { time_ns: 1_700_000_000_123_456_789, payload: vec![7; n] });
+        let mut writer = RecordingWriter::create(&path, &config.to_toml(), &config.site, false).unwrap();
+        writer.write_packets(0, &[vec![packet(1)], packets.to_vec()]).unwrap();
+        writer.finish().unwrap();
+        let (entries, _) = read(&path).unwrap();
+        let Entry::Config(text) = &entries[0] else { panic!() };
+        assert_eq!(Config::site_of_run(text, "a.mcap").unwrap(), config.site);
+        assert!(entries.contains(&Entry::Packets("lidar_east".into(), vec![packet(1)])));
+        assert!(entries.contains(&Entry::Packets("lidar_west".into(), packets.to_vec())));
     }
 
     #[test]

@@ -31,9 +31,10 @@ pub struct Live {
     pub page: PageArgs,
     #[command(flatten)]
     pub record: RecordArgs,
-    /// UDP port of the site's first sensor; the others follow. 0: free ones.
-    #[arg(long, default_value_t = 2368, value_name = "PORT")]
-    pub port: u16,
+    /// UDP port of the site's first sensor; the others follow. 0: free ones. Default: what the site file says, or its
+    /// sensors' own.
+    #[arg(long, value_name = "PORT")]
+    pub port: Option<u16>,
     /// End after so many seconds; default: on a signal.
     #[arg(long, value_name = "S", value_parser = positive)]
     pub seconds: Option<f64>,

@@ -190,7 +190,7 @@ pub struct Simulate {
 #[derive(Debug, Args)]
 pub struct Run {
     /// A folder of recordings or PCD clouds, or files: .mcap, .pcd, or .pcap with one for each sensor in the
-    /// site's order.
+    /// site's order, or one of all.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]

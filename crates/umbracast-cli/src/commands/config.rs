@@ -1,7 +1,7 @@
 //! `config`: the commented default, the complete values of a mode, or a check of a file.
 
+use umbracast::Error;
 use umbracast::config::DEFAULT_TOML;
-use umbracast::{Config, Error};
 
 use crate::ending::Ending;
 use crate::{args, say, setup};
@@ -12,7 +12,7 @@ pub fn run(args: &args::Config) -> Result<Ending, Error> {
         // A file is of the mode asked for, else of the one it names.
         match args.mode {
             Some(mode) => setup::config(mode, Some(file))?,
-            None => Config::of_run(&setup::read_text(file)?, &file.display().to_string())?,
+            None => setup::config_of_file(file)?,
         };
         say::line(format_args!("{}: understood", file.display()));
     } else if let Some(mode) = args.mode {

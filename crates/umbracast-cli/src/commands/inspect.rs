@@ -135,6 +135,7 @@ fn recording(file: &Path, found: &mut Findings) -> Result<(), Error> {
                 continue;
             }
             Entry::Packets(sensor, packets) => (format!("/{sensor}/packets"), packets.len() as u64),
+            Entry::Cloud(topic, _) => (format!("{topic} sensor_msgs/msg/PointCloud2"), 0),
             Entry::Other(topic, kind, _) => (format!("{topic} {kind}"), 0),
         };
         let counts = topics.entry(topic).or_default();

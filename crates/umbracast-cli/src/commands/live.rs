@@ -1,12 +1,14 @@
 //! `live`: sensors in, warnings out, until somebody asks for the end.
 
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use umbracast::lidar::udp_port;
+use umbracast::site::Sensor;
 use umbracast::{Config, Error, Frame, Health, STEP_NS};
 use umbracast_eval::run::chain::{self, CIRCLE_M};
 use umbracast_live::receive::Door;
@@ -36,12 +38,10 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     let config = setup::config(args.mode, args.site.site.as_deref())?;
     let asked = signal::asked_to_end()?;
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
-    let sensors = config.site.sensors.len();
     let settings = Settings {
         weights: Some(setup::weights(args.weights.as_deref())?),
         empty: empty_frames(args, &config)?,
-        // A demonstration takes free ports: nobody is disturbed who listens already.
-        doors: (0..sensors).map(|sensor| door(sensor, if args.demo { 0 } else { args.port })).collect(),
+        doors: doors(args, &config)?,
         record: recorder(&args.record),
         config: config.clone(),
         clock,
@@ -71,9 +71,21 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     Ok(tell(&summary, sent, &watch, common))
 }
 
-fn door(sensor: usize, first_port: u16) -> Door {
-    let port = if first_port == 0 { 0 } else { first_port.saturating_add(sensor as u16) };
-    Door { sensor, port, from: None }
+/// Where each sensor's packets come in: as the site says, or on ports from `--port` on. A demonstration takes free
+/// ports: nobody is disturbed who listens already.
+fn doors(args: &args::Live, config: &Config) -> Result<Vec<Door>, Error> {
+    let door = |(number, sensor): (usize, &Sensor)| {
+        let counted = args.port.map(|first| if first == 0 { 0 } else { first.saturating_add(number as u16) });
+        let port = if args.demo { Some(0) } else { counted.or(udp_port(sensor)) };
+        let port = port.ok_or_else(|| {
+            let (name, model) = (&sensor.name, &sensor.model);
+            Error::new(format!("sensor {name:?}: expected a model that sends packets, found {model:?}"))
+        })?;
+        // Ports that were counted, or are free, are each a sensor's own.
+        let from = sensor.address_bytes().filter(|_| !args.demo && args.port.is_none()).map(IpAddr::from);
+        Ok(Door { sensor: number, port, from })
+    };
+    config.site.sensors.iter().enumerate().map(door).collect()
 }
 
 fn recorder(args: &RecordArgs) -> Option<RecordSettings> {

@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use umbracast::Site;
 use umbracast::geometry::{DVec2, DVec3, Pose};
-use umbracast::lidar::Model;
+use umbracast::lidar::{Model, RangeImage, Turn};
 
-/// Azimuths that a packet tells apart: hundredths of a degree.
-pub const TURN_CDEG: usize = 36_000;
+/// Azimuths that a packet tells apart unless a sensor's columns repeat: hundredths of a degree.
+const TURN_CDEG: u32 = 36_000;
 
 /// Diffuse reflectivities in percent, as Velodyne calibrates them: painted concrete, dark floor, wood.
 const FLOOR: u8 = 25;
@@ -16,10 +16,11 @@ const WALL: u8 = 55;
 const PILLAR: u8 = 45;
 const FURNITURE: u8 = 35;
 
-/// Ranges and reflectivities of all beams at all azimuths, at `beam * TURN_CDEG + azimuth_cdeg`: a frame reads
+/// Ranges and reflectivities of all beams at all azimuths of the head, at `beam * azimuths + azimuth`: a frame reads
 /// one beam after the other in even strides.
 #[derive(Debug)]
 pub struct HallImage {
+    turn: Option<Turn>,
     range_m: Vec<f32>,
     /// Percent.
     reflectivity: Vec<u8>,
@@ -29,26 +30,34 @@ impl HallImage {
     /// Traces the hall from a sensor that hangs within it.
     pub fn trace(site: &Site, model: &Model, site_from_sensor: &Pose) -> Self {
         let hall = Solids::new(site);
-        let rays = model.beams.len() * TURN_CDEG;
+        let (count, first_cdeg) = model.turn.map_or((TURN_CDEG, 0.0), |turn| (turn.columns, turn.first_cdeg));
+        let rays = model.beams.len() * count as usize;
         let (mut ranges_m, mut reflectivities) = (Vec::with_capacity(rays), Vec::with_capacity(rays));
-        let azimuths: Vec<(f64, f64)> =
-            (0..TURN_CDEG).map(|cdeg| (cdeg as f64 * (TAU / TURN_CDEG as f64)).sin_cos()).collect();
+        let azimuth_rad = |i| first_cdeg * (TAU / 36_000.0) + f64::from(i) * (TAU / f64::from(count));
+        let azimuths: Vec<(f64, f64)> = (0..count).map(|i| azimuth_rad(i).sin_cos()).collect();
         for beam in model.beams.iter() {
-            let origin_m = site_from_sensor.point(DVec3::Z * beam.z_offset_m);
-            let (rise, flat) = beam.elevation_rad.sin_cos();
-            for &(sin, cos) in &azimuths {
-                let direction = site_from_sensor.direction(DVec3::new(flat * cos, -flat * sin, rise));
-                let (range_m, reflectivity) = hall.cast(origin_m, direction);
+            for &azimuth in &azimuths {
+                let (origin_m, direction) = beam.ray(azimuth);
+                let (range_m, reflectivity) =
+                    hall.cast(site_from_sensor.point(origin_m), site_from_sensor.direction(direction));
                 ranges_m.push(range_m as f32);
                 reflectivities.push(reflectivity);
             }
         }
-        Self { range_m: ranges_m, reflectivity: reflectivities }
+        Self { turn: model.turn, range_m: ranges_m, reflectivity: reflectivities }
     }
 
-    /// Range and reflectivity of one beam.
-    pub fn at(&self, azimuth_cdeg: u32, beam: usize) -> (f32, u8) {
-        let pixel = beam * TURN_CDEG + azimuth_cdeg as usize;
+    /// Range and reflectivity of what beam `b` of column `c` meets.
+    pub fn at(&self, image: &RangeImage, c: usize, b: usize) -> (f32, u8) {
+        let (azimuth, count) = match self.turn {
+            None => (image.azimuth_cdeg(c, b), TURN_CDEG),
+            Some(turn) => {
+                let passed = (f64::from(image.columns[c].azimuth_cdeg) - turn.first_cdeg) / 36_000.0;
+                let number = (passed * f64::from(turn.columns)).round() as i64;
+                (number.rem_euclid(i64::from(turn.columns)) as u32, turn.columns)
+            }
+        };
+        let pixel = b * count as usize + azimuth as usize;
         (self.range_m[pixel], self.reflectivity[pixel])
     }
 }

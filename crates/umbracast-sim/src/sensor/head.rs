@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use umbracast::lidar::{Column, Model, packet};
+use umbracast::site::Sensor;
 use umbracast::{Health, STEP_NS};
 
 /// A sensor's clock and motor. Column 0 of a scene fires at time 0, at the cut.
@@ -17,6 +18,26 @@ pub struct Head {
 }
 
 impl Head {
+    /// The head of a sensor of a site.
+    pub fn new(model: Model, sensor: &Sensor) -> Self {
+        let (cut_cdeg, rate_hz) = (sensor.cut_deg * 100.0, sensor.rate_hz);
+        match model.turn {
+            None => Self { cut_cdeg, rate_cdeg_per_ns: rate_hz * 36_000.0e-9, model },
+            // Where columns repeat, the cut is at the packet that begins next to it, and the sensor's own file may
+            // name the speed.
+            Some(turn) => {
+                let column_cdeg = 36_000.0 / f64::from(turn.columns);
+                let packet_cdeg = column_cdeg * packet::columns_per_packet(&model) as f64;
+                let packets = ((cut_cdeg - turn.first_cdeg) / packet_cdeg).round();
+                Self {
+                    cut_cdeg: turn.first_cdeg + packets * packet_cdeg,
+                    rate_cdeg_per_ns: column_cdeg / model.column_period_ns,
+                    model,
+                }
+            }
+        }
+    }
+
     /// Columns in a packet.
     pub fn packet_columns(&self) -> u64 {
         packet::columns_per_packet(&self.model) as u64

@@ -101,7 +101,7 @@ impl Sensors {
 
 impl Simulated {
     fn new(site: &Site, sensor: &Sensor, noise: Noise) -> Result<Self, Error> {
-        let model = Model::by_name(&sensor.model)?;
+        let model = Model::of_sensor(sensor)?;
         if !(sensor.rate_hz > 0.0 && sensor.rate_hz <= 50.0) {
             let found = sensor.rate_hz;
             return Err(Error::new(format!("rate_hz: expected more than 0 and at most 50, found {found}")));
@@ -115,8 +115,7 @@ impl Simulated {
             )));
         }
         let site_from_sensor = sensor.site_from_sensor();
-        let head =
-            Head { cut_cdeg: sensor.cut_deg * 100.0, rate_cdeg_per_ns: sensor.rate_hz * 36_000.0e-9, model };
+        let head = Head::new(model, sensor);
         Ok(Self {
             hall: Arc::new(HallImage::trace(site, &head.model, &site_from_sensor)),
             painter: Painter::new(&site_from_sensor, &head),

@@ -4,7 +4,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use umbracast::geometry::{DVec2, DVec3, Pose};
-use umbracast::lidar::Azimuths;
+use umbracast::lidar::{Azimuths, Beam};
 
 use super::head::Head;
 use super::view::View;
@@ -25,11 +25,13 @@ pub struct Painter {
     sensor_from_site: Pose,
     /// From the lowest to the highest.
     beams: Vec<SlopedBeam>,
-    /// Of the beams, above the sensor's origin.
+    /// Of the beams where they pass the sensor's axis, above the sensor's origin.
     lowest_origin_m: f64,
     highest_origin_m: f64,
-    /// How far the head turns from the first to the last beam of a column.
-    column_sweep_cdeg: f64,
+    /// How far from the axis beams pass.
+    aside_m: f64,
+    /// Least and greatest azimuth of the beams from their column's.
+    column_sweep_cdeg: (f64, f64),
     /// A mesh at the start and at the end of a pass, in the sensor's frame.
     start_m: Vec<DVec3>,
     end_m: Vec<DVec3>,
@@ -44,7 +46,7 @@ struct SlopedBeam {
     beam: usize,
     /// Rise over horizontal distance.
     slope: f64,
-    /// How far the head turns from the column's first beam to this one.
+    /// How far to the right of the column's azimuth it looks: by its own offset, and as the head has turned on.
     turned_cdeg: f64,
 }
 
@@ -64,7 +66,7 @@ struct Bounds {
     ahead_m: (f64, f64),
     /// Tangent of the azimuth from the middle; holds where all of `ahead_m` is positive.
     tangent: (f64, f64),
-    /// Rise over horizontal distance, from any beam's origin.
+    /// Rise over horizontal distance, from where any beam passes the axis.
     slope: (f64, f64),
 }
 
@@ -75,16 +77,19 @@ impl Painter {
             .map(|(beam, b)| SlopedBeam {
                 beam,
                 slope: b.elevation_rad.tan(),
-                turned_cdeg: head.rate_cdeg_per_ns * f64::from(b.fire_offset_ns),
+                turned_cdeg: head.rate_cdeg_per_ns * f64::from(b.turned_ns)
+                    + f64::from(b.azimuth_offset_cdeg),
             })
             .collect();
         beams.sort_by(|a, b| a.slope.total_cmp(&b.slope));
-        let origins_m = || head.model.beams.iter().map(|b| b.z_offset_m);
+        let past_axis = || head.model.beams.iter().map(past_axis);
+        let turned = || beams.iter().map(|b| b.turned_cdeg);
         Self {
             sensor_from_site: site_from_sensor.inverse(),
-            lowest_origin_m: origins_m().fold(f64::INFINITY, f64::min),
-            highest_origin_m: origins_m().fold(f64::NEG_INFINITY, f64::max),
-            column_sweep_cdeg: beams.iter().map(|b| b.turned_cdeg).fold(0.0, f64::max),
+            lowest_origin_m: past_axis().map(|(z_m, _)| z_m).fold(f64::INFINITY, f64::min),
+            highest_origin_m: past_axis().map(|(z_m, _)| z_m).fold(f64::NEG_INFINITY, f64::max),
+            aside_m: past_axis().map(|(_, aside_m)| aside_m).fold(0.0, f64::max),
+            column_sweep_cdeg: (turned().fold(0.0, f64::min), turned().fold(0.0, f64::max)),
             beams,
             start_m: Vec::new(),
             end_m: Vec::new(),
@@ -103,8 +108,9 @@ impl Painter {
         let Some(last) = view.image.columns.len().checked_sub(1) else { return };
         let Some((middle_cdeg, half_cdeg)) = self.azimuths(walker, view) else { return };
         // The body may be met from the column whose last beam reaches it to the column whose first beam leaves it.
+        let (least_cdeg, most_cdeg) = self.column_sweep_cdeg;
         let (before_cdeg, after_cdeg) =
-            (half_cdeg + self.column_sweep_cdeg + ROUNDING_CDEG, half_cdeg + ROUNDING_CDEG);
+            (half_cdeg + most_cdeg + ROUNDING_CDEG, half_cdeg - least_cdeg + ROUNDING_CDEG);
         // Once in every turn of the head: twice in a frame for a body that stands across the cut.
         let turns = ((view.first_cdeg - after_cdeg - middle_cdeg) / 36_000.0).ceil();
         let mut azimuth_cdeg = middle_cdeg + turns * 36_000.0;
@@ -125,12 +131,13 @@ impl Painter {
         for state in [first, last].iter().filter_map(|column| walker.state_at(column.time_ns)) {
             let foot = self.sensor_from_site.point(state.position_m.extend(0.0)).truncate();
             let head = self.sensor_from_site.point(state.position_m.extend(state.height_m)).truncate();
-            if distance_to_segment(foot, head) <= REACH_M {
+            let reach_m = REACH_M + self.aside_m;
+            if distance_to_segment(foot, head) <= reach_m {
                 return Some((0.0, 18_000.0));
             }
             for end in [foot, head] {
                 let azimuth_cdeg = cdeg(f64::atan2(-end.y, end.x));
-                let half_cdeg = cdeg((REACH_M / end.length()).asin());
+                let half_cdeg = cdeg((reach_m / end.length()).asin());
                 let (middle, half) = around.unwrap_or((azimuth_cdeg, 0.0));
                 let azimuth_cdeg =
                     middle + (azimuth_cdeg - middle + 18_000.0).rem_euclid(36_000.0) - 18_000.0;
@@ -173,9 +180,14 @@ impl Painter {
             let bounds = corners.map(|i| self.bounds[i]).into_iter().reduce(Bounds::around);
             let Some(bounds) = bounds.filter(|b| b.ahead_m.1 > 0.0) else { continue };
             let width = bounds.tangent.1 - bounds.tangent.0;
-            let narrow = bounds.ahead_m.0 > 0.0 && width < 1.0;
-            let (low, high) =
-                if narrow { stretched(bounds.slope, width) } else { self.slopes_near_axis(corners) };
+            let narrow = bounds.ahead_m.0 > 4.0 * self.aside_m && width < 1.0;
+            // By what a beam that does not pass through the axis seems turned and stretched, at most.
+            let aside = if narrow { self.aside_m / bounds.ahead_m.0 } else { 0.0 };
+            let aside_cdeg = cdeg(aside.asin());
+            let (low, high) = match narrow {
+                true => stretched(bounds.slope, width.hypot(2.0 * aside)),
+                false => self.slopes_near_axis(corners),
+            };
             let first = self.beams.partition_point(|b| b.slope < low);
             if first == self.beams.len() || self.beams[first].slope > high {
                 continue;
@@ -187,8 +199,8 @@ impl Painter {
                 (f64::NEG_INFINITY, f64::INFINITY)
             };
             for beam in self.beams[first..].iter().take_while(|b| b.slope <= high) {
-                let from = view.column_at(from_cdeg - beam.turned_cdeg - ROUNDING_CDEG).ceil();
-                let to = view.column_at(to_cdeg - beam.turned_cdeg + ROUNDING_CDEG).floor();
+                let from = view.column_at(from_cdeg - beam.turned_cdeg - ROUNDING_CDEG - aside_cdeg).ceil();
+                let to = view.column_at(to_cdeg - beam.turned_cdeg + ROUNDING_CDEG + aside_cdeg).floor();
                 let from = from.max(*pass.columns.start() as f64);
                 let to = to.min(*pass.columns.end() as f64);
                 if from <= to {
@@ -255,6 +267,14 @@ impl Bounds {
             slope: both(self.slope, other.slope),
         }
     }
+}
+
+/// Where a beam's line passes the sensor's axis: how high above the origin, and at what distance. Its start is not on
+/// the axis where the head carries it around.
+fn past_axis(beam: &Beam) -> (f64, f64) {
+    let (start_m, flat) = (beam.origin_m.truncate(), beam.direction.truncate());
+    let ahead = flat / flat.length().max(1e-6);
+    (beam.origin_m.z - start_m.dot(ahead) * beam.elevation_rad.tan(), start_m.perp_dot(ahead).abs())
 }
 
 /// Slopes between corners are steeper than at them: a chord is nearer to the axis than its ends, by up to the

@@ -34,7 +34,7 @@ impl View {
         for b in 0..image.beams.len() {
             for c in 0..image.columns.len() {
                 let pixel = c * image.beams.len() + b;
-                (image.range_m[pixel], image.reflectivity[pixel]) = hall.at(image.azimuth_cdeg(c, b), b);
+                (image.range_m[pixel], image.reflectivity[pixel]) = hall.at(&image, c, b);
             }
         }
         Self {

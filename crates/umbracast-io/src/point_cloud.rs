@@ -1,0 +1,185 @@
+//! `sensor_msgs/PointCloud2`, of any layout: fields of any type in any order, either byte order, rows with or without
+//! a gap. Where points carry a time it is read: `t` (whole nanoseconds after the stamp, Ouster), `time` (seconds after the
+//! stamp, Velodyne), `timestamp` (seconds since 1970, Hesai and RoboSense), `offset_time` (nanoseconds, Livox).
+
+use umbracast::lidar::SensorPoint;
+
+use crate::cdr::Decoder;
+
+/// A cloud in its sensor's frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointCloud {
+    /// The message's time.
+    pub stamp_ns: i64,
+    /// The frame that the points are in.
+    pub frame_id: String,
+    /// Points that are finite.
+    pub points: Vec<SensorPoint>,
+    /// How many were not.
+    pub dropped: u64,
+}
+
+/// A field of a point: where it stands, and its type as the message numbers it.
+#[derive(Debug, Clone, Copy)]
+struct Field {
+    offset: usize,
+    datatype: u8,
+}
+
+/// Reads a message; `None` for bytes that are none, or a cloud without x, y and z.
+pub fn read(bytes: &[u8]) -> Option<PointCloud> {
+    let mut d = Decoder::new(bytes)?;
+    let stamp_ns = d.time()?;
+    let frame_id = d.string()?.to_owned();
+    let (height, width) = (d.u32()? as usize, d.u32()? as usize);
+    let mut fields: Vec<(&str, Field)> = Vec::new();
+    for _ in 0..d.u32()? {
+        let (name, offset, datatype, _count) = (d.string()?, d.u32()? as usize, d.u8()?, d.u32()?);
+        fields.push((name, Field { offset, datatype }));
+    }
+    let big_endian = d.bool()?;
+    let (point_step, row_step) = (d.u32()? as usize, d.u32()? as usize);
+    let length = d.u32()? as usize;
+    let data = d.array(length)?;
+    let row_step = if height > 1 { row_step } else { point_step.checked_mul(width)? };
+    if point_step == 0
+        || row_step < point_step.checked_mul(width)?
+        || data.len() < row_step.checked_mul(height)?
+    {
+        return None;
+    }
+    let field =
+        |names: &[&str]| fields.iter().find(|(name, _)| names.contains(name)).map(|(_, field)| *field);
+    let [x, y, z] = [field(&["x"])?, field(&["y"])?, field(&["z"])?];
+    let reflectivity = field(&["intensity", "reflectivity"]);
+    let nanoseconds = field(&["t", "offset_time"]);
+    let (seconds, since_1970) = (field(&["time"]), field(&["timestamp"]));
+    let mut cloud = PointCloud { stamp_ns, frame_id, points: Vec::new(), dropped: 0 };
+    for i in 0..height * width {
+        let start = i / width * row_step + i % width * point_step;
+        let point = &data[start..start + point_step];
+        let value = |field: Field| field.value(point, big_endian);
+        let time_ns = if let Some(field) = nanoseconds {
+            stamp_ns.saturating_add(value(field)? as i64)
+        } else if let Some(field) = seconds {
+            stamp_ns.saturating_add((value(field)? * 1e9) as i64)
+        } else if let Some(field) = since_1970 {
+            (value(field)? * 1e9) as i64
+        } else {
+            stamp_ns
+        };
+        let position_m = [value(x)? as f32, value(y)? as f32, value(z)? as f32];
+        if !position_m.iter().all(|m| m.is_finite()) {
+            cloud.dropped += 1;
+            continue;
+        }
+        let reflectivity = reflectivity.and_then(value).unwrap_or(0.0) as f32;
+        cloud.points.push(SensorPoint { position_m, time_ns, reflectivity });
+    }
+    Some(cloud)
+}
+
+impl Field {
+    /// `None` for a type that there is not, or a field that leaves its point.
+    fn value(self, point: &[u8], big_endian: bool) -> Option<f64> {
+        let size = [1, 1, 2, 2, 4, 4, 4, 8][usize::from(self.datatype.checked_sub(1)?).min(7)];
+        let mut bytes = [0; 8];
+        let own = &mut bytes[..size];
+        own.copy_from_slice(point.get(self.offset..self.offset.checked_add(size)?)?);
+        if big_endian {
+            own.reverse();
+        }
+        let word = u64::from_le_bytes(bytes);
+        Some(match self.datatype {
+            1 => f64::from(word as u8 as i8),
+            2 => f64::from(word as u8),
+            3 => f64::from(word as u16 as i16),
+            4 => f64::from(word as u16),
+            5 => f64::from(word as u32 as i32),
+            6 => f64::from(word as u32),
+            7 => f64::from(f32::from_bits(word as u32)),
+            8 => f64::from_bits(word),
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cdr::Encoder;
+
+    const STAMP_NS: i64 = 1_700_000_000_100_000_000;
+
+    /// Two points (1, 2, 3) and (NaN, 0, 0) with fields of these names, types and bytes.
+    fn message(time: (&str, u8, &[u8]), big_endian: bool) -> Vec<u8> {
+        let order =
+            |bytes: [u8; 4]| if big_endian { bytes.into_iter().rev().collect() } else { bytes.to_vec() };
+        let f32s =
+            |values: [f32; 3]| values.into_iter().flat_map(|v| order(v.to_le_bytes())).collect::<Vec<u8>>();
+        let mut e = Encoder::default();
+        e.header(STAMP_NS, "lidar");
+        e.u32(1);
+        e.u32(2);
+        let (name, datatype, bytes) = time;
+        let fields = [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), (name, 14, datatype)];
+        e.u32(fields.len() as u32);
+        for (name, offset, datatype) in fields {
+            e.string(name);
+            e.u32(offset);
+            e.u8(datatype);
+            e.u32(1);
+        }
+        e.bool(big_endian);
+        e.u32(22);
+        e.u32(44);
+        let mut data = Vec::new();
+        for position in [[1.0, 2.0, 3.0], [f32::NAN, 0.0, 0.0]] {
+            let mut point = f32s(position);
+            point.resize(14, 0);
+            point.extend_from_slice(bytes);
+            point.resize(22, 0);
+            data.extend(point);
+        }
+        e.u32(data.len() as u32);
+        e.array(&data);
+        e.bool(false);
+        e.finish()
+    }
+
+    #[test]
+    fn fields_of_any_type_are_read_and_points_that_are_none_counted() {
+        for (time, after_ns) in [
+            (("t", 6, &7_000_u32.to_le_bytes()[..]), 7000),
+            (("offset_time", 6, &9_000_u32.to_le_bytes()), 9000),
+            (("time", 7, &(-0.0625_f32).to_le_bytes()), -62_500_000),
+            (("timestamp", 8, &1_700_000_000.5_f64.to_le_bytes()), 400_000_000),
+            (("ring", 4, &[3, 0]), 0),
+        ] {
+            let cloud = read(&message(time, false)).unwrap();
+            assert_eq!((cloud.points.len(), cloud.dropped, cloud.frame_id.as_str()), (1, 1, "lidar"));
+            assert_eq!(cloud.points[0].position_m, [1.0, 2.0, 3.0]);
+            assert_eq!(cloud.points[0].time_ns - STAMP_NS, after_ns, "{}", time.0);
+        }
+        let cloud = read(&message(("t", 6, &7_000_u32.to_be_bytes()), true)).unwrap();
+        assert_eq!((cloud.points[0].position_m, cloud.points[0].time_ns), ([1.0, 2.0, 3.0], STAMP_NS + 7000));
+    }
+
+    #[test]
+    fn any_bytes_give_points_or_none() {
+        let whole = message(("t", 6, &[0; 4]), false);
+        let mut state = 7_u64;
+        for _ in 0..50_000 {
+            let mut bytes = whole.clone();
+            for _ in 0..4 {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                let at = (state >> 33) as usize % bytes.len();
+                bytes[at] = (state >> 25) as u8;
+            }
+            if let Some(cloud) = read(&bytes) {
+                assert!(cloud.points.iter().all(|p| p.position_m.iter().all(|m| m.is_finite())));
+            }
+        }
+        assert!((0..whole.len() - 4).all(|cut| read(&whole[..cut]).is_none()));
+    }
+}
