@@ -29,7 +29,7 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
     Track {
         id,
         position_m,
-        velocity_mps: if id % 4 == 0 { DVec2::ZERO } else { velocity_mps },
+        velocity_mps: if id.is_multiple_of(4) { DVec2::ZERO } else { velocity_mps },
         covariance,
         heading_rad: within(3.0),
         heading_sigma_rad: 0.3,

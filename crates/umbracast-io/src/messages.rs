@@ -57,15 +57,15 @@ pub const SCAN: Schema = Schema::new(
 );
 
 /// One sensor's packets of one frame, of any length: `velodyne_msgs` has room for Velodynes alone.
-pub const SENSOR_PACKETS: Schema = Schema {
-    name: "umbracast_msgs/msg/SensorPackets",
-    definition: with_header!(
+pub const SENSOR_PACKETS: Schema = Schema::new(
+    "umbracast_msgs/msg/SensorPackets",
+    with_header!(
         "# UDP payloads of one sensor, as they came; header.frame_id is the sensor's name.\n\
          std_msgs/Header header\nSensorPacket[] packets\n\
          ================================================================================\n\
          MSG: umbracast_msgs/SensorPacket\n# When it was received.\nbuiltin_interfaces/Time stamp\nuint8[] data\n"
     ),
-};
+);
 
 /// Poses of the sensors.
 pub const TRANSFORMS: Schema = Schema::new(
