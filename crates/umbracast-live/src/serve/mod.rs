@@ -17,13 +17,14 @@
 mod metrics;
 mod openapi;
 
-use std::net::{SocketAddr, TcpListener};
+use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Query, Request, State};
+use axum::http::uri::Authority;
 use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
@@ -179,13 +180,15 @@ async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) 
     }
 }
 
-/// Who has not the token is refused; without one, a page of another origin is: its requests carry that origin's name.
+/// Who has not the token is refused. Without one, only loopback is listened to, and what a browser there sends for a page
+/// from elsewhere is refused: it carries that page's origin, or a name that leads here and is not this host's.
 fn refused(token: Option<&str>, request: &Request) -> Option<(StatusCode, &'static str)> {
     let head = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
     let Some(token) = token else {
         let host = head(header::HOST).unwrap_or_default();
-        let foreign = head(header::ORIGIN)
+        let foreign_origin = head(header::ORIGIN)
             .is_some_and(|origin| origin.split_once("://").is_none_or(|(_, name)| name != host));
+        let foreign = foreign_origin || !is_loopback(host);
         return foreign.then_some((StatusCode::FORBIDDEN, "expected a request of this page's own\n"));
     };
     let bearer = head(header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
@@ -193,6 +196,15 @@ fn refused(token: Option<&str>, request: &Request) -> Option<(StatusCode, &'stat
     let given = bearer.or_else(|| in_query.find_map(|pair| pair.strip_prefix("token=")));
     let refusal = (StatusCode::UNAUTHORIZED, "expected a token: Authorization: Bearer, or ?token=\n");
     (!given.is_some_and(|given| same(given, token))).then_some(refusal)
+}
+
+/// Whether a `Host` names this host alone, with or without a port.
+fn is_loopback(host: &str) -> bool {
+    let authority: Result<Authority, _> = host.parse();
+    authority.is_ok_and(|authority| {
+        let name = authority.host().trim_start_matches('[').trim_end_matches(']');
+        name == "localhost" || name.parse().is_ok_and(|address: IpAddr| address.is_loopback())
+    })
 }
 
 /// Compares in a time that tells nothing of where they differ.

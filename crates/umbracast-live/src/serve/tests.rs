@@ -124,6 +124,14 @@ fn a_page_of_another_origin_is_refused() {
 }
 
 #[test]
+fn a_name_that_was_made_to_lead_here_is_refused() {
+    let own = ["127.0.0.1:8600", "localhost", "localhost:8600", "[::1]:8600", "127.0.0.1"];
+    own.iter().for_each(|host| assert!(is_loopback(host), "{host}"));
+    let foreign = ["elsewhere.example:8600", "127.0.0.1.elsewhere.example", "", "192.168.0.7:8600", "@:"];
+    foreign.iter().for_each(|host| assert!(!is_loopback(host), "{host}"));
+}
+
+#[test]
 fn an_address_that_others_reach_needs_a_token() {
     let watched = Watched {
         site: Config::default().site,
