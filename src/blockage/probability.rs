@@ -22,8 +22,8 @@ use crate::{STEP_S, STEPS};
 /// Quantiles of times that are reported.
 const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 
-/// Most body-ray tests of a frame: everybody who may stand in the way of somebody at a step, times samples. About a third
-/// of a frame's 100 ms on one core of 2024; two hundred people with two access points ask for as many.
+/// Most body-ray tests of a frame: everybody who may stand in the way of somebody at a step, times samples. An estimate
+/// of what a core does in a third of a frame's 100 ms, not measured yet; `bench/src/bin/growth.rs` will tell.
 const TESTS_MAX: usize = 1 << 23;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.125 off (one sigma).
 const SAMPLES_MIN: usize = 16;

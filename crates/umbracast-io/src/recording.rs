@@ -107,18 +107,17 @@ impl RecordingWriter {
         Ok(writer)
     }
 
-    /// Packets that were sent up to `time_ns`, one list a sensor.
+    /// Packets that were sent up to `time_ns`, one list a sensor. Empty lists are written too: whoever reads tells by a
+    /// sensor's next list that these are over.
     ///
     /// # Errors
     /// A disk that is full or gone.
     pub fn write_packets(&mut self, time_ns: i64, packets: &[Vec<Packet>]) -> Result<(), Error> {
         for (sensor, packets) in packets.iter().enumerate() {
-            if !packets.is_empty() {
-                let (channel, of_velodyne) = self.packets[sensor];
-                let message = if of_velodyne { messages::scan } else { messages::sensor_packets };
-                let message = message(time_ns, &self.site.sensors[sensor].name, packets);
-                self.put(channel, time_ns, &message)?;
-            }
+            let (channel, of_velodyne) = self.packets[sensor];
+            let message = if of_velodyne { messages::scan } else { messages::sensor_packets };
+            let message = message(time_ns, &self.site.sensors[sensor].name, packets);
+            self.put(channel, time_ns, &message)?;
         }
         Ok(())
     }

@@ -20,8 +20,8 @@ use crate::queue::Queue;
 const SOCKET_BUFFER_BYTES: usize = 4 << 20;
 /// How long a stop may go unnoticed.
 const WAKE: Duration = Duration::from_millis(100);
-/// A UDP payload cannot be longer.
-const LONGEST_BYTES: usize = 65_536;
+/// No sensor's packet is longer: the largest Ouster's has 33 kB. Longer ones are cut here, and not understood later.
+const LONGEST_BYTES: usize = 33_280;
 
 /// Where a sensor's packets come in.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub struct Receivers {
     stop: Arc<AtomicBool>,
     /// Packets from addresses that no sensor has.
     strangers: Arc<AtomicU64>,
-    /// Where the sockets are bound, in the order of the ports.
+    /// Where each sensor's socket is bound.
     bound: Vec<SocketAddr>,
 }
 
@@ -68,11 +68,17 @@ impl Receivers {
             let key = if door.port == 0 { (0, k) } else { (door.port, 0) };
             of_port.entry(key).or_default().push(door.clone());
         }
-        let mut receivers = Self { threads: Vec::new(), stop, strangers, bound: Vec::new() };
+        let bound = vec![SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0)); doors.len()];
+        let mut receivers = Self { threads: Vec::new(), stop, strangers, bound };
         for ((port, _), doors) in of_port {
             told_apart(port, &doors)?;
             let socket = bind(port).map_err(|e| Error::new(format!("UDP port {port}: {e}")))?;
-            receivers.bound.push(socket.local_addr().map_err(|e| Error::new(e.to_string()))?);
+            let at = socket.local_addr().map_err(|e| Error::new(e.to_string()))?;
+            for door in &doors {
+                if let Some(bound) = receivers.bound.get_mut(door.sensor) {
+                    *bound = at;
+                }
+            }
             let (stop, strangers) = (receivers.stop.clone(), receivers.strangers.clone());
             let packets = packets.clone();
             receivers.threads.push(std::thread::spawn(move || {
@@ -82,7 +88,7 @@ impl Receivers {
         Ok(receivers)
     }
 
-    /// Where each port is open, in the order of the ports; free ones in the order of their sensors.
+    /// Where each sensor's packets come in, in the order of the doors.
     pub fn bound(&self) -> &[SocketAddr] {
         &self.bound
     }

@@ -13,15 +13,17 @@ use umbracast::{Config, Error, STEP_NS};
 use umbracast_io::recording::RecordingWriter;
 
 use crate::published::Published;
-use crate::queue::{Queue, WhenFull};
+use crate::queue::{Popped, Queue, WhenFull};
 use crate::receive::Arrived;
 
-/// Half a second of two HDL-32E, 1800 packets a second each, and their results.
-const WAITING: usize = 2048;
+/// Four seconds of two HDL-32E, 1800 packets a second each, and their results: as long as a disk may be busy.
+const WAITING: usize = 16_384;
 /// After a write that failed the disk is tried again so much later.
 const RETRY_NS: i64 = 5_000_000_000;
 /// What is younger than this is lost when the program is killed.
 const FLUSH_NS: i64 = 1_000_000_000;
+/// The same where nothing comes any more.
+const REST: Duration = Duration::from_secs(1);
 
 /// How recordings are kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,8 +83,12 @@ impl Recorder {
                 let status = RecordStatus { lost: files.status.lost + items.lost(), ..files.status.clone() };
                 *shared.lock().unwrap_or_else(PoisonError::into_inner) = status;
             };
-            while let Some(item) = items.pop() {
-                files.take(item);
+            loop {
+                match items.pop_within(REST) {
+                    Popped::Item(item) => files.take(item),
+                    Popped::Nothing => files.rest(),
+                    Popped::Closed => break,
+                }
                 tell(&files);
             }
             files.close();
@@ -101,11 +107,20 @@ impl Recorder {
         self.queue.push(Item::Result(published));
     }
 
+    /// True while its thread works.
+    pub fn is_well(&self) -> bool {
+        !self.thread.is_finished()
+    }
+
     /// Writes what waits, and ends the file.
     pub fn stop(self) -> RecordStatus {
         self.queue.close();
-        let _ = self.thread.join(); // What it did stands in the status, also if it panicked.
-        self.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        let panicked = self.thread.join().is_err();
+        let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if panicked {
+            status.failing = Some("the recorder ended; this is a bug".to_owned());
+        }
+        status
     }
 }
 
@@ -129,12 +144,14 @@ struct Open {
     started_ns: i64,
     flushed_ns: i64,
     bytes: u64,
+    /// Packets and results that the disk has not seen.
+    unflushed: u64,
 }
 
 impl Files {
     fn new(settings: RecordSettings, config: Config) -> Self {
         let batch = vec![Vec::new(); config.site.sensors.len()];
-        let ours = recordings_in(&settings.folder, &config.site.name);
+        let ours = recordings_in(&settings.folder, &file_name(&config.site.name));
         let (status, open) = (RecordStatus::default(), None);
         Self { settings, config, status, open, ours, not_before_ns: i64::MIN, batch, batch_start_ns: None }
     }
@@ -186,9 +203,10 @@ impl Files {
         let written = self.file_for(now_ns).and_then(|open| {
             write(&mut open.writer)?;
             open.bytes += bytes;
+            open.unflushed += items;
             if now_ns - open.flushed_ns >= FLUSH_NS {
-                open.flushed_ns = now_ns;
                 open.writer.flush()?;
+                (open.flushed_ns, open.unflushed) = (now_ns, 0);
             }
             Ok(())
         });
@@ -198,8 +216,9 @@ impl Files {
                 self.status.failing = None;
             }
             Err(error) => {
-                self.status.lost += items;
-                if self.open.take().is_some() || self.not_before_ns <= now_ns {
+                let unflushed = self.open.take().map(|open| open.unflushed);
+                self.status.lost += unflushed.unwrap_or(0).max(items);
+                if unflushed.is_some() || self.not_before_ns <= now_ns {
                     self.not_before_ns = now_ns + RETRY_NS;
                 }
                 self.status.failing = Some(error.to_string());
@@ -221,28 +240,52 @@ impl Files {
                 let told = self.status.failing.clone().unwrap_or_default();
                 return Err(Error::new(told));
             }
-            self.make_room();
-            let path = self.settings.folder.join(format!("{}-{}.mcap", self.config.site.name, stamp(now_ns)));
+            let path = self.settings.folder.join(format!(
+                "{}-{}.mcap",
+                file_name(&self.config.site.name),
+                stamp(now_ns)
+            ));
             let toml = self.config.to_toml();
-            let mut writer = RecordingWriter::create_live(&path, &toml, &self.config.site)?;
-            writer.flush()?;
+            let begun = RecordingWriter::create_live(&path, &toml, &self.config.site)
+                .and_then(|mut writer| writer.flush().map(|()| writer));
+            // A full disk still makes files: one that holds nothing would count as a recording.
+            let writer = begun.inspect_err(|_| {
+                let _ = fs::remove_file(&path);
+            })?;
             self.ours.push_back(path);
+            self.make_room();
             self.status.files += 1;
-            self.open = Some(Open { writer, started_ns: now_ns, flushed_ns: now_ns, bytes: 0 });
+            self.open = Some(Open { writer, started_ns: now_ns, flushed_ns: now_ns, bytes: 0, unflushed: 0 });
         }
         self.open.as_mut().ok_or_else(|| Error::new("no open file"))
     }
 
     fn finish_file(&mut self) {
-        if let Some(Err(error)) = self.open.take().map(|open| open.writer.finish()) {
+        let Some(open) = self.open.take() else { return };
+        if let Err(error) = open.writer.finish() {
+            self.status.lost += open.unflushed.max(1);
             self.status.failing = Some(error.to_string());
+        }
+    }
+
+    /// Nothing came for a while: what waits is written, so that it is no older than it says.
+    fn rest(&mut self) {
+        self.write_batch();
+        self.batch_start_ns = None;
+        let Some(open) = self.open.as_mut().filter(|open| open.unflushed > 0) else { return };
+        match open.writer.flush() {
+            Ok(()) => open.unflushed = 0,
+            Err(error) => {
+                self.status.lost += self.open.take().map_or(0, |open| open.unflushed);
+                self.status.failing = Some(error.to_string());
+            }
         }
     }
 
     /// Deletes the oldest, only where that was asked for.
     fn make_room(&mut self) {
         let Some(keep) = self.settings.keep else { return };
-        while self.ours.len() >= keep.max(1) {
+        while self.ours.len() > keep.max(1) {
             let Some(oldest) = self.ours.pop_front() else { return };
             if let Err(error) = fs::remove_file(&oldest) {
                 self.status.failing =
@@ -269,6 +312,11 @@ fn recordings_in(folder: &Path, site: &str) -> VecDeque<PathBuf> {
     let mut found: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(ours).collect();
     found.sort();
     found.into()
+}
+
+/// A site's name as a file's: it must not lead out of the folder.
+fn file_name(site: &str) -> String {
+    site.chars().map(|c| if c.is_alphanumeric() || "-_ ".contains(c) { c } else { '_' }).collect()
 }
 
 /// A time as a file's name holds it: `20261122T070503.250Z`.
@@ -343,6 +391,11 @@ mod tests {
             files.close();
             assert_eq!(recordings_in(folder.path(), "default").len(), left);
         }
+    }
+
+    #[test]
+    fn a_site_s_name_does_not_lead_out_of_the_folder() {
+        assert_eq!(file_name("../hall 3/east"), "___hall 3_east");
     }
 
     #[test]

@@ -19,8 +19,9 @@ use crate::warnings::Warnings;
 
 /// Packets that wait for the assembler: a second of four HDL-32E.
 const PACKETS_WAITING: usize = 8192;
-/// Frames that wait for the pipeline: one is worked on, one waits, and the newest takes its place.
-const FRAMES_WAITING: usize = 1;
+/// Frames that wait for the pipeline: as many as one packet can close at once, when a sensor falls silent. Then the newest
+/// takes the place of the oldest.
+const FRAMES_WAITING: usize = 3;
 
 /// What a live run is made of.
 pub struct Settings {
@@ -104,7 +105,7 @@ pub struct Summary {
 /// A frame that closed, and what the assembler knew then.
 struct Closed {
     frame: Frame,
-    /// When the last packet before the one that closed it came: no later than the last packet of the frame.
+    /// When the packet before the one that closed it came.
     arrived_ns: i64,
     health: Health,
 }
@@ -151,7 +152,8 @@ impl Live {
 
     /// True while every thread works. One that does not is a bug: then everything had better end and be started anew.
     pub fn is_well(&self) -> bool {
-        !self.assembling.is_finished() && !self.stepping.is_finished()
+        let recording = self.recorder.as_ref().is_none_or(|recorder| recorder.is_well());
+        recording && !self.assembling.is_finished() && !self.stepping.is_finished()
     }
 
     /// Ends in the order of the data, so that what has come is finished, published and recorded.
@@ -160,6 +162,7 @@ impl Live {
         self.receivers.stop();
         self.packets.close();
         let _ = self.assembling.join();
+        self.frames.close(); // Also where the assembler panicked: the pipeline must not wait for it.
         let _ = self.stepping.join();
         let recorded = self.recorder.and_then(Arc::into_inner).map(Recorder::stop).unwrap_or_default();
         let of =

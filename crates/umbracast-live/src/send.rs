@@ -10,6 +10,9 @@ use umbracast_sim::scene::{Scene, SceneFrame};
 use crate::clock::HostClock;
 use crate::receive::Arrived;
 
+/// From a packet to the next one of the same recording.
+const SAME_PACE_NS: std::ops::Range<i64> = -STEP_NS..100 * STEP_NS;
+
 /// What was sent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Sent {
@@ -39,13 +42,20 @@ pub fn send(
         .collect::<Result<Vec<_>, _>>()
         .map_err(|e| Error::new(format!("a socket to send from: {e}")))?;
     let mut sent = Sent::default();
-    let mut first = None;
+    let mut pace = None;
     for Arrived { sensor, packet } in packets {
         if stop.load(Ordering::Relaxed) {
             break;
         }
         let (Some(socket), Some(to)) = (sockets.get(sensor), to.get(sensor)) else { continue };
-        let (host_ns, packet_ns) = *first.get_or_insert((clock.now_ns(), packet.time_ns));
+        // Another recording, or a long silence: the pace begins anew.
+        let (host_ns, packet_ns) = match pace {
+            Some((host_ns, packet_ns, last_ns)) if SAME_PACE_NS.contains(&(packet.time_ns - last_ns)) => {
+                (host_ns, packet_ns)
+            }
+            _ => (clock.now_ns(), packet.time_ns),
+        };
+        pace = Some((host_ns, packet_ns, packet.time_ns));
         let due_ns = host_ns + ((packet.time_ns - packet_ns) as f64 / rate) as i64;
         clock.sleep_until(due_ns);
         sent.latest_ns = sent.latest_ns.max(clock.now_ns() - due_ns);

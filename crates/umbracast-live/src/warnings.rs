@@ -15,6 +15,8 @@ pub enum State {
     Warned,
     /// Blocked.
     Blocked,
+    /// Nobody is followed there any more, who was warned of or blocked before.
+    Gone,
 }
 
 /// A change of one link.
@@ -28,7 +30,7 @@ pub struct Event {
 
 /// What every link was in the frame before.
 #[derive(Debug, Clone, Default)]
-pub struct Warnings(BTreeMap<(u32, u64), State>);
+pub struct Warnings(BTreeMap<(u32, u64), (State, LinkRow)>);
 
 impl State {
     /// Its name on the wire.
@@ -37,6 +39,7 @@ impl State {
             Self::Clear => "clear",
             Self::Warned => "warning",
             Self::Blocked => "blocked",
+            Self::Gone => "gone",
         }
     }
 
@@ -50,18 +53,20 @@ impl State {
 }
 
 impl Warnings {
-    /// The links that are something else than in the frame before. A link is clear before its first frame; one that
-    /// is gone says nothing.
+    /// The links that are something else than in the frame before. A link is clear before its first frame; one that was
+    /// not when its track ended is gone, with the row that it had.
     pub fn changes(&mut self, links: &[LinkRow]) -> Vec<Event> {
         let mut now = BTreeMap::new();
         let mut events = Vec::new();
         for &link in links {
             let (key, state) = ((link.access_point, link.track), State::of(&link));
-            if self.0.get(&key).copied().unwrap_or(State::Clear) != state {
+            if self.0.remove(&key).map_or(State::Clear, |(before, _)| before) != state {
                 events.push(Event { link, state });
             }
-            now.insert(key, state);
+            now.insert(key, (state, link));
         }
+        let gone = self.0.values().filter(|(before, _)| *before != State::Clear);
+        events.extend(gone.map(|&(_, link)| Event { link, state: State::Gone }));
         self.0 = now;
         events
     }
@@ -110,10 +115,12 @@ mod tests {
     }
 
     #[test]
-    fn a_link_that_was_gone_begins_anew() {
+    fn a_link_whose_track_ends_is_gone_and_begins_anew() {
         let mut warnings = Warnings::default();
         assert_eq!(warnings.changes(&[link(false, true)]).len(), 1);
-        assert!(warnings.changes(&[]).is_empty());
+        let gone = warnings.changes(&[]);
+        assert_eq!((gone[0].state, gone[0].link.track), (State::Gone, 5));
+        assert!(warnings.changes(&[]).is_empty(), "said once");
         assert_eq!(warnings.changes(&[link(false, true)])[0].state, State::Warned);
     }
 }

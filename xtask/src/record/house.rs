@@ -29,6 +29,12 @@ pub fn speed(book: &mut Book) -> Result<()> {
     script(book, growth, growth)
 }
 
+/// A live run in which something fails.
+pub fn faults(book: &mut Book) -> Result<()> {
+    let faults = "cargo run --release --quiet --package umbracast-live --example faults";
+    script(book, faults, faults)
+}
+
 /// The same seed twice, on one thread and on two.
 pub fn same_bytes(book: &mut Book) -> Result<()> {
     let of_threads = [("one", "1"), ("two", "2")];

@@ -97,10 +97,10 @@ pub struct RecordArgs {
     #[arg(long, value_name = "DIR")]
     pub record: Option<PathBuf>,
     /// A new file after so many megabytes.
-    #[arg(long, default_value_t = 4096, value_name = "MB", requires = "record")]
+    #[arg(long, default_value_t = 4096, value_name = "MB", requires = "record", value_parser = clap::value_parser!(u64).range(1..1 << 40))]
     pub record_mb: u64,
     /// A new file after so many minutes.
-    #[arg(long, default_value_t = 60, value_name = "MIN", requires = "record")]
+    #[arg(long, default_value_t = 60, value_name = "MIN", requires = "record", value_parser = clap::value_parser!(u64).range(1..1 << 30))]
     pub record_minutes: u64,
     /// Keep the newest so many files and delete older ones; default: delete none.
     #[arg(long, value_name = "N", requires = "record")]

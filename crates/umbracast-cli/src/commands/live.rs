@@ -61,6 +61,8 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     while !asked.load(Ordering::Relaxed) && args.seconds.is_none_or(|seconds| watch.seconds() < seconds) {
         std::thread::sleep(TICK);
         if !live.is_well() {
+            // What there is shall be finished all the same.
+            live.stop();
             return Err(Error::new("a thread of the pipeline ended; this is a bug"));
         }
     }
@@ -161,7 +163,7 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
         json = json.with("packets_sent", sent.packets).with("sent_late_ms_max", sent.latest_ns as f64 * 1e-6);
     }
     let text = format!(
-        "{} frames of {} packets in {:.1} s: {:.2} ms from the last packet to the warning (median), {:.2} ms (99 %)",
+        "{} frames of {} packets in {:.1} s: {:.2} ms from the last packet but one to the warning (median), {:.2} ms (99 %)",
         summary.frames,
         summary.packets,
         watch.seconds(),
@@ -171,6 +173,7 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
     json.print(common, &text);
     let lost = [
         (summary.packets_lost, "packets given up"),
+        (summary.strangers, "packets of no sensor's address"),
         (summary.frames_skipped, "frames skipped"),
         (summary.recorded.lost, "packets and results not recorded"),
     ];

@@ -32,16 +32,16 @@ pub fn run(args: &ReplayPackets, common: &Common) -> Result<Ending, Error> {
     let watch = Stopwatch::start();
     let (packets, coming) = mpsc::sync_channel(AHEAD);
     let reading = std::thread::spawn(move || -> Result<Vec<String>, Error> {
-        let mut lost = Vec::new();
+        let (mut lost, mut ended) = (Vec::new(), false);
         for input in &inputs {
             let told = input.packets(&site, |sensor, packet: Packet| {
-                packets.send(Arrived { sensor, packet }).map_err(|_| Error::new("asked to end"))
+                ended |= packets.send(Arrived { sensor, packet }).is_err();
+                if ended { Err(Error::new("asked to end")) } else { Ok(()) }
             });
-            match told {
-                Ok(told) => lost.extend(told),
-                Err(error) if error.to_string().contains("asked to end") => break,
-                Err(error) => return Err(error),
+            if ended {
+                break;
             }
+            lost.extend(told?);
         }
         Ok(lost)
     });

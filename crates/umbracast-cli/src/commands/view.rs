@@ -29,6 +29,7 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
     let publish = page.listener();
     let mut lost = Vec::new();
     loop {
+        lost.clear(); // Another pass loses the same.
         for input in &inputs {
             let mut pipeline = Pipeline::new(&config, Some(&weights))?;
             if let Some(empty) = input::empty_beside(input) {

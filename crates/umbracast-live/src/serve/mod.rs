@@ -35,6 +35,7 @@ use serde_json::{Value, json};
 use tokio::sync::{broadcast, oneshot, watch};
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::BroadcastStream;
+use tokio_stream::wrappers::errors::BroadcastStreamRecvError;
 use umbracast::{Error, Site};
 
 use crate::clock::HostClock;
@@ -109,6 +110,13 @@ pub fn start(address: SocketAddr, token: Option<String>, watched: Watched) -> Re
         return Err(Error::new(format!(
             "{address}: expected a token (UMBRACAST_TOKEN) for an address that other hosts can reach, found none"
         )));
+    }
+    // As it stands in an address: nothing that a browser writes otherwise there.
+    let plain = |token: &String| {
+        !token.is_empty() && token.bytes().all(|b| b.is_ascii_alphanumeric() || b"-._~".contains(&b))
+    };
+    if !token.as_ref().is_none_or(plain) {
+        return Err(Error::new("UMBRACAST_TOKEN: expected letters, digits, - . _ ~, found something else"));
     }
     let listener = TcpListener::bind(address).map_err(|e| Error::new(e.to_string()).within(address))?;
     let failed = |e: std::io::Error| Error::new(e.to_string()).within(address);
@@ -285,7 +293,9 @@ async fn events(State(shared): State<Arc<Shared>>) -> Response {
             Ok(event) => {
                 Sent::default().event(event.state.name()).data(event.json(&shared.access_points).to_string())
             }
-            Err(missed) => Sent::default().event("missed").data(missed.to_string()),
+            Err(BroadcastStreamRecvError::Lagged(missed)) => {
+                Sent::default().event("missed").data(missed.to_string())
+            }
         })
     });
     Sse::new(stream).keep_alive(KeepAlive::default()).into_response()
