@@ -1,4 +1,4 @@
-//! Files and tables: pcap, PCD, MCAP recordings, trajectories, motion captures, Parquet and CSV.
+//! Files, tables and messages: pcap, PCD, MCAP recordings, trajectories, motion captures, Parquet and CSV.
 
 mod lzf;
 pub mod pcap;
@@ -7,8 +7,8 @@ pub mod rows;
 pub mod cdr;
 pub mod messages;
 pub mod point_cloud;
-pub mod recording;
 pub mod tables;
 pub mod wire;
+pub mod recording;
 pub mod trajectories;
 pub mod bvh;

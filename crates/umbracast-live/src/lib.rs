@@ -13,9 +13,9 @@
 pub mod clock;
 pub mod queue;
 pub mod latency;
+pub mod warnings;
 pub mod receive;
 pub mod published;
-pub mod warnings;
 pub mod record;
 pub mod run;
 pub mod send;
