@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::Watched;
+use super::watched::Watched;
 use crate::latency::Latencies;
 use crate::published::Published;
 

@@ -14,6 +14,7 @@
 //! A thread of its own with one worker: a slow or hostile client takes time from other clients at most, never from the
 //! pipeline, which only leaves the newest frame here.
 
+mod watched;
 mod metrics;
 mod openapi;
 
@@ -36,12 +37,11 @@ use tokio::sync::{broadcast, oneshot, watch};
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::wrappers::errors::BroadcastStreamRecvError;
-use umbracast::{Error, Site};
+use umbracast::Error;
 
-use crate::clock::HostClock;
 use crate::published::Published;
-use crate::run::Counters;
 use crate::warnings::Event;
+pub use watched::Watched;
 
 /// The page: HTML, style and script in one, nothing loaded from elsewhere.
 const PAGE: &str = include_str!("page.html");
@@ -53,18 +53,6 @@ const EVENTS_WAITING: usize = 1024;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Without a frame for so long, something is wrong.
 const STALE: Duration = Duration::from_secs(1);
-
-/// What the page is about.
-pub struct Watched {
-    /// Where everything stands.
-    pub site: Site,
-    /// What is counted.
-    pub counters: Arc<Counters>,
-    /// The clock of the run.
-    pub clock: HostClock,
-    /// What it is that is shown: `live`, or a recording's name.
-    pub title: String,
-}
 
 /// The server's thread, and where it listens.
 pub struct Server {

@@ -5,6 +5,8 @@ use umbracast::Config;
 use umbracast_io::rows::{LinkRow, TrackRow};
 
 use super::*;
+use crate::clock::HostClock;
+use crate::run::Counters;
 use crate::warnings::Warnings;
 
 fn server(token: Option<&str>) -> (Server, HostClock) {
