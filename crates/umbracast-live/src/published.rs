@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use umbracast::{Health, Outcome};
+use umbracast::{Frame, Health, Outcome};
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::wire;
 
@@ -21,7 +21,7 @@ pub struct Published {
     pub time_ns: i64,
     /// When it was published, host time.
     pub published_ns: i64,
-    /// From the last packet of the frame to this.
+    /// From the packet before the one that closed the frame to this.
     pub latency: Duration,
     /// Of the stages alone.
     pub step: Duration,
@@ -44,8 +44,8 @@ pub struct Published {
 }
 
 impl Published {
-    /// The rows and points of an outcome.
-    pub fn of(outcome: &Outcome) -> Self {
+    /// The rows and points of a frame's outcome, and which of the site's `sensors` gave to it.
+    pub fn of(outcome: &Outcome, frame: &Frame, sensors: usize) -> Self {
         let (mut tracks, mut links) = (Vec::new(), Vec::new());
         rows::of_outcome(0, outcome, &mut tracks, &mut links);
         let every = outcome.foreground.len().div_ceil(POINTS_DRAWN).max(1);
@@ -60,6 +60,7 @@ impl Published {
                 .map(|point| point.position_m.to_array().map(in_cm))
                 .collect(),
             health: outcome.health,
+            sensors: (0..sensors).map(|s| frame.scans.iter().any(|scan| scan.sensor == s)).collect(),
             ..Self::default()
         }
     }

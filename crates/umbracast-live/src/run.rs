@@ -62,7 +62,7 @@ pub struct Counters {
     pub packets: AtomicU64,
     /// Frames that were published.
     pub frames: AtomicU64,
-    /// From the last packet of a frame to its results.
+    /// From the packet before the one that closed a frame to its results.
     pub latencies: Mutex<Latencies>,
     /// Of the stages alone.
     pub steps: Mutex<Latencies>,
@@ -92,7 +92,7 @@ pub struct Summary {
     pub frames: u64,
     /// Frames given up because the pipeline was busy.
     pub frames_skipped: u64,
-    /// From the last packet of a frame to its results.
+    /// From the packet before the one that closed a frame to its results.
     pub latencies: Latencies,
     /// Of the stages alone.
     pub steps: Latencies,
@@ -227,11 +227,9 @@ fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
         let begun_ns = publish.clock.now_ns();
         let outcome = pipeline.step(&frame);
         let stepped_ns = publish.clock.now_ns();
-        let mut published = Published::of(outcome);
+        let mut published = Published::of(outcome, &frame, publish.sensors);
         published.health.add(&health);
         published.frames_skipped = frames.lost();
-        published.sensors =
-            (0..publish.sensors).map(|s| frame.scans.iter().any(|scan| scan.sensor == s)).collect();
         published.events = publish.warnings.changes(&published.links);
         published.step = Duration::from_nanos((stepped_ns - begun_ns).max(0) as u64);
         published.published_ns = publish.clock.now_ns();

@@ -40,11 +40,8 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
             let told = input.frames(&config.site, &mut Health::default(), |frame| {
                 let (host_ns, frame_ns) = *first.get_or_insert((clock.now_ns(), frame.time_ns));
                 let outcome = pipeline.step(frame);
-                let mut published = Published::of(outcome);
+                let mut published = Published::of(outcome, frame, config.site.sensors.len());
                 published.events = warnings.changes(&published.links);
-                published.sensors = (0..config.site.sensors.len())
-                    .map(|s| frame.scans.iter().any(|scan| scan.sensor == s))
-                    .collect();
                 clock.sleep_until(host_ns + ((frame.time_ns - frame_ns) as f64 / args.rate) as i64);
                 published.published_ns = clock.now_ns();
                 counters.frames.fetch_add(1, Ordering::Relaxed);
