@@ -244,6 +244,11 @@ impl Ue {
             self.height_share * height_m,
         )
     }
+
+    /// Whether it is above the person's position, whichever way the person faces.
+    pub(crate) fn is_on_axis(&self) -> bool {
+        self.forward_m == 0.0 && self.left_m == 0.0
+    }
 }
 
 impl Sensor {

@@ -164,7 +164,7 @@ impl Caster {
         self.sampler.draw(numbers, ue, &self.access_points_m, people.clone());
         for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
             for (person, (track, _)) in people.clone().enumerate() {
-                let chances = self.sampler.chances(numbers, ue, access_point, ap_m, person, self.threshold);
+                let chances = self.sampler.chances(ue, access_point, ap_m, person, self.threshold);
                 blockages.push(Blockage {
                     access_point,
                     track: track.id,

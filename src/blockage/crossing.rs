@@ -1,188 +1,172 @@
-//! The samples of a word in which a body comes near its ray, asked exactly what [`super::body::blocks`] asks one ray, in
-//! loops over samples. Sums stand in another order: where a ray only touches a body, to some 1e-12 of its height, the answer may
-//! be another.
+//! The samples of a word in which a body comes near its ray, asked what [`super::body::blocks`] asks one ray, in loops over
+//! samples and in single precision: where a ray passes a body within 0.1 mm of touching it, the answer may be another.
+
+use std::ops::Range;
 
 use super::body_model::Slice;
 use super::figure::{Band, Figure, Joint, Rod};
-use super::rays::{Rays, WORD};
+use super::lanes::{WORD, larger, smaller};
+use super::rays::Rays;
+use super::shadows::Meeting;
 use super::trajectories::Trajectories;
-use crate::gait::{FOREMOST_RAD, LEFTMOST_RAD};
-use crate::geometry::{DVec2, DVec3};
 
 /// A rise that is none, as a share of a body's height over the whole ray.
-const LEVEL: f64 = 1e-12;
+const LEVEL: f32 = 1e-12;
+/// Loops run over whole registers; what the lanes beyond the last sample hold does no harm.
+const REGISTER: usize = 8;
 
-type Lane = [f64; WORD];
+type Lane = [f32; WORD];
 
-/// Samples of a word in which a body comes near its ray, each in the body's own frame: shares of its height, from its
-/// swaying axis, x ahead and y to the left.
-#[derive(Debug, Clone)]
+/// Up to a word of samples, from any of a body's words, each in the body's own frame: shares of its height, from its swaying
+/// axis, x ahead and y to the left.
+#[derive(Debug, Clone, Default)]
 pub(super) struct Crossing {
-    samples: Vec<u8>,
-    /// Where the body and the ray's end are, then what is worked out of it.
-    position: [Lane; 2],
+    samples: Vec<u32>,
+    /// Where the body's swaying axis is, which way it faces, and where the ray ends, then what is worked out of it.
+    axis: [Lane; 2],
+    own: [Lane; 2],
     end: [Lane; 3],
-    turn: [Lane; 2],
+    start_z: f32,
     height: Lane,
     width: Lane,
-    sway: Lane,
     swing: Lane,
-    phase: [Lane; 2],
+    wave: Lane,
     from: [Lane; 3],
     along: [Lane; 3],
     /// How far the ray misses the body, in no unit: touching is 0.
     miss: Lane,
 }
 
-impl Default for Crossing {
-    fn default() -> Self {
-        let [none, one] = [[0.0; WORD], [1.0; WORD]];
-        Self {
-            samples: Vec::with_capacity(WORD),
-            position: [none; 2],
-            end: [none; 3],
-            turn: [none; 2],
-            height: one,
-            width: one,
-            sway: none,
-            swing: none,
-            phase: [none; 2],
-            from: [none; 3],
-            along: [none; 3],
-            miss: none,
-        }
-    }
+/// What of a body is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    Trunk,
+    Arms,
 }
 
 impl Crossing {
-    /// Of the samples in `asked`, a word of bits, those whose ray the body meets.
-    pub(super) fn blocked(
+    /// Of the samples in these words of `asked`, bits, adds those whose ray a part of the body meets to `blocked`.
+    #[inline(always)]
+    pub(super) fn ask(
         &mut self,
         figure: &Figure,
+        part: Part,
         rays: &Rays,
+        meeting: &Meeting,
         other: &Trajectories,
-        step: usize,
-        word: usize,
-        asked: u64,
-        band: Band,
-    ) -> u64 {
-        if asked == 0 {
-            return 0;
-        }
-        self.gather(rays, other, step, word, asked);
-        self.cross_widely(figure, rays.start_m, other.ahead[step], band);
-        let met = self.samples.iter().zip(&self.miss).filter(|(_, miss)| **miss <= 0.0);
-        met.fold(0, |bits, (sample, _)| bits | 1 << sample)
-    }
-
-    /// Takes what is asked for out of the arrays of rays and body.
-    fn gather(&mut self, rays: &Rays, other: &Trajectories, step: usize, word: usize, asked: u64) {
-        self.samples.clear();
-        let (row, gait) = (step * other.samples, &other.gait);
-        let mut left = asked;
-        for lane in 0..WORD {
-            if left == 0 {
-                break;
+        words: Range<usize>,
+        asked: &[u32],
+        blocked: &mut [u32],
+    ) {
+        let step = meeting.step as usize;
+        let base = other.mean_m[step] - rays.start_m.truncate();
+        let base_m = [base.x as f32, base.y as f32];
+        self.start_z = rays.start_m.z as f32;
+        for word in words {
+            let mut left = asked[word];
+            while left != 0 {
+                let k = word * WORD + left.trailing_zeros() as usize;
+                left &= left - 1;
+                self.gather(rays, other, base_m, k, step * other.samples + k);
+                if self.samples.len() == WORD {
+                    self.answer(figure, part, meeting.band, blocked);
+                }
             }
-            let bit = left.trailing_zeros() as usize;
-            left &= left - 1;
-            self.samples.push(bit as u8);
-            let k = word * WORD + bit;
-            let i = row + k;
-            (self.position[0][lane], self.position[1][lane]) = (other.x_m[i], other.y_m[i]);
-            (self.end[0][lane], self.end[1][lane]) = (rays.end_m[0][k], rays.end_m[1][k]);
-            self.end[2][lane] = rays.end_m[2][k];
-            (self.turn[0][lane], self.turn[1][lane]) = (gait.turn[0][k], gait.turn[1][k]);
-            (self.height[lane], self.width[lane]) = (other.height_m[k], other.width_scale[k]);
-            (self.sway[lane], self.swing[lane]) = (gait.sway[k], gait.swing_hz[k]);
-            (self.phase[0][lane], self.phase[1][lane]) = (gait.phase[0][i], gait.phase[1][i]);
         }
+        self.answer(figure, part, meeting.band, blocked);
     }
 
-    /// [`Crossing::cross`], once more for processors with wider registers. No instruction that rounds otherwise is used
-    /// (fused multiply-add is another feature), so both give the same bits.
-    fn cross_widely(&mut self, figure: &Figure, start_m: DVec3, ahead: DVec2, band: Band) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has just said that it has what the function was compiled for.
-            return unsafe { self.cross_avx2(figure, start_m, ahead, band) };
-        }
-        self.cross(figure, start_m, ahead, band);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn cross_avx2(&mut self, figure: &Figure, start_m: DVec3, ahead: DVec2, band: Band) {
-        self.cross(figure, start_m, ahead, band);
-    }
-
+    /// Takes a sample out of the arrays of rays and body.
     #[inline(always)]
-    fn cross(&mut self, figure: &Figure, start_m: DVec3, ahead: DVec2, band: Band) {
-        self.turn_to_body(figure, start_m, ahead);
-        self.miss = [f64::INFINITY; WORD];
-        let mut bottom = 0.0;
-        for slice in &figure.slices {
-            if band.meets(bottom, slice.top) {
-                self.cross_slice(slice, bottom);
-            }
-            bottom = slice.top;
+    fn gather(&mut self, rays: &Rays, other: &Trajectories, base_m: [f32; 2], k: usize, of_step: usize) {
+        let (lane, gait) = (self.samples.len(), &other.gait);
+        for i in 0..2 {
+            self.axis[i][lane] = base_m[i] + gait.axis_m[i][of_step];
+            self.own[i][lane] = gait.own[i][of_step];
         }
-        if self.miss[..self.lanes()].iter().all(|miss| *miss <= 0.0) {
+        for i in 0..3 {
+            self.end[i][lane] = rays.end_m[i][k];
+        }
+        (self.height[lane], self.width[lane]) = (other.height_m[k], other.width_scale[k]);
+        (self.swing[lane], self.wave[lane]) = (gait.swing_hz[k], gait.wave_hz[of_step]);
+        self.samples.push(k as u32);
+    }
+
+    /// Asks those that were taken.
+    #[inline(always)]
+    fn answer(&mut self, figure: &Figure, part: Part, band: Band, blocked: &mut [u32]) {
+        if self.samples.is_empty() {
             return;
         }
-        for rod in figure.arms.rods().into_iter().filter(|rod| rod.is_within(band)) {
-            self.cross_rod(&rod, -1.0);
-            self.cross_rod(&rod, 1.0);
+        self.cross(figure, part, band);
+        for (sample, miss) in self.samples.iter().zip(&self.miss) {
+            blocked[*sample as usize / WORD] |= u32::from(*miss <= 0.0) << (*sample as usize % WORD);
+        }
+        self.samples.clear();
+    }
+
+    #[inline(always)]
+    fn cross(&mut self, figure: &Figure, part: Part, band: Band) {
+        self.turn_to_body();
+        self.miss = [f32::INFINITY; WORD];
+        match part {
+            Part::Trunk => {
+                let mut bottom = 0.0;
+                for slice in &figure.slices {
+                    if band.meets(bottom, slice.top) {
+                        self.cross_slice(slice, bottom as f32);
+                    }
+                    bottom = slice.top;
+                }
+            }
+            Part::Arms => {
+                for rod in figure.rods.iter().filter(|rod| rod.is_within(band)) {
+                    self.cross_rod(rod, -1.0);
+                    self.cross_rod(rod, 1.0);
+                }
+            }
         }
     }
 
-    /// How many lanes are in use.
+    /// How many lanes are in use, up to whole registers.
     #[inline(always)]
     fn lanes(&self) -> usize {
-        self.samples.len().min(WORD)
+        self.samples.len().next_multiple_of(REGISTER).min(WORD)
     }
 
-    /// Each ray into the frame of its body, whose trunk rides over the foot that stands, once a stride, and goes ahead
-    /// and back with every step.
     #[inline(always)]
-    fn turn_to_body(&mut self, figure: &Figure, start_m: DVec3, ahead: DVec2) {
-        let n = self.lanes();
-        let (leftmost, foremost) = (DVec2::from_angle(LEFTMOST_RAD), DVec2::from_angle(FOREMOST_RAD));
-        for i in 0..n {
-            let turned_x = ahead.x * self.turn[0][i] - ahead.y * self.turn[1][i];
-            let turned_y = ahead.y * self.turn[0][i] + ahead.x * self.turn[1][i];
+    fn turn_to_body(&mut self) {
+        for i in 0..self.lanes() {
             let share = 1.0 / self.height[i];
-            let (cos, sin) = (self.phase[0][i], self.phase[1][i]);
-            let from_foremost = cos * foremost.x + sin * foremost.y;
-            let sway_ahead = figure.sway_ahead * self.sway[i] * (2.0 * from_foremost * from_foremost - 1.0);
-            let sway_left = figure.sway_left * self.sway[i] * (cos * leftmost.x + sin * leftmost.y);
-            let (from_x, from_y) = (start_m.x - self.position[0][i], start_m.y - self.position[1][i]);
-            let (along_x, along_y) = (self.end[0][i] - start_m.x, self.end[1][i] - start_m.y);
-            self.from[0][i] = (turned_x * from_x + turned_y * from_y) * share - sway_ahead;
-            self.from[1][i] = (turned_x * from_y - turned_y * from_x) * share - sway_left;
-            self.from[2][i] = start_m.z * share;
-            self.along[0][i] = (turned_x * along_x + turned_y * along_y) * share;
-            self.along[1][i] = (turned_x * along_y - turned_y * along_x) * share;
-            self.along[2][i] = (self.end[2][i] - start_m.z) * share;
+            let (own_x, own_y) = (self.own[0][i], self.own[1][i]);
+            let (axis_x, axis_y) = (self.axis[0][i], self.axis[1][i]);
+            let (end_x, end_y) = (self.end[0][i], self.end[1][i]);
+            self.from[0][i] = -(own_x * axis_x + own_y * axis_y) * share;
+            self.from[1][i] = (own_y * axis_x - own_x * axis_y) * share;
+            self.from[2][i] = self.start_z * share;
+            self.along[0][i] = (own_x * end_x + own_y * end_y) * share;
+            self.along[1][i] = (own_x * end_y - own_y * end_x) * share;
+            self.along[2][i] = (self.end[2][i] - self.start_z) * share;
         }
     }
 
     /// The ray at the height of a slice against its ellipse: in the space where that is the unit circle, the ray comes
     /// nearest at `nearest` and is inside where `|s + t d|^2 <= 1`.
     #[inline(always)]
-    fn cross_slice(&mut self, slice: &Slice, bottom: f64) {
-        let n = self.lanes();
-        for i in 0..n {
+    fn cross_slice(&mut self, slice: &Slice, bottom: f32) {
+        let [top, ahead] = [slice.top as f32, slice.ahead as f32];
+        let [depth, side] = [1.0 / slice.half_depth as f32, 1.0 / slice.half_width as f32];
+        for i in 0..self.lanes() {
             // A level ray is taken to rise by next to nothing.
             let up = self.along[2][i];
             let per_up = 1.0 / if up.abs() < LEVEL { LEVEL } else { up };
-            let (a, b) = ((bottom - self.from[2][i]) * per_up, (slice.top - self.from[2][i]) * per_up);
+            let (a, b) = ((bottom - self.from[2][i]) * per_up, (top - self.from[2][i]) * per_up);
             let (enter, leave) = (larger(smaller(a, b), 0.0), smaller(larger(a, b), 1.0));
             let width = 1.0 / self.width[i];
-            let (per_depth, per_width) = (width / slice.half_depth, width / slice.half_width);
-            let (sx, sy) = ((self.from[0][i] - slice.ahead) * per_depth, self.from[1][i] * per_width);
+            let (per_depth, per_width) = (width * depth, width * side);
+            let (sx, sy) = ((self.from[0][i] - ahead) * per_depth, self.from[1][i] * per_width);
             let (dx, dy) = (self.along[0][i] * per_depth, self.along[1][i] * per_width);
-            let squared = larger(dx * dx + dy * dy, f64::MIN_POSITIVE);
+            let squared = larger(dx * dx + dy * dy, f32::MIN_POSITIVE);
             let nearest = larger(smaller(-(sx * dx + sy * dy) / squared, leave), enter);
             let (x, y) = (sx + nearest * dx, sy + nearest * dy);
             // Where the ray is nowhere at the slice's height, it enters after it leaves.
@@ -194,19 +178,18 @@ impl Crossing {
     /// The ray against a rod of an arm on the left (`side` 1) or the right. Arms swing against the leg of their side, and
     /// farther ahead than back because the elbow bends.
     #[inline(always)]
-    fn cross_rod(&mut self, rod: &Rod, side: f64) {
-        let (n, Rod { upper, lower, radius }) = (self.lanes(), rod);
-        for i in 0..n {
-            let wave = side * self.phase[0][i];
-            let ahead = |joint: &Joint| self.swing[i] * (joint.ahead + joint.swing * wave);
+    fn cross_rod(&mut self, rod: &Rod, side: f32) {
+        let numbers = |joint: &Joint| {
+            [joint.ahead, joint.swing * f64::from(side), joint.out * f64::from(side), joint.up]
+                .map(|x| x as f32)
+        };
+        let (upper, lower, radius) = (numbers(&rod.upper), numbers(&rod.lower), rod.radius as f32);
+        for i in 0..self.lanes() {
+            let ahead = |joint: [f32; 4]| self.swing[i] * joint[0] + self.wave[i] * joint[1];
             let (upper_ahead, lower_ahead) = (ahead(upper), ahead(lower));
             let d = [self.along[0][i], self.along[1][i], self.along[2][i]];
-            let e = [lower_ahead - upper_ahead, side * (lower.out - upper.out), lower.up - upper.up];
-            let r = [
-                self.from[0][i] - upper_ahead,
-                self.from[1][i] - side * upper.out,
-                self.from[2][i] - upper.up,
-            ];
+            let e = [lower_ahead - upper_ahead, lower[2] - upper[2], lower[3] - upper[3]];
+            let r = [self.from[0][i] - upper_ahead, self.from[1][i] - upper[2], self.from[2][i] - upper[3]];
             let squared = nearest_of_segments(r, d, e);
             let width = radius * self.width[i];
             self.miss[i] = smaller(self.miss[i], squared - width * width);
@@ -216,15 +199,15 @@ impl Crossing {
 
 /// Square of the smallest distance between the segments p + t d and q + u e, where r = p - q.
 #[inline(always)]
-fn nearest_of_segments(r: [f64; 3], d: [f64; 3], e: [f64; 3]) -> f64 {
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let (a, b, c) = (larger(dot(d, d), f64::MIN_POSITIVE), dot(d, e), larger(dot(e, e), f64::MIN_POSITIVE));
+fn nearest_of_segments(r: [f32; 3], d: [f32; 3], e: [f32; 3]) -> f32 {
+    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let (a, b, c) = (larger(dot(d, d), f32::MIN_POSITIVE), dot(d, e), larger(dot(e, e), f32::MIN_POSITIVE));
     let (f, g) = (dot(d, r), dot(e, r));
     let parallel = a * c - b * b;
     let on_d = if parallel > 0.0 { share((b * g - c * f) / parallel) } else { 0.0 };
     let on_e = share((b * on_d + g) / c);
     let on_d = share((b * on_e - f) / a);
-    let apart: [f64; 3] = [
+    let apart: [f32; 3] = [
         r[0] + on_d * d[0] - on_e * e[0],
         r[1] + on_d * d[1] - on_e * e[1],
         r[2] + on_d * d[2] - on_e * e[2],
@@ -233,18 +216,6 @@ fn nearest_of_segments(r: [f64; 3], d: [f64; 3], e: [f64; 3]) -> f64 {
 }
 
 #[inline(always)]
-fn share(t: f64) -> f64 {
+fn share(t: f32) -> f32 {
     smaller(larger(t, 0.0), 1.0)
-}
-
-// `f64::min` and `max` ask for NaN as well, which no lane holds: these are one instruction.
-
-#[inline(always)]
-fn smaller(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }

@@ -5,20 +5,22 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use super::lanes::WORD;
 use crate::STEPS;
 
-/// By coordinate, then by sample: standard normal, or even in (0, 1) where said.
+/// By coordinate, then by sample: standard normal, or even in (0, 1) where said. Samples fill whole words; those after
+/// the last that was asked for lie in the middle of every distribution.
 #[derive(Debug, Clone)]
 pub(super) struct Draws {
-    pub(super) state: [Vec<f64>; 4],
-    pub(super) process_noise: [[Vec<f64>; 2]; STEPS],
-    pub(super) height: Vec<f64>,
-    pub(super) width: Vec<f64>,
-    pub(super) heading: Vec<f64>,
+    pub(super) state: [Vec<f32>; 4],
+    pub(super) process_noise: [[Vec<f32>; 2]; STEPS],
+    pub(super) height: Vec<f32>,
+    pub(super) width: Vec<f32>,
+    pub(super) heading: Vec<f32>,
     /// Even.
-    pub(super) phase: Vec<f64>,
+    pub(super) phase: Vec<f32>,
     /// Even.
-    pub(super) arm_swing: Vec<f64>,
+    pub(super) arm_swing: Vec<f32>,
 }
 
 impl Draws {
@@ -26,32 +28,30 @@ impl Draws {
     pub(super) fn new(samples: usize, seed: u64, track: u64) -> Self {
         let mut random = Pcg64Mcg::seed_from_u64(seed ^ track.wrapping_mul(0x9E37_79B9_7F4A_7C15));
         let (even, normal) = (even(samples), normal(samples));
-        let mut shuffled = |values: &[f64]| shuffled(values, &mut random);
-        Self {
-            state: std::array::from_fn(|_| shuffled(&normal)),
-            process_noise: std::array::from_fn(|_| std::array::from_fn(|_| shuffled(&normal))),
-            height: shuffled(&normal),
-            width: shuffled(&normal),
-            heading: shuffled(&normal),
-            phase: shuffled(&even),
-            arm_swing: shuffled(&even),
-        }
+        let mut normal = || shuffled(&normal, 0.0, &mut random);
+        let state = std::array::from_fn(|_| normal());
+        let process_noise = std::array::from_fn(|_| std::array::from_fn(|_| normal()));
+        let (height, width, heading) = (normal(), normal(), normal());
+        let mut even = || shuffled(&even, 0.5, &mut random);
+        Self { state, process_noise, height, width, heading, phase: even(), arm_swing: even() }
     }
 }
 
-fn shuffled(values: &[f64], random: &mut impl Rng) -> Vec<f64> {
+/// In any order, with the middle up to a whole word.
+fn shuffled(values: &[f32], middle: f32, random: &mut impl Rng) -> Vec<f32> {
     let mut values = values.to_vec();
     values.shuffle(random);
+    values.resize(values.len().next_multiple_of(WORD), middle);
     values
 }
 
 /// Middles of n equal shares of (0, 1).
-fn even(n: usize) -> Vec<f64> {
-    (0..n).map(|k| (k as f64 + 0.5) / n as f64).collect()
+fn even(n: usize) -> Vec<f32> {
+    (0..n).map(|k| ((k as f64 + 0.5) / n as f64) as f32).collect()
 }
 
 /// The standard normal distribution's quantiles at those middles, its density added up from the left.
-fn normal(n: usize) -> Vec<f64> {
+fn normal(n: usize) -> Vec<f32> {
     const STEP: f64 = 1e-3;
     const FIRST: f64 = -6.0;
     let density = |z: f64| (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
@@ -59,11 +59,11 @@ fn normal(n: usize) -> Vec<f64> {
     even(n)
         .into_iter()
         .map(|share| {
-            while below < share && z < -FIRST {
+            while below < f64::from(share) && z < -FIRST {
                 below += STEP * density(z + 0.5 * STEP);
                 z += STEP;
             }
-            z
+            z as f32
         })
         .collect()
 }
@@ -83,9 +83,9 @@ mod tests {
     #[test]
     fn every_coordinate_has_each_quantile_once_in_an_order_of_its_own() {
         let draws = Draws::new(64, 1, 7);
-        let sorted = |values: &[f64]| {
+        let sorted = |values: &[f32]| {
             let mut values = values.to_vec();
-            values.sort_by(f64::total_cmp);
+            values.sort_by(f32::total_cmp);
             values
         };
         assert_eq!(sorted(&draws.state[0]), sorted(&draws.process_noise[8][1]));

@@ -1,6 +1,7 @@
 //! A body for the loops over samples: which of its parts stand between two heights, and how far they reach.
 
 use super::body_model::{Arms, BodyModel, Slice};
+use super::lanes::larger;
 
 /// Heights between which rays may meet a body, as shares of its height.
 #[derive(Debug, Clone, Copy)]
@@ -10,6 +11,7 @@ pub(super) struct Band {
 }
 
 impl Band {
+    #[inline(always)]
     pub(super) fn meets(&self, bottom: f64, top: f64) -> bool {
         top >= self.low && bottom <= self.high
     }
@@ -19,7 +21,7 @@ impl Band {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
     /// Half axes, ahead and aside, of an ellipse that holds every slice of the band for a width scale of 1, and of one that
-    /// every slice holds; 0 where there is none.
+    /// every slice holds.
     pub(super) around: [f32; 2],
     pub(super) within: [f32; 2],
     /// The slices' middles are so far ahead of the axis, and by so much more or less.
@@ -29,70 +31,106 @@ pub(super) struct Plan {
     pub(super) joints: [[f32; 3]; 3],
     /// Of the thicker rod; without arms in the band so negative that nothing is near.
     pub(super) radius: f32,
-    pub(super) sway: [f32; 2],
+    /// How far the trunk sways, ahead and aside together.
+    sway: f32,
+}
+
+impl Plan {
+    /// No part of it is farther from the body's position, as a share of the height.
+    pub(super) fn reach(&self, width_max: f64, fastest_hz: f64) -> f64 {
+        let half = f64::from(larger(self.around[0], self.around[1]));
+        let trunk = half * width_max + f64::from(self.ahead.abs() + self.ahead_by);
+        let joint = |[fixed, swings, out]: [f32; 3]| {
+            let ahead = fastest_hz * f64::from(fixed.abs() + swings.abs());
+            (ahead * ahead + f64::from(out * out)).sqrt()
+        };
+        let arms =
+            self.joints.map(joint).into_iter().fold(0.0, f64::max) + f64::from(self.radius) * width_max;
+        trunk.max(arms) + f64::from(self.sway)
+    }
 }
 
 /// The body's numbers as the loops want them.
 #[derive(Debug, Clone)]
 pub(super) struct Figure {
     pub(super) slices: Vec<Slice>,
-    pub(super) arms: Arms,
+    pub(super) rods: [Rod; 2],
+    /// Of every stretch of slices, with every choice of rods.
+    pub(super) plans: Vec<Plan>,
     pub(super) sway_left: f64,
     pub(super) sway_ahead: f64,
+    /// Share of people who walk without swinging their arms.
+    pub(super) still_share: f64,
 }
 
 impl Figure {
     pub(super) fn new(body: &BodyModel) -> Self {
-        Self {
+        let mut figure = Self {
             slices: body.slices.clone(),
-            arms: body.arms,
+            rods: body.arms.rods(),
+            plans: Vec::new(),
             sway_left: body.sway_left,
             sway_ahead: body.sway_ahead,
-        }
+            still_share: body.arms.still_share,
+        };
+        let n = figure.slices.len();
+        let stretches = (0..n).flat_map(|low| (0..n).map(move |high| (low, high)));
+        let plans = stretches.flat_map(|(low, high)| (0..RODS).map(move |rods| (low, high, rods)));
+        figure.plans = plans.map(|(low, high, rods)| figure.plan(low, high, rods)).collect();
+        figure
     }
 
-    /// What of the body is within a band.
-    pub(super) fn plan(&self, band: Band) -> Plan {
-        let (mut around, mut within, mut bottom) = ([0.0_f64; 2], [f64::MAX; 2], 0.0);
-        let (mut least, mut most) = (f64::MAX, f64::MIN);
-        for slice in &self.slices {
-            if band.meets(bottom, slice.top) {
-                let half = [slice.half_depth, slice.half_width];
-                around = [around[0].max(half[0]), around[1].max(half[1])];
-                within = [within[0].min(half[0]), within[1].min(half[1])];
-                (least, most) = (least.min(slice.ahead), most.max(slice.ahead));
-            }
-            bottom = slice.top;
-        }
-        if around[0] == 0.0 {
-            (least, most) = (0.0, 0.0);
-        }
-        if around[0] == 0.0 || band.low < 0.0 || band.high > bottom {
-            within = [0.0; 2];
-        }
-        let [upper, fore] = self.arms.rods();
-        let ends = match (upper.is_within(band), fore.is_within(band)) {
-            (true, true) => [upper.upper, upper.lower, fore.lower],
-            (true, false) => [upper.upper, upper.lower, upper.lower],
-            (false, _) => [fore.upper, fore.lower, fore.lower],
+    /// What of the body is within a band: one of [`Figure::plans`].
+    #[inline(always)]
+    pub(super) fn plan_of(&self, band: Band) -> usize {
+        let slices = &self.slices;
+        let last = slices.len().saturating_sub(1);
+        let low = slices[..last].iter().take_while(|slice| slice.top < band.low).count();
+        let high = slices[..last].iter().take_while(|slice| slice.top <= band.high).count();
+        let rods =
+            self.rods.iter().enumerate().map(|(i, rod)| usize::from(rod.is_within(band)) << i).sum::<usize>();
+        (low * slices.len() + high.max(low)) * RODS + rods
+    }
+
+    /// True where a band lies between the floor and the top of the head of everybody.
+    #[inline(always)]
+    pub(super) fn holds(&self, band: Band) -> bool {
+        band.low >= 0.0 && self.slices.last().is_some_and(|slice| band.high <= slice.top)
+    }
+
+    /// Of slices `low` to `high`, and of those rods whose bit is set.
+    fn plan(&self, low: usize, high: usize, rods: usize) -> Plan {
+        let slices = &self.slices[low.min(high)..=high];
+        let most = |of: fn(&Slice) -> f64| slices.iter().map(of).fold(f64::MIN, f64::max);
+        let least = |of: fn(&Slice) -> f64| slices.iter().map(of).fold(f64::MAX, f64::min);
+        let [foremost, hindmost] = [most(|slice| slice.ahead), least(|slice| slice.ahead)];
+        let [upper, fore] = &self.rods;
+        let ends = match rods {
+            0b11 => [upper.upper, upper.lower, fore.lower],
+            0b01 => [upper.upper, upper.lower, upper.lower],
+            _ => [fore.upper, fore.lower, fore.lower],
         };
-        let armed = upper.is_within(band) || fore.is_within(band);
+        let radius = if rods == 0 { NOWHERE } else { upper.radius.max(fore.radius) as f32 };
         Plan {
-            around: around.map(|half| half as f32),
-            within: within.map(|half| half as f32),
-            ahead: (0.5 * (least + most)) as f32,
-            ahead_by: (0.5 * (most - least)) as f32,
+            around: [most(|slice| slice.half_depth) as f32, most(|slice| slice.half_width) as f32],
+            within: [least(|slice| slice.half_depth) as f32, least(|slice| slice.half_width) as f32],
+            ahead: (0.5 * (foremost + hindmost)) as f32,
+            ahead_by: (0.5 * (foremost - hindmost)) as f32,
             joints: ends.map(|joint| [joint.ahead, joint.swing, joint.out].map(|x| x as f32)),
-            radius: if armed { upper.radius.max(fore.radius) as f32 } else { NOWHERE },
-            sway: [self.sway_ahead as f32, self.sway_left as f32],
+            radius,
+            sway: (self.sway_ahead + self.sway_left) as f32,
         }
     }
 }
+
+/// Which of the two rods: two bits.
+const RODS: usize = 4;
 
 /// A radius of what is not there.
 const NOWHERE: f32 = -1e3;
 
 /// One of the two rods of an arm.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Rod {
     pub(super) upper: Joint,
     pub(super) lower: Joint,
@@ -100,6 +138,7 @@ pub(super) struct Rod {
 }
 
 impl Rod {
+    #[inline(always)]
     pub(super) fn is_within(&self, band: Band) -> bool {
         // No width is more than twice the usual one.
         let radius = 2.0 * self.radius;
@@ -108,7 +147,7 @@ impl Rod {
 }
 
 /// Where an arm's shoulder, elbow or hand is.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Joint {
     pub(super) up: f64,
     pub(super) out: f64,

@@ -11,11 +11,13 @@ mod phases;
 mod steps;
 #[doc(hidden)] // What tests and ablations turn.
 pub mod numbers;
-mod trajectories;
+mod lanes;
+mod spread;
 mod figure;
+mod trajectories;
+mod shadows;
 mod rays;
 mod crossing;
-mod shadows;
 #[doc(hidden)] // Phases of a gait, for the fit of the body.
 pub mod probability;
 mod caster;

@@ -34,6 +34,22 @@ impl Phases {
     /// The phase below which a share of them lies.
     pub fn at(&self, share: f64) -> f64 {
         let i = self.shares.partition_point(|&up_to| up_to < share).min(PHASES - 1);
+        self.within(i, share)
+    }
+
+    /// The same for the middles of n equal shares, in their order.
+    pub(super) fn even(&self, n: usize) -> impl Iterator<Item = f64> {
+        let mut i = 0;
+        (0..n).map(move |k| {
+            let share = (k as f64 + 0.5) / n as f64;
+            while i < PHASES - 1 && self.shares[i] < share {
+                i += 1;
+            }
+            self.within(i, share)
+        })
+    }
+
+    fn within(&self, i: usize, share: f64) -> f64 {
         let below = if i == 0 { 0.0 } else { self.shares[i - 1] };
         let within = (share - below) / (self.shares[i] - below).max(f64::MIN_POSITIVE);
         self.first_rad + TAU / PHASES as f64 * (i as f64 + within)

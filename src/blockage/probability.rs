@@ -3,14 +3,16 @@
 //! every sample. Steps of a window, and links that share a blocker, hang together as they do in reality.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use super::crossing::Crossing;
+use super::crossing::{Crossing, Part};
 use super::draws::Draws;
 use super::figure::Figure;
+use super::lanes::WORD;
 use super::numbers::Numbers;
 #[doc(hidden)] // For the fit of the body.
 pub use super::phases::Phases;
-use super::rays::{Rays, WORD};
+use super::rays::{Near, Rays};
 use super::shadows::{Meeting, Shadows};
 use super::trajectories::{MOMENTS, Trajectories};
 use crate::forecast::Forecast;
@@ -24,9 +26,9 @@ const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 
 /// Most body-ray tests of a frame: everybody who may stand in the way of somebody at a step, times samples. An estimate
 /// of what a core does in a third of a frame's 100 ms, not measured yet; `bench/src/bin/growth.rs` will tell.
-const TESTS_MAX: usize = 1 << 23;
-/// Fewer samples are not taken: a probability of 0.5 is then 0.125 off (one sigma).
-const SAMPLES_MIN: usize = 16;
+const TESTS_MAX: usize = 1 << 20;
+/// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
+const SAMPLES_MIN: usize = WORD;
 
 /// What the samples say of one link.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,17 +67,28 @@ pub struct Sampler {
     link: Link,
 }
 
+/// From which access point to whose UE.
+#[derive(Debug, Clone, Copy)]
+struct Aim<'a> {
+    ue: &'a Ue,
+    ap_m: DVec3,
+    person: usize,
+}
+
 /// A link's samples: a bit each, words of [`WORD`].
 #[derive(Debug, Clone, Default)]
 struct Link {
     /// Blocked at the step that is looked at.
-    blocked: Vec<u64>,
+    blocked: Vec<u32>,
     /// Blocked now.
-    now: Vec<u64>,
+    now: Vec<u32>,
     /// Blocked at a step after now.
-    met: Vec<u64>,
+    met: Vec<u32>,
     /// The time that `duration_s` tells has come.
-    over: Vec<u64>,
+    over: Vec<u32>,
+    /// What is to be asked height by height of the body that is looked at.
+    trunk: Vec<u32>,
+    arms: Vec<u32>,
 }
 
 impl Sampler {
@@ -105,6 +118,36 @@ impl Sampler {
         aps_m: &[DVec3],
         people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
     ) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has just said that it has what the function was compiled for.
+            return unsafe { self.draw_avx2(numbers, ue, aps_m, people) };
+        }
+        self.draw_portably(numbers, ue, aps_m, people);
+    }
+
+    /// [`Sampler::draw`], once more for processors with wider registers. No instruction that rounds otherwise is used
+    /// (fused multiply-add is another feature), so both give the same bits.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn draw_avx2<'a>(
+        &mut self,
+        numbers: &Numbers,
+        ue: &Ue,
+        aps_m: &[DVec3],
+        people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
+    ) {
+        self.draw_portably(numbers, ue, aps_m, people);
+    }
+
+    #[inline(always)]
+    fn draw_portably<'a>(
+        &mut self,
+        numbers: &Numbers,
+        ue: &Ue,
+        aps_m: &[DVec3],
+        people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
+    ) {
         self.draws.retain(|&id, _| people.clone().any(|(track, _)| track.id == id));
         self.present = 0;
         for (track, forecast) in people {
@@ -115,7 +158,7 @@ impl Sampler {
                 .draws
                 .entry(track.id)
                 .or_insert_with(|| Draws::new(numbers.samples, numbers.seed, track.id));
-            self.people[self.present].fill(numbers, draws, track, forecast);
+            self.people[self.present].fill(numbers, &self.figure, draws, track, forecast);
             self.present += 1;
         }
         self.meetings.clear();
@@ -124,16 +167,14 @@ impl Sampler {
         for &ap_m in aps_m {
             self.shadows.fall(ap_m, ue, people);
             for person in 0..people.len() {
-                self.shadows.meet(people, person, &mut self.meetings);
+                self.shadows.meet(&self.figure, people, person, &mut self.meetings);
                 self.ends.push(self.meetings.len());
             }
         }
-        // Where there is more to ask than time allows, every other sample is left out, for all links alike; what is left
-        // is a sample of the same distribution, for draws are in no order.
-        self.samples = numbers.samples;
-        while self.samples * self.meetings.len() > TESTS_MAX && self.samples >= 2 * SAMPLES_MIN {
-            self.samples /= 2;
-        }
+        // Where there is more to ask than time allows, samples are left out, for all links alike; what is left is a sample of
+        // the same distribution, for draws are in no order.
+        let affordable = (TESTS_MAX / self.meetings.len().max(1)).max(SAMPLES_MIN) / WORD * WORD;
+        self.samples = numbers.samples.min(affordable);
     }
 
     /// Whether there were more meetings than could be asked with all samples.
@@ -143,9 +184,25 @@ impl Sampler {
 
     /// What becomes of the link between access point `ap` of those drawn for and `person`. It counts as blocked now from
     /// `threshold` on.
-    pub fn chances(
+    pub fn chances(&mut self, ue: &Ue, ap: usize, ap_m: DVec3, person: usize, threshold: f64) -> Chances {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has just said that it has what the function was compiled for.
+            return unsafe { self.chances_avx2(ue, ap, ap_m, person, threshold) };
+        }
+        self.chances_portably(ue, ap, ap_m, person, threshold)
+    }
+
+    /// [`Sampler::chances`], once more as [`Sampler::draw`] is.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn chances_avx2(&mut self, ue: &Ue, ap: usize, ap_m: DVec3, person: usize, threshold: f64) -> Chances {
+        self.chances_portably(ue, ap, ap_m, person, threshold)
+    }
+
+    #[inline(always)]
+    fn chances_portably(
         &mut self,
-        numbers: &Numbers,
         ue: &Ue,
         ap: usize,
         ap_m: DVec3,
@@ -155,51 +212,89 @@ impl Sampler {
         let link = ap * self.present + person;
         let of_link = link.checked_sub(1).map_or(0, |before| self.ends[before])..self.ends[link];
         let samples = self.samples;
+        let words = samples.div_ceil(WORD);
         self.link.begin(samples);
         let mut counts = Counts::default();
-        let mut rest = of_link.start;
-        for step in 0..MOMENTS {
-            let of_step = self.meetings[rest..of_link.end].partition_point(|m| m.step as usize <= step);
-            let meetings = rest..rest + of_step;
-            rest = meetings.end;
-            self.link.blocked.fill(0);
-            if !meetings.is_empty() {
-                self.rays.aim(ap_m, ue, &self.people[person], step, samples);
+        let aim = Aim { ue, ap_m, person };
+        let later = self.take_step(aim, 0, of_link.clone(), 0..words, &mut counts);
+        counts.blocked_now = counts.now as f64 / samples as f64 >= threshold;
+        // Where nothing stands in the way of any sample now, nor of the first half of them later, that is taken for the rest
+        // as well: some chance below a few per cent then counts as none.
+        let half = words.div_ceil(2);
+        for words in [0..half, half..words] {
+            let mut rest = later.clone();
+            for step in 1..MOMENTS {
+                rest = self.take_step(aim, step, rest, words.clone(), &mut counts);
             }
-            for m in meetings {
-                self.mark(numbers, m, step, counts.blocked_now);
+            if counts.now == 0 && counts.met == [0; MOMENTS] {
+                break;
             }
-            self.link.count(step, samples, threshold, &mut counts);
         }
         counts.chances(samples)
     }
 
+    /// What these words of samples show of a link at a step. `rest` are the link's meetings from that step on; those of
+    /// later steps come back.
+    #[inline(always)]
+    fn take_step(
+        &mut self,
+        aim: Aim,
+        step: usize,
+        rest: Range<usize>,
+        words: Range<usize>,
+        counts: &mut Counts,
+    ) -> Range<usize> {
+        let of_step = self.meetings[rest.clone()].iter().take_while(|m| m.step as usize == step).count();
+        let meetings = rest.start..rest.start + of_step;
+        self.link.blocked[words.clone()].fill(0);
+        if !meetings.is_empty() {
+            if !aim.ue.is_on_axis() {
+                self.people[aim.person].walk(&self.figure, &self.draws);
+            }
+            self.rays.aim(aim.ap_m, aim.ue, &self.people[aim.person], step, words.clone());
+        }
+        for m in meetings.clone() {
+            self.mark(m, step, words.clone(), counts.blocked_now);
+        }
+        self.link.count(step, self.samples, words, counts);
+        meetings.end..rest.end
+    }
+
     /// Notes in which samples a meeting blocks the link, where that matters still.
-    fn mark(&mut self, numbers: &Numbers, meeting: usize, step: usize, blocked_now: bool) {
-        let Meeting { other, band, .. } = self.meetings[meeting];
-        let other = &mut self.people[other as usize];
-        for word in 0..self.link.blocked.len() {
-            let open = self.link.open(word, step, blocked_now);
-            if open == 0 {
-                continue;
-            }
-            if !other.walks() {
-                other.walk(numbers.body.arms.still_share, &self.draws[&other.track]);
-            }
-            let near = self.rays.near(&self.figure, other, step, word, band);
-            self.link.blocked[word] |= open & near.surely;
-            let asked = open & near.maybe & !near.surely;
-            if asked != 0 {
-                self.link.blocked[word] |=
-                    self.crossing.blocked(&self.figure, &self.rays, other, step, word, asked, band);
-            }
+    #[inline(always)]
+    fn mark(&mut self, meeting: usize, step: usize, words: Range<usize>, blocked_now: bool) {
+        let (meeting, link) = (&self.meetings[meeting], &mut self.link);
+        let other = &mut self.people[meeting.other as usize];
+        other.walk(&self.figure, &self.draws);
+        let [mut trunk, mut arms] = [0; 2];
+        for word in words.clone() {
+            let open = link.open(word, step, blocked_now);
+            let near = match open {
+                0 => Near::default(),
+                _ => self.rays.near(&self.figure, meeting, other, word),
+            };
+            link.blocked[word] |= open & near.surely;
+            link.trunk[word] = open & near.trunk & !near.surely;
+            link.arms[word] = open & near.arms & !near.surely;
+            trunk |= link.trunk[word];
+            arms |= link.arms[word];
+        }
+        let Link { blocked, .. } = link;
+        let (figure, rays, crossing) = (&self.figure, &self.rays, &mut self.crossing);
+        if trunk != 0 {
+            crossing.ask(figure, Part::Trunk, rays, meeting, other, words.clone(), &link.trunk, blocked);
+        }
+        if arms != 0 {
+            words.clone().for_each(|word| link.arms[word] &= !blocked[word]);
+            crossing.ask(figure, Part::Arms, rays, meeting, other, words, &link.arms, blocked);
         }
     }
 }
 
 impl Link {
     fn begin(&mut self, samples: usize) {
-        for words in [&mut self.blocked, &mut self.now, &mut self.met, &mut self.over] {
+        let Self { blocked, now, met, over, trunk, arms } = self;
+        for words in [blocked, now, met, over, trunk, arms] {
             words.clear();
             words.resize(samples.div_ceil(WORD), 0);
         }
@@ -207,7 +302,7 @@ impl Link {
 
     /// Samples of which it is not known yet whether they are blocked at this step, and of which that still matters: once
     /// a sample has been blocked, only the end of that counts, and only where it is told.
-    fn open(&self, word: usize, step: usize, blocked_now: bool) -> u64 {
+    fn open(&self, word: usize, step: usize, blocked_now: bool) -> u32 {
         let (now, met, over) = (self.now[word], self.met[word], self.over[word]);
         let matters = match (step, blocked_now) {
             (0, _) => !0,
@@ -218,14 +313,15 @@ impl Link {
     }
 
     /// Takes what a step has shown.
-    fn count(&mut self, step: usize, samples: usize, threshold: f64, counts: &mut Counts) {
-        for word in 0..self.blocked.len() {
+    #[inline(always)]
+    fn count(&mut self, step: usize, samples: usize, words: Range<usize>, counts: &mut Counts) {
+        for word in words {
             let all = match samples - word * WORD {
-                left if left < WORD => (1 << left) - 1,
+                left if left < WORD => (1_u32 << left) - 1,
                 _ => !0,
             };
             let blocked = self.blocked[word] & all;
-            let ones = |bits: u64| bits.count_ones() as usize;
+            let ones = |bits: u32| bits.count_ones() as usize;
             if step == 0 {
                 self.now[word] = blocked;
                 counts.now += ones(blocked);
@@ -242,9 +338,6 @@ impl Link {
             counts.met[step] += ones(new);
             counts.onset[step] += ones(new & !now);
             counts.over[step] += ones(over);
-        }
-        if step == 0 {
-            counts.blocked_now = counts.now as f64 / samples as f64 >= threshold;
         }
     }
 }

@@ -6,7 +6,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::figure::Band;
+use super::figure::{Band, Figure};
+use super::spread::Spread;
 use super::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
@@ -22,10 +23,16 @@ pub(super) struct Meeting {
     /// Whose body.
     pub(super) other: u32,
     pub(super) step: u32,
-    /// Where on the body, as shares of its height.
+    /// Where on the body, as shares of its height,
     pub(super) band: Band,
-    /// Square of how far the middle of the body's samples is from the middle ray.
-    off_m2: f64,
+    /// whether all that is between the floor and everybody's head,
+    pub(super) holds: bool,
+    /// what of it is there, by number,
+    pub(super) plan: u32,
+    /// and how far from the body's position that reaches.
+    pub(super) reach_m: f32,
+    /// How far the middle of the body's samples is from the middle ray.
+    off_m: f32,
 }
 
 /// Shadows of everybody's bodies, seen from one access point.
@@ -104,7 +111,14 @@ impl Shadows {
     }
 
     /// Adds everybody who may stand in the way of a person's link, step after step.
-    pub(super) fn meet(&mut self, people: &[Trajectories], person: usize, meetings: &mut Vec<Meeting>) {
+    #[inline(always)]
+    pub(super) fn meet(
+        &mut self,
+        figure: &Figure,
+        people: &[Trajectories],
+        person: usize,
+        meetings: &mut Vec<Meeting>,
+    ) {
         let q = &people[person];
         self.candidates.clear();
         for sector in Sectors::of(wider(q.second, self.ue_reach_m), self.ap_m.truncate()).each() {
@@ -116,56 +130,124 @@ impl Shadows {
                 }
             }
         }
-        let mut candidates = std::mem::take(&mut self.candidates);
-        candidates.retain(|&other| {
+        let second = Bundle::of_second(self.ap_m, q, self.ue_reach_m);
+        self.candidates.retain(|&other| {
             let p = &people[other as usize];
-            other as usize != person && self.band(q, q.second, p, p.second).is_some()
+            let radius_m = p.second.radius_m;
+            let around = Around { center_m: p.second.center_m, reach_m: p.reach_m + radius_m, spread: None };
+            other as usize != person && second.share(&around).is_some()
         });
+        let rises_m = q.heights_m.map(|height_m| self.ue_height_share * height_m - self.ap_m.z);
         for step in 0..MOMENTS {
             let first = meetings.len();
-            for &other in &candidates {
+            let bundle = Bundle::of_step(self.ap_m, q, step, self.ue_reach_m);
+            for &other in &self.candidates {
                 let p = &people[other as usize];
-                if let Some((band, off_m2)) = self.band(q, q.discs[step], p, p.discs[step]) {
-                    meetings.push(Meeting { other, step: step as u32, band, off_m2 });
-                }
+                let around =
+                    |reach_m| Around { center_m: p.mean_m[step], reach_m, spread: Some(&p.spread[step]) };
+                let whole = bundle.share(&around(p.reach_m)).and_then(|share| self.band(rises_m, share, p));
+                let Some(band) = whole else { continue };
+                // What is within those heights does not reach as far, so they are fewer still.
+                let reach_m = p.reach_of_m[figure.plan_of(band)];
+                let part = bundle.share(&around(reach_m)).and_then(|share| self.band(rises_m, share, p));
+                let Some(band) = part else { continue };
+                let off_m = bundle.off_m(p.mean_m[step]).abs() as f32;
+                let (plan, reach_m) = (figure.plan_of(band) as u32, (reach_m + ROOM) as f32);
+                let holds = figure.holds(band);
+                meetings.push(Meeting { other, step: step as u32, band, holds, plan, reach_m, off_m });
             }
             // Who stands nearest to the line blocks most, and what is blocked is not asked again.
             meetings[first..]
-                .sort_unstable_by(|a, b| a.off_m2.total_cmp(&b.off_m2).then(a.other.cmp(&b.other)));
+                .sort_unstable_by(|a, b| a.off_m.total_cmp(&b.off_m).then(a.other.cmp(&b.other)));
         }
-        self.candidates = candidates;
     }
 
-    /// The heights at which rays to `q` within `q_disc` may meet the body of `p` within `p_disc`, and the square of how far
-    /// apart the middles are; `None` where none can.
-    fn band(&self, q: &Trajectories, q_disc: Disc, p: &Trajectories, p_disc: Disc) -> Option<(Band, f64)> {
-        let start = self.ap_m.truncate();
-        let (along, off) = (q_disc.center_m - start, p_disc.center_m - start);
-        let length2 = along.length_squared().max(1e-12);
-        let t = (off.dot(along) / length2).clamp(0.0, 1.0);
-        let reach = p.reach_m + self.ue_reach_m + p_disc.radius_m + q_disc.radius_m + ROOM;
-        let off_m2 = off.distance_squared(along * t);
-        let room2 = reach * reach - off_m2;
-        if room2 < 0.0 {
-            return None;
-        }
-        // So far along, as a share of the ray, a body is met at most; the ray is highest and lowest at one end of that
-        // stretch, towards the highest or lowest UE.
-        let slack = (room2 / length2).sqrt();
-        let (near, far) = ((t - slack).max(0.0), (t + slack).min(1.0));
-        let rises_m = [q.height_min_m, q.height_max_m].map(|h| self.ue_height_share * h - self.ap_m.z);
-        let rises_m = rises_m.map(|rise_m| [near * rise_m, far * rise_m]);
-        let of_all =
-            |fold: fn(f64, f64) -> f64| rises_m.into_iter().flatten().reduce(fold).unwrap_or_default();
-        let (low_m, high_m) = (self.ap_m.z + of_all(f64::min), self.ap_m.z + of_all(f64::max));
+    /// The heights at which rays may meet the body of `p` between two shares of their length; `None` where they pass above
+    /// it. `rises_m` are those of the least and the most of the rays over their whole length.
+    #[inline(always)]
+    fn band(&self, rises_m: [f64; 2], (near, far): (f64, f64), p: &Trajectories) -> Option<Band> {
+        let [of_least, of_most] = rises_m.map(|rise_m| [near * rise_m, far * rise_m]);
+        let low_m = self.ap_m.z + of_least[0].min(of_least[1]).min(of_most[0]).min(of_most[1]);
+        let high_m = self.ap_m.z + of_least[0].max(of_least[1]).max(of_most[0]).max(of_most[1]);
+        let [short, tall] = p.heights_m;
         let per =
             |height_m: f64, [tall, short]: [f64; 2]| height_m / if height_m > 0.0 { tall } else { short };
-        let band = Band {
-            low: per(low_m, [p.height_max_m, p.height_min_m]) - ROOM,
-            high: per(high_m, [p.height_min_m, p.height_max_m]) + ROOM,
-        };
-        (band.low <= 1.0).then_some((band, off_m2))
+        let band = Band { low: per(low_m, [tall, short]) - ROOM, high: per(high_m, [short, tall]) + ROOM };
+        (band.low <= 1.0).then_some(band)
     }
+}
+
+/// All rays from an access point to the samples of a person, in plan view.
+struct Bundle {
+    start_m: DVec2,
+    /// Unit vector along their middle, and its length.
+    along: DVec2,
+    length_m: f64,
+    /// How far the rays' ends lie from the middle's: ahead, back, to the left and to the right.
+    ends_m: [f64; 4],
+}
+
+/// Where bodies may be.
+struct Around<'a> {
+    center_m: DVec2,
+    reach_m: f64,
+    /// How far they spread besides.
+    spread: Option<&'a Spread>,
+}
+
+impl Bundle {
+    fn of_second(ap_m: DVec3, q: &Trajectories, ue_reach_m: f64) -> Self {
+        let (along, length_m) = Self::middle(ap_m, q.second.center_m);
+        Self { start_m: ap_m.truncate(), along, length_m, ends_m: [q.second.radius_m + ue_reach_m; 4] }
+    }
+
+    #[inline(always)]
+    fn of_step(ap_m: DVec3, q: &Trajectories, step: usize, ue_reach_m: f64) -> Self {
+        let (along, length_m) = Self::middle(ap_m, q.mean_m[step]);
+        let ends_m = sides(along).map(|side| q.spread[step].along_m(side) + ue_reach_m);
+        Self { start_m: ap_m.truncate(), along, length_m, ends_m }
+    }
+
+    fn middle(ap_m: DVec3, end_m: DVec2) -> (DVec2, f64) {
+        let way_m = end_m - ap_m.truncate();
+        (way_m.normalize_or(DVec2::X), way_m.length())
+    }
+
+    /// How far to the left of the middle a place is.
+    #[inline(always)]
+    fn off_m(&self, place_m: DVec2) -> f64 {
+        self.along.perp_dot(place_m - self.start_m)
+    }
+
+    /// Between which shares of their length rays may meet what is around a place; `None` where none can. A ray that
+    /// does comes as near as the reach, along the middle and across it.
+    #[inline(always)]
+    fn share(&self, around: &Around) -> Option<(f64, f64)> {
+        let reach_m = around.reach_m + ROOM;
+        let off_m = self.off_m(around.center_m);
+        let [fore, back, left, right] = self.ends_m;
+        if off_m.abs() > reach_m + around.spread.map_or(0.0, |spread| spread.radius_m) + left.max(right) {
+            return None;
+        }
+        let spread_m = |side: DVec2| reach_m + around.spread.map_or(0.0, |spread| spread.along_m(side));
+        let way_m = self.along.dot(around.center_m - self.start_m);
+        let last_m = way_m + spread_m(self.along);
+        if last_m < 0.0 {
+            return None;
+        }
+        let far = if last_m < self.length_m - back { last_m / (self.length_m - back) } else { 1.0 };
+        let across = self.along.perp();
+        if off_m - spread_m(-across) > far * left || off_m + spread_m(across) < -far * right {
+            return None;
+        }
+        let near = ((way_m - spread_m(-self.along)) / (self.length_m + fore)).max(0.0);
+        (near <= 1.0).then_some((near, far))
+    }
+}
+
+/// Ahead, back, to the left and to the right.
+fn sides(along: DVec2) -> [DVec2; 4] {
+    [along, -along, along.perp(), -along.perp()]
 }
 
 fn wider(disc: Disc, by_m: f64) -> Disc {

@@ -1,17 +1,21 @@
 //! Samples of one person's next second: where each goes, and what stays through its steps.
 //!
-//! Everything lies in arrays by sample, so that loops over samples run in vector registers. What only a body in somebody's
-//! way needs, its gait above all, is worked out when it is first asked for ([`Trajectories::walk`]).
+//! Everything lies in arrays by sample, in single precision and from the mean of its step, so that loops over samples run in
+//! vector registers. What only a body in somebody's way needs, its gait above all, is worked out when it is first asked for
+//! ([`Trajectories::walk`]).
 
-use std::f64::consts::TAU;
+use std::collections::BTreeMap;
 
 use super::body;
 use super::draws::Draws;
+use super::figure::Figure;
+use super::lanes::{cos_sin, larger, smaller};
 use super::numbers::Numbers;
 use super::phases::Phases;
+use super::spread::Spread;
 use super::steps::{heading_at, position_at};
 use crate::forecast::Forecast;
-use crate::gait::{self, GaitPhase, WALKS_FROM_MPS, sway_share};
+use crate::gait::{self, FOREMOST_RAD, GaitPhase, LEFTMOST_RAD, WALKS_FROM_MPS, sway_share};
 use crate::geometry::DVec2;
 use crate::track::Track;
 use crate::{STEP_S, STEPS};
@@ -26,115 +30,102 @@ pub(super) struct Disc {
     pub(super) radius_m: f64,
 }
 
-/// Samples of one person. What belongs to step s and sample k stands at `s * samples + k`; step 0 is now.
+/// Samples of one person, in whole words. What belongs to step s and sample k stands at `s * samples + k`; step 0 is now.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Trajectories {
     pub(super) samples: usize,
+    /// How many of them were asked for.
+    asked: usize,
     pub(super) track: u64,
-    /// By step and sample.
-    pub(super) x_m: Vec<f64>,
-    pub(super) y_m: Vec<f64>,
-    /// The same from the middle of the step's disc, for tests that need not be exact.
-    pub(super) off_x_m: Vec<f32>,
-    pub(super) off_y_m: Vec<f32>,
+    /// By step: the mean, round which the samples lie.
+    pub(super) mean_m: [DVec2; MOMENTS],
+    /// By step: how far.
+    pub(super) spread: [Spread; MOMENTS],
     /// By step: the heading's unit vector, to be turned by the sample's turn.
-    pub(super) ahead: [DVec2; MOMENTS],
-    /// By step: the samples.
-    pub(super) discs: [Disc; MOMENTS],
+    ahead: [DVec2; MOMENTS],
+    /// By step and sample: from the step's mean.
+    pub(super) off_m: [Vec<f32>; 2],
     /// The samples of all steps.
     pub(super) second: Disc,
-    pub(super) height_min_m: f64,
-    pub(super) height_max_m: f64,
-    /// No part of a sample's body is farther from its position.
+    /// The least and the most of all samples.
+    pub(super) heights_m: [f64; 2],
+    /// No part of a sample's body is farther from its position; the same of what each plan holds.
     pub(super) reach_m: f64,
+    pub(super) reach_of_m: Vec<f64>,
     /// By sample.
-    pub(super) height_m: Vec<f64>,
-    pub(super) width_scale: Vec<f64>,
-    pub(super) turn_rad: Vec<f64>,
-    speed_mps: Vec<f64>,
+    pub(super) height_m: Vec<f32>,
+    pub(super) width_scale: Vec<f32>,
+    turn_rad: Vec<f32>,
+    speed_mps: Vec<f32>,
     phase: Option<GaitPhase>,
-    /// Empty until the body is in somebody's way.
+    /// Phases of even shares, in their order.
+    even_rad: Vec<f32>,
+    /// Of another frame until the body is in somebody's way.
     pub(super) gait: Gait,
+    walks: bool,
     /// Offset and drift of each sample at the step that is drawn.
-    state: [Vec<f64>; 4],
+    state: [Vec<f32>; 4],
 }
 
 /// How samples walk.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gait {
-    /// By sample: cosine and sine of the trunk's turn from the heading.
-    pub(super) turn: [Vec<f64>; 2],
-    /// By sample: share of the full sway of the trunk.
-    pub(super) sway: Vec<f64>,
+    /// By step and sample: the swaying axis of the trunk, from the step's mean.
+    pub(super) axis_m: [Vec<f32>; 2],
+    /// By step and sample: the unit vector that the trunk faces.
+    pub(super) own: [Vec<f32>; 2],
+    /// By step and sample: how far the arms swing, left ahead, as speed over hip height.
+    pub(super) wave_hz: Vec<f32>,
     /// By sample: speed over hip height of whoever swings the arms; 0 for arms that hang still.
-    pub(super) swing_hz: Vec<f64>,
-    /// By step and sample: cosine and sine of the phase since the right heel touched the floor.
-    pub(super) phase: [Vec<f64>; 2],
-    pub(super) rough: Rough,
-    known: bool,
-}
-
-/// A body's samples in single precision, for tests that need not be exact.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Rough {
-    /// By sample, as in [`Trajectories`] and [`Gait`].
-    pub(super) height_m: Vec<f32>,
-    pub(super) width: Vec<f32>,
-    pub(super) turn: [Vec<f32>; 2],
-    pub(super) sway: Vec<f32>,
-    pub(super) swing: Vec<f32>,
-    /// By step and sample.
-    pub(super) phase: [Vec<f32>; 2],
-}
-
-impl Rough {
-    /// In the order of the fields.
-    fn round(&mut self, exact: [&[f64]; 8]) {
-        let [to_x, to_y] = &mut self.turn;
-        let [of_x, of_y] = &mut self.phase;
-        let rounded =
-            [&mut self.height_m, &mut self.width, to_x, to_y, &mut self.sway, &mut self.swing, of_x, of_y];
-        for (rounded, exact) in rounded.into_iter().zip(exact) {
-            rounded.clear();
-            rounded.extend(exact.iter().map(|x| *x as f32));
-        }
-    }
+    pub(super) swing_hz: Vec<f32>,
+    /// By sample: cosine and sine of the trunk's turn from the heading, of the phase at the step that is worked out, and of
+    /// what it turns in a step; the sway's share in metres.
+    turn: [Vec<f32>; 2],
+    phase: [Vec<f32>; 2],
+    step: [Vec<f32>; 2],
+    sway_m: Vec<f32>,
 }
 
 impl Trajectories {
     /// Draws all samples of a track.
-    pub(super) fn fill(&mut self, numbers: &Numbers, draws: &Draws, track: &Track, forecast: &Forecast) {
-        self.samples = numbers.samples;
+    #[inline(always)]
+    pub(super) fn fill(
+        &mut self,
+        numbers: &Numbers,
+        figure: &Figure,
+        draws: &Draws,
+        track: &Track,
+        forecast: &Forecast,
+    ) {
+        self.samples = draws.height.len();
+        self.asked = numbers.samples;
         self.track = track.id;
         self.phase = Some(track.gait);
-        self.gait.known = false;
+        self.walks = false;
+        self.mean_m = std::array::from_fn(|s| position_at(track, forecast, s));
         self.ahead = std::array::from_fn(|s| DVec2::from_angle(heading_at(track, forecast, s)));
         self.start(draws, &root(&forecast.coupling.state));
         self.take_traits(numbers, draws, track);
         // Process noise: a constant acceleration over each step with the step's share of the white one.
         let noise_root_mps2 =
             root(&forecast.coupling.acceleration_psd_m2ps3.map(|row| row.map(|psd| psd / STEP_S)));
-        for moments in [&mut self.x_m, &mut self.y_m] {
-            moments.resize(MOMENTS * self.samples, 0.0);
-        }
-        for moments in [&mut self.off_x_m, &mut self.off_y_m] {
-            moments.resize(MOMENTS * self.samples, 0.0);
-        }
+        self.off_m.iter_mut().for_each(|off_m| off_m.resize(MOMENTS * self.samples, 0.0));
         for s in 0..MOMENTS {
             if s > 0 {
                 self.go_on(&draws.process_noise[s - 1], noise_root_mps2);
             }
-            self.place(s, position_at(track, forecast, s), numbers.joint);
+            self.place(s, numbers.joint);
         }
-        self.bound(numbers);
+        self.bound(figure);
     }
 
     /// The samples' errors now: of position and of velocity.
+    #[inline(always)]
     fn start(&mut self, draws: &Draws, root: &[[f64; 4]; 4]) {
         let z = &draws.state;
         for (r, (state, row)) in self.state.iter_mut().zip(root).enumerate() {
-            state.clear();
-            state.extend(z[0].iter().map(|z| row[0] * z));
+            let row = row.map(|x| x as f32);
+            renew(state, z[0].iter().map(|z| row[0] * z));
             for (weight, z) in row[1..=r].iter().zip(&z[1..]) {
                 state.iter_mut().zip(z).for_each(|(state, z)| *state += weight * z);
             }
@@ -142,131 +133,173 @@ impl Trajectories {
     }
 
     /// One step: the drift goes on, the noise pushes.
-    fn go_on(&mut self, noise: &[Vec<f64>; 2], [[xx, _], [xy, yy]]: [[f64; 2]; 2]) {
+    #[inline(always)]
+    fn go_on(&mut self, noise: &[Vec<f32>; 2], noise_root_mps2: [[f64; 2]; 2]) {
+        const STEP: f32 = STEP_S as f32;
+        let [[xx, _], [xy, yy]] = noise_root_mps2.map(|row| row.map(|x| x as f32));
         let [x, y, vx, vy] = &mut self.state;
         let n = x.len();
         let (y, vx, vy, [a, b]) = (&mut y[..n], &mut vx[..n], &mut vy[..n], [&noise[0][..n], &noise[1][..n]]);
         for k in 0..n {
             let push_mps2 = [xx * a[k], xy * a[k] + yy * b[k]];
-            x[k] += vx[k] * STEP_S + push_mps2[0] * (0.5 * STEP_S * STEP_S);
-            y[k] += vy[k] * STEP_S + push_mps2[1] * (0.5 * STEP_S * STEP_S);
-            vx[k] += push_mps2[0] * STEP_S;
-            vy[k] += push_mps2[1] * STEP_S;
+            x[k] += vx[k] * STEP + push_mps2[0] * (0.5 * STEP * STEP);
+            y[k] += vy[k] * STEP + push_mps2[1] * (0.5 * STEP * STEP);
+            vx[k] += push_mps2[0] * STEP;
+            vy[k] += push_mps2[1] * STEP;
         }
     }
 
     /// Puts the samples round the mean of a step.
-    fn place(&mut self, s: usize, mean_m: DVec2, joint: bool) {
+    #[inline(always)]
+    fn place(&mut self, s: usize, joint: bool) {
         let [x, y, ..] = &self.state;
+        self.spread[s] = Spread::of(x, y);
+        // Drawn each by itself: every step takes its positions from other samples.
+        let first = if joint { 0 } else { s * 37 % self.samples };
         let row = s * self.samples..(s + 1) * self.samples;
-        let (x_m, y_m) = (&mut self.x_m[row.clone()], &mut self.y_m[row.clone()]);
-        let (off_x_m, off_y_m) = (&mut self.off_x_m[row.clone()], &mut self.off_y_m[row]);
-        for (k, (x, y)) in x.iter().zip(y).enumerate() {
-            // Drawn each by itself: every step takes its positions from other samples.
-            let at = if joint { k } else { (k + s * 37) % self.samples };
-            (x_m[at], y_m[at]) = (mean_m.x + x, mean_m.y + y);
-            (off_x_m[at], off_y_m[at]) = (*x as f32, *y as f32);
+        for (off_m, state) in self.off_m.iter_mut().zip([x, y]) {
+            let (begin, end) = off_m[row.clone()].split_at_mut(first);
+            let (head, tail) = state.split_at(self.samples - first);
+            end.copy_from_slice(head);
+            begin.copy_from_slice(tail);
         }
-        let farthest2 = x.iter().zip(y).fold(0.0_f64, |far, (x, y)| far.max(x * x + y * y));
-        self.discs[s] = Disc { center_m: mean_m, radius_m: farthest2.sqrt() + ROUNDED_M };
     }
 
     /// What stays through the steps of a sample.
+    #[inline(always)]
     fn take_traits(&mut self, numbers: &Numbers, draws: &Draws, track: &Track) {
         let velocity = track.velocity_mps;
         let walks = velocity.length() > WALKS_FROM_MPS;
         let trunk_rad = numbers.heading_sigma_rad;
-        let turn_sigma_rad = if walks { trunk_rad } else { track.heading_sigma_rad.hypot(trunk_rad) };
-        let height_sigma_m = track.height_sigma_m.hypot(numbers.height_sigma_m);
-        let width_sigma = track.width_scale_sigma.hypot(numbers.width_sigma);
-        let velocity2 = velocity.length_squared();
-        let drifts = || self.state[2].iter().zip(&self.state[3]).map(|(x, y)| DVec2::new(*x, *y));
-        renew(
-            &mut self.height_m,
-            draws.height.iter().map(|z| (track.height_m + height_sigma_m * z).max(0.5)),
-        );
+        let turn_sigma_rad = if walks { trunk_rad } else { track.heading_sigma_rad.hypot(trunk_rad) } as f32;
+        let (height_m, width) = (track.height_m as f32, track.width_scale as f32);
+        let height_sigma_m = track.height_sigma_m.hypot(numbers.height_sigma_m) as f32;
+        let width_sigma = track.width_scale_sigma.hypot(numbers.width_sigma) as f32;
+        let [vx, vy] = velocity.to_array().map(|v| v as f32);
+        // Who walks faces where he goes: an error of the velocity is one of the heading.
+        let per2 = if walks { 1.0 / velocity.length_squared() as f32 } else { 0.0 };
+        let drifts = || self.state[2].iter().zip(&self.state[3]);
+        renew(&mut self.height_m, draws.height.iter().map(|z| larger(height_m + height_sigma_m * z, 0.5)));
         renew(
             &mut self.width_scale,
-            draws.width.iter().map(|z| (track.width_scale + width_sigma * z).clamp(0.5, 1.8)),
+            draws.width.iter().map(|z| smaller(larger(width + width_sigma * z, 0.5), 1.8)),
         );
-        renew(&mut self.speed_mps, drifts().map(|drift| (velocity + drift).length()));
+        renew(&mut self.speed_mps, drifts().map(|(x, y)| ((vx + x) * (vx + x) + (vy + y) * (vy + y)).sqrt()));
         renew(
             &mut self.turn_rad,
-            drifts().zip(&draws.heading).map(|(drift, z)| {
-                // Who walks faces where he goes: an error of the velocity is one of the heading.
-                let turned_rad = if walks { velocity.perp_dot(drift) / velocity2 } else { 0.0 };
-                turned_rad + turn_sigma_rad * z
-            }),
+            drifts().zip(&draws.heading).map(|((x, y), z)| (vx * y - vy * x) * per2 + turn_sigma_rad * z),
         );
     }
 
     /// How far the samples and their bodies reach.
-    fn bound(&mut self, numbers: &Numbers) {
-        let largest = |values: &[f64], least: f64| values.iter().fold(least, |a, b| a.max(*b));
-        self.height_min_m = self.height_m.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-        self.height_max_m = largest(&self.height_m, 0.0);
-        let (width_max, fastest_mps) = (largest(&self.width_scale, 1.0), largest(&self.speed_mps, 0.0));
-        self.reach_m = body::reach_m(&numbers.body, self.height_max_m, width_max, fastest_mps);
-        let ends = self.discs.iter().map(|disc| disc.center_m);
+    #[inline(always)]
+    fn bound(&mut self, figure: &Figure) {
+        let largest = |values: &[f32]| values.iter().fold(0.0_f32, |a, b| larger(a, *b));
+        let least_m = self.height_m.iter().fold(f32::MAX, |a, b| smaller(a, *b));
+        self.heights_m = [least_m, largest(&self.height_m)].map(f64::from);
+        let (height_m, width) = (self.heights_m[1], f64::from(largest(&self.width_scale)).max(1.0));
+        let fastest_hz = body::relative_speed_hz(f64::from(largest(&self.speed_mps)), height_m);
+        self.reach_of_m.clear();
+        self.reach_of_m.extend(figure.plans.iter().map(|plan| height_m * plan.reach(width, fastest_hz)));
+        self.reach_m = self.reach_of_m.iter().fold(0.0, |a, b| b.max(a));
+        let ends = self.mean_m.iter();
         let (least, most) =
-            ends.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+            ends.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(a, b), p| (a.min(*p), b.max(*p)));
         let center_m = 0.5 * (least + most);
-        let far = |disc: &Disc| disc.center_m.distance(center_m) + disc.radius_m;
-        let radius_m = self.discs.iter().map(far).fold(0.0, f64::max);
+        let far = |(mean_m, spread): (&DVec2, &Spread)| mean_m.distance(center_m) + spread.radius_m;
+        let radius_m = self.mean_m.iter().zip(&self.spread).map(far).fold(0.0, f64::max);
         self.second = Disc { center_m, radius_m };
     }
 
-    /// Whether gait and turn of every sample are known.
-    pub(super) fn walks(&self) -> bool {
-        self.gait.known
-    }
-
-    /// Works them out.
-    pub(super) fn walk(&mut self, still_share: f64, draws: &Draws) {
-        let (n, gait) = (self.samples, &mut self.gait);
-        gait.known = true;
-        gait.phase.iter_mut().for_each(|of| of.resize(MOMENTS * n, 0.0));
-        gait.turn.iter_mut().for_each(Vec::clear);
-        gait.sway.clear();
-        gait.swing_hz.clear();
-        let phases = Phases::new(&self.phase.unwrap_or(GaitPhase::UNKNOWN));
-        for k in 0..n {
-            let (sin, cos) = self.turn_rad[k].sin_cos();
-            gait.turn[0].push(cos);
-            gait.turn[1].push(sin);
-            let (speed_mps, height_m) = (self.speed_mps[k], self.height_m[k]);
-            let speed_hz = body::relative_speed_hz(speed_mps, height_m);
-            gait.sway.push(sway_share(speed_hz));
-            gait.swing_hz.push(if draws.arm_swing[k] < still_share { 0.0 } else { speed_hz });
-            let stride_m = gait::stride_m(speed_mps, height_m);
-            let step_rad = if stride_m > 0.0 { TAU * speed_mps * STEP_S / stride_m } else { 0.0 };
-            // The phase turns by the same angle in every step: two sines in place of twenty, the last bit apart.
-            let (step_sin, step_cos) = step_rad.sin_cos();
-            let (mut sin, mut cos) = phases.at(draws.phase[k]).sin_cos();
-            for s in 0..MOMENTS {
-                (gait.phase[0][s * n + k], gait.phase[1][s * n + k]) = (cos, sin);
-                (sin, cos) = (sin * step_cos + cos * step_sin, cos * step_cos - sin * step_sin);
-            }
+    /// Works out how the samples walk and face, once a frame.
+    #[inline(always)]
+    pub(super) fn walk(&mut self, figure: &Figure, draws: &BTreeMap<u64, Draws>) {
+        if self.walks {
+            return;
         }
-        let ([turn_x, turn_y], [phase_x, phase_y]) = (&gait.turn, &gait.phase);
-        let bodies: [&[f64]; 2] = [&self.height_m, &self.width_scale];
-        gait.rough.round([
-            bodies[0],
-            bodies[1],
-            turn_x,
-            turn_y,
-            &gait.sway,
-            &gait.swing_hz,
-            phase_x,
-            phase_y,
-        ]);
+        self.walks = true;
+        let draws = &draws[&self.track];
+        let (n, gait) = (self.samples, &mut self.gait);
+        let [axis_x, axis_y] = &mut gait.axis_m;
+        let [own_x, own_y] = &mut gait.own;
+        for by_step in [axis_x, axis_y, own_x, own_y, &mut gait.wave_hz] {
+            by_step.resize(MOMENTS * n, 0.0);
+        }
+        for by_sample in [&mut gait.swing_hz, &mut gait.sway_m, &mut gait.step[0], &mut gait.phase[0]] {
+            by_sample.resize(n, 0.0);
+        }
+        let still_share = figure.still_share as f32;
+        let (speed_mps, height_m) = (&self.speed_mps[..n], &self.height_m[..n]);
+        let (swing_hz, sway_m) = (&mut gait.swing_hz[..n], &mut gait.sway_m[..n]);
+        let (step_rad, arm_swing) = (&mut gait.step[0][..n], &draws.arm_swing[..n]);
+        for k in 0..n {
+            let (speed_mps, height_m) = (f64::from(speed_mps[k]), f64::from(height_m[k]));
+            let speed_hz = body::relative_speed_hz(speed_mps, height_m);
+            swing_hz[k] = if arm_swing[k] < still_share { 0.0 } else { speed_hz as f32 };
+            sway_m[k] = (sway_share(speed_hz) * height_m) as f32;
+            step_rad[k] = (gait::stride_hz(speed_mps, height_m) * RAD_OF_STRIDES) as f32;
+        }
+        cos_sin(&mut gait.step);
+        gait.turn[0].clone_from(&self.turn_rad);
+        cos_sin(&mut gait.turn);
+        // The shares of the phases are those of as many even ones, in any order.
+        let asked = self.asked;
+        let phases = Phases::new(&self.phase.unwrap_or(GaitPhase::UNKNOWN));
+        self.even_rad.clear();
+        self.even_rad.extend(phases.even(asked).map(|rad| rad as f32));
+        for (phase_rad, share) in gait.phase[0].iter_mut().zip(&draws.phase) {
+            *phase_rad = self.even_rad[(share * asked as f32) as usize];
+        }
+        cos_sin(&mut gait.phase);
+        for step in 0..MOMENTS {
+            let off_m = [0, 1].map(|i| &self.off_m[i][step * n..(step + 1) * n]);
+            gait.walk_step(figure, step, self.ahead[step], off_m);
+        }
     }
 }
 
-/// More than rounding takes from a distance.
-const ROUNDED_M: f64 = 1e-9;
+/// Of the phase in a step, for each stride a second.
+const RAD_OF_STRIDES: f64 = std::f64::consts::TAU * STEP_S;
 
-fn renew(values: &mut Vec<f64>, new: impl Iterator<Item = f64>) {
+impl Gait {
+    /// One step of all samples; their phases go on to the next.
+    #[inline(always)]
+    fn walk_step(&mut self, figure: &Figure, step: usize, ahead: DVec2, [off_x, off_y]: [&[f32]; 2]) {
+        let n = off_x.len();
+        let off_y = &off_y[..n];
+        let row = step * n..(step + 1) * n;
+        let [axis_x, axis_y] = &mut self.axis_m;
+        let (axis_x, axis_y) = (&mut axis_x[row.clone()][..n], &mut axis_y[row.clone()][..n]);
+        let [own_x, own_y] = &mut self.own;
+        let (own_x, own_y) = (&mut own_x[row.clone()][..n], &mut own_y[row.clone()][..n]);
+        let wave_hz = &mut self.wave_hz[row][..n];
+        let (turn_x, turn_y) = (&self.turn[0][..n], &self.turn[1][..n]);
+        let [phase_x, phase_y] = &mut self.phase;
+        let (phase_x, phase_y) = (&mut phase_x[..n], &mut phase_y[..n]);
+        let (step_x, step_y) = (&self.step[0][..n], &self.step[1][..n]);
+        let (sway_m, swing_hz) = (&self.sway_m[..n], &self.swing_hz[..n]);
+        let [leftmost, foremost] = [LEFTMOST_RAD, FOREMOST_RAD].map(|at| [at.cos() as f32, at.sin() as f32]);
+        let (sway_ahead, sway_left) = (figure.sway_ahead as f32, figure.sway_left as f32);
+        let [ahead_x, ahead_y] = ahead.to_array().map(|x| x as f32);
+        for k in 0..n {
+            let (x, y) =
+                (ahead_x * turn_x[k] - ahead_y * turn_y[k], ahead_y * turn_x[k] + ahead_x * turn_y[k]);
+            // The trunk rides over the foot that stands, once a stride, and goes ahead and back with every step.
+            let (cos, sin) = (phase_x[k], phase_y[k]);
+            let from_foremost = cos * foremost[0] + sin * foremost[1];
+            let fore_m = sway_ahead * sway_m[k] * (2.0 * from_foremost * from_foremost - 1.0);
+            let left_m = sway_left * sway_m[k] * (cos * leftmost[0] + sin * leftmost[1]);
+            (own_x[k], own_y[k]) = (x, y);
+            (axis_x[k], axis_y[k]) = (off_x[k] + fore_m * x - left_m * y, off_y[k] + fore_m * y + left_m * x);
+            wave_hz[k] = swing_hz[k] * cos;
+            // The phase turns by the same angle in every step.
+            (phase_x[k], phase_y[k]) = (cos * step_x[k] - sin * step_y[k], sin * step_x[k] + cos * step_y[k]);
+        }
+    }
+}
+
+#[inline(always)]
+fn renew(values: &mut Vec<f32>, new: impl Iterator<Item = f32>) {
     values.clear();
     values.extend(new);
 }
@@ -291,7 +324,20 @@ fn root<const N: usize>(a: &[[f64; N]; N]) -> [[f64; N]; N] {
 
 #[cfg(test)]
 impl Trajectories {
-    pub(super) fn speed_mps(&self, sample: usize) -> f64 {
-        self.speed_mps[sample]
+    /// How a sample stands or walks at a step, for bodies that are asked one by one.
+    pub(super) fn posture(&self, draws: &Draws, still_share: f64, step: usize, k: usize) -> body::Posture {
+        let (speed_mps, height_m) = (f64::from(self.speed_mps[k]), f64::from(self.height_m[k]));
+        let phases = Phases::new(&self.phase.unwrap_or(GaitPhase::UNKNOWN));
+        let walked_rad = gait::stride_hz(speed_mps, height_m) * RAD_OF_STRIDES * step as f64;
+        let off_m = [0, 1].map(|i| f64::from(self.off_m[i][step * self.samples + k]));
+        body::Posture {
+            position_m: self.mean_m[step] + DVec2::from(off_m),
+            ahead: self.ahead[step].rotate(DVec2::from_angle(f64::from(self.turn_rad[k]))),
+            height_m,
+            width_scale: f64::from(self.width_scale[k]),
+            speed_mps,
+            phase_rad: phases.at(f64::from(draws.phase[k])) + walked_rad,
+            arm_swing: if f64::from(draws.arm_swing[k]) < still_share { 0.0 } else { 1.0 },
+        }
     }
 }

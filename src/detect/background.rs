@@ -76,6 +76,11 @@ struct SensorModel {
     row_of_elevation: Vec<Option<u16>>,
     elevation_bins_per_rad: f64,
     returns: Vec<Return>,
+    /// Of each beam: how long the head has turned on, and how far it looks to the right.
+    turned: Vec<[f32; 2]>,
+    /// Of each beam of the column that is looked at.
+    azimuths_cdeg: Vec<f32>,
+    pixels: Vec<u32>,
 }
 
 /// A point of an unorganised cloud as the sensor saw it.
@@ -110,6 +115,9 @@ impl Background {
             row_of_elevation: vec![None; (180.0 / CLOUD_ELEVATION_BIN_DEG) as usize + 3],
             elevation_bins_per_rad: 1.0_f64.to_degrees() / CLOUD_ELEVATION_BIN_DEG,
             returns: Vec::new(),
+            turned: Vec::new(),
+            azimuths_cdeg: Vec::new(),
+            pixels: Vec::new(),
         };
         Self {
             method: config.background,
@@ -325,24 +333,36 @@ impl SensorModel {
         }
         self.ranges.grow(beams);
         let (range_min_m, range_max_m) = (self.range_min_m, self.range_max_m);
+        let Self { ranges, turned, azimuths_cdeg, pixels, .. } = self;
+        turned.clear();
+        turned.extend(image.beams.iter().map(|beam| [beam.turned_ns as f32, beam.azimuth_offset_cdeg]));
+        azimuths_cdeg.resize(beams, 0.0);
+        pixels.resize(beams, 0);
         for (c, (column, ranges_m)) in image.columns.iter().zip(image.range_m.chunks_exact(beams)).enumerate()
         {
-            for (b, (&range_m, beam)) in ranges_m.iter().zip(image.beams.iter()).enumerate() {
+            for (azimuth_cdeg, [turned_ns, offset_cdeg]) in azimuths_cdeg.iter_mut().zip(&*turned) {
+                let turned_cdeg = column.azimuth_rate_cdeg_per_ns * turned_ns;
+                *azimuth_cdeg = column.azimuth_cdeg + turned_cdeg + offset_cdeg;
+            }
+            ranges.pixels(azimuths_cdeg, pixels);
+            // Nearly every column sees nothing but the hall.
+            if learn.is_none() && !ranges.any_new(pixels, ranges_m) {
+                continue;
+            }
+            for (b, &range_m) in ranges_m.iter().enumerate() {
                 if range_m == 0.0 {
                     continue;
                 }
-                let turned_cdeg = column.azimuth_rate_cdeg_per_ns * beam.turned_ns as f32;
-                let azimuth_cdeg = column.azimuth_cdeg + turned_cdeg + beam.azimuth_offset_cdeg;
-                let pixel = self.ranges.pixel(b, azimuth_cdeg);
+                let pixel = pixels[b] as usize;
                 // Written so that NaN is caught: it is neither beyond the limit nor in the range.
-                let background = range_m >= self.ranges.limit_m(pixel);
+                let background = range_m >= ranges.limit_m(pixel);
                 if background && learn.is_none() {
                     continue;
                 }
                 if !(range_m >= range_min_m && range_m <= range_max_m) {
                     health.points_invalid += 1;
                     if range_m > 0.0 && range_m < range_min_m && learn.is_some_and(|learn| learn.on_the_way) {
-                        self.ranges.observe(pixel, range_m);
+                        ranges.observe(pixel, range_m);
                     }
                     continue;
                 }
@@ -355,7 +375,7 @@ impl SensorModel {
                     }
                 }
                 if learn.is_some() && !frozen {
-                    self.ranges.observe(pixel, range_m);
+                    ranges.observe(pixel, range_m);
                 }
             }
         }

@@ -114,7 +114,7 @@ impl RangeModel {
     }
 
     /// The pixel of a row that looks at this azimuth, hundredths of a degree.
-    #[inline]
+    #[inline(always)]
     pub fn pixel(&self, row: usize, azimuth_cdeg: f32) -> usize {
         // A turn more or less is common, more than one is not: no remainder in the hot loop. Nor a call of `floor`, which
         // is one where the processor may be any.
@@ -122,12 +122,23 @@ impl RangeModel {
         let mut bin = bins as i32;
         bin -= i32::from(bins < bin as f32);
         let bins = self.bins as i32;
-        if bin >= bins {
-            bin -= bins;
-        } else if bin < 0 {
-            bin += bins;
-        }
+        bin -= if bin >= bins { bins } else { 0 };
+        bin += if bin < 0 { bins } else { 0 };
         bin.clamp(0, bins - 1) as usize * self.rows + row
+    }
+
+    /// The same of a column: the first azimuth is that of row 0.
+    pub fn pixels(&self, azimuths_cdeg: &[f32], pixels: &mut [u32]) {
+        for (row, (pixel, azimuth_cdeg)) in pixels.iter_mut().zip(azimuths_cdeg).enumerate() {
+            *pixel = self.pixel(row, *azimuth_cdeg) as u32;
+        }
+    }
+
+    /// Whether any return of a column is new, or is one that cannot be told, as NaN.
+    pub fn any_new(&self, pixels: &[u32], ranges_m: &[f32]) -> bool {
+        let is_known =
+            |pixel: u32, range_m: f32| (range_m == 0.0) | (range_m >= self.limit_m(pixel as usize));
+        !pixels.iter().zip(ranges_m).fold(true, |all, (pixel, range_m)| all & is_known(*pixel, *range_m))
     }
 
     /// Returns nearer than this are new. Zero, so that nothing is, until the scene is known.
