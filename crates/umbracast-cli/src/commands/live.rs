@@ -9,15 +9,14 @@ use std::time::Duration;
 
 use umbracast::lidar::udp_port;
 use umbracast::site::Sensor;
-use umbracast::{Config, Error, Frame, Health, STEP_NS};
+use umbracast::{Config, Error, Frame, Health};
 use umbracast_eval::run::chain::{self, CIRCLE_M};
 use umbracast_live::receive::Door;
 use umbracast_live::record::RecordSettings;
 use umbracast_live::run::Counters;
 use umbracast_live::send::{self, Sent};
 use umbracast_live::{HostClock, Live, Settings, Summary};
-use umbracast_sim::crowd;
-use umbracast_sim::scene::Scene;
+use umbracast_sim::crowd::Stroll;
 use umbracast_sim::sensor::Sensors;
 
 use crate::args::{self, Common, RecordArgs};
@@ -28,8 +27,6 @@ use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
 use crate::{say, signal};
 
-/// A demonstration's people walk so long before others take their place.
-const DEMO_S: u64 = 300;
 /// How often the end may be asked for.
 const TICK: Duration = Duration::from_millis(50);
 
@@ -83,8 +80,8 @@ fn doors(args: &args::Live, config: &Config) -> Result<Vec<Door>, Error> {
             let (name, model) = (&sensor.name, &sensor.model);
             Error::new(format!("sensor {name:?}: expected a model that sends packets, found {model:?}"))
         })?;
-        // Ports that were counted, or are free, are each a sensor's own.
-        let from = sensor.address_bytes().filter(|_| !args.demo && args.port.is_none()).map(IpAddr::from);
+        // Simulated packets come from loopback, whatever the site file says.
+        let from = sensor.address_bytes().filter(|_| !args.demo).map(IpAddr::from);
         Ok(Door { sensor: number, port, from })
     };
     config.site.sensors.iter().enumerate().map(door).collect()
@@ -124,22 +121,10 @@ fn demonstration(
     let to: Vec<SocketAddr> =
         to.iter().map(|at| SocketAddr::from((Ipv4Addr::LOCALHOST, at.port()))).collect();
     let sensors = Sensors::new(&site, seed)?;
+    let stroll = Stroll::new(preset, people, CIRCLE_M, seed);
     Ok(std::thread::spawn(move || {
-        let mut sent = Sent::default();
-        for seed in seed.. {
-            if stop.load(Ordering::Relaxed) {
-                break;
-            }
-            let first = send::frame_of_hour(clock.now_ns());
-            let crowd =
-                crowd::strolling(preset, people, CIRCLE_M, seed, DEMO_S).later(first as i64 * STEP_NS);
-            let scene = Scene::in_hall(crowd, &site, &sensors, seed).starting_at(first);
-            let more = send::send(send::simulated(scene), &to, 1.0, clock, &stop)?;
-            sent.packets += more.packets;
-            sent.failed += more.failed;
-            sent.latest_ns = sent.latest_ns.max(more.latest_ns);
-        }
-        Ok(sent)
+        let first = send::frame_of_hour(clock.now_ns());
+        send::send(send::strolling(stroll, &site, &sensors, seed, first), &to, 1.0, clock, &stop)
     }))
 }
 
