@@ -15,12 +15,12 @@
 //! pipeline, which only leaves the newest frame here.
 
 mod watched;
+mod connections;
 mod metrics;
 mod openapi;
 
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
@@ -31,7 +31,7 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::get;
-use axum::{Json, Router};
+use axum::{Extension, Json, Router};
 use serde_json::{Value, json};
 use tokio::sync::{broadcast, oneshot, watch};
 use tokio_stream::StreamExt;
@@ -39,18 +39,15 @@ use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::wrappers::errors::BroadcastStreamRecvError;
 use umbracast::Error;
 
+use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
 use crate::warnings::Event;
 pub use watched::Watched;
 
 /// The page: HTML, style and script in one, nothing loaded from elsewhere.
 const PAGE: &str = include_str!("page.html");
-/// More WebSockets and event streams than this at once are refused.
-const STREAMS_MAX: usize = 64;
 /// Events that wait for a slow client; beyond it is told how many it missed.
 const EVENTS_WAITING: usize = 1024;
-/// A client that takes nothing for so long is let go.
-const PATIENCE: Duration = Duration::from_secs(5);
 /// Without a frame for so long, something is wrong.
 const STALE: Duration = Duration::from_secs(1);
 
@@ -86,7 +83,7 @@ struct Shared {
     newest: watch::Sender<Arc<Published>>,
     events: broadcast::Sender<Event>,
     token: Option<String>,
-    streams: AtomicUsize,
+    connections: Arc<Connections>,
 }
 
 /// Listens on an address. Others than loopback need a token: what is seen here is where people are.
@@ -94,6 +91,15 @@ struct Shared {
 /// # Errors
 /// An address that is taken, or that others can reach without a token.
 pub fn start(address: SocketAddr, token: Option<String>, watched: Watched) -> Result<Server, Error> {
+    start_with(Limits::default(), address, token, watched)
+}
+
+fn start_with(
+    limits: Limits,
+    address: SocketAddr,
+    token: Option<String>,
+    watched: Watched,
+) -> Result<Server, Error> {
     if !address.ip().is_loopback() && token.is_none() {
         return Err(Error::new(format!(
             "{address}: expected a token (UMBRACAST_TOKEN) for an address that other hosts can reach, found none"
@@ -116,21 +122,15 @@ pub fn start(address: SocketAddr, token: Option<String>, watched: Watched) -> Re
     let (stop, stopped) = oneshot::channel();
     let access_points = watched.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let (sender, event_sender) = (newest.clone(), events.clone());
-    let shared = Shared {
-        watched,
-        access_points,
-        newest: sender,
-        events: event_sender,
-        token,
-        streams: AtomicUsize::new(0),
-    };
+    let connections = Connections::new(limits);
+    let open = connections.clone();
+    let shared = Shared { watched, access_points, newest: sender, events: event_sender, token, connections };
     let thread = std::thread::spawn(move || {
         runtime.block_on(async move {
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-            let serving =
-                std::future::IntoFuture::into_future(axum::serve(listener, router(Arc::new(shared))));
+            let serving = connections::serve(listener, router(Arc::new(shared)), open);
             // Streams never end by themselves, so nobody is waited for.
-            tokio::select! { _ = serving => (), _ = stopped => () }
+            tokio::select! { () = serving => (), _ = stopped => () }
         });
     });
     Ok(Server { address, newest, events, stop, thread })
@@ -172,7 +172,12 @@ fn router(shared: Arc<Shared>) -> Router {
 async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
     match refused(shared.token.as_deref(), &request) {
         Some(refusal) => refusal.into_response(),
-        None => next.run(request).await,
+        None => {
+            if let Some(guest) = request.extensions().get::<Guest>() {
+                guest.let_in();
+            }
+            next.run(request).await
+        }
     }
 }
 
@@ -238,18 +243,20 @@ async fn frame(State(shared): State<Arc<Shared>>, Query(query): Query<FrameQuery
 
 async fn live(
     State(shared): State<Arc<Shared>>,
+    Extension(guest): Extension<Guest>,
     Query(query): Query<FrameQuery>,
     upgrade: WebSocketUpgrade,
 ) -> Response {
-    let Some(place) = Place::take(&shared) else { return full() };
+    let Some(place) = guest.stream() else { return full() };
     // Nothing is expected from a client but that it closes.
-    upgrade.max_message_size(4096).on_upgrade(move |socket| stream(socket, place, query.with_points()))
+    let upgrade = upgrade.max_message_size(4096);
+    upgrade.on_upgrade(move |socket| stream(socket, shared, place, query.with_points()))
 }
 
 /// Every frame that the client can take. A watch holds the newest only, so a slow one skips frames, and the others
 /// notice nothing.
-async fn stream(mut socket: WebSocket, place: Place, with_points: bool) {
-    let mut newest = place.0.newest.subscribe();
+async fn stream(mut socket: WebSocket, shared: Arc<Shared>, _place: Stream, with_points: bool) {
+    let mut newest = shared.newest.subscribe();
     newest.mark_changed();
     loop {
         tokio::select! {
@@ -258,9 +265,9 @@ async fn stream(mut socket: WebSocket, place: Place, with_points: bool) {
                     return;
                 }
                 let frame = newest.borrow_and_update().clone();
-                let text = place.0.frame_json(&frame, with_points).to_string();
-                let sent = tokio::time::timeout(PATIENCE, socket.send(Message::Text(text.into()))).await;
-                if !matches!(sent, Ok(Ok(()))) {
+                let text = shared.frame_json(&frame, with_points).to_string();
+                // Fails where the other end takes nothing: see `connections`.
+                if socket.send(Message::Text(text.into())).await.is_err() {
                     return;
                 }
             }
@@ -273,10 +280,10 @@ async fn stream(mut socket: WebSocket, place: Place, with_points: bool) {
     }
 }
 
-async fn events(State(shared): State<Arc<Shared>>) -> Response {
-    let Some(place) = Place::take(&shared) else { return full() };
+async fn events(State(shared): State<Arc<Shared>>, Extension(guest): Extension<Guest>) -> Response {
+    let Some(place) = guest.stream() else { return full() };
     let stream = BroadcastStream::new(shared.events.subscribe()).map(move |event| {
-        let shared = &place.0;
+        let _held = &place;
         Ok::<_, std::convert::Infallible>(match event {
             Ok(event) => {
                 Sent::default().event(event.state.name()).data(event.json(&shared.access_points).to_string())
@@ -311,7 +318,7 @@ async fn health(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
 
 async fn metrics_text(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
     let newest = shared.newest.borrow().clone();
-    let text = metrics::text(&shared.watched, &newest, shared.streams.load(Ordering::Relaxed));
+    let text = metrics::text(&shared.watched, &newest, &shared.connections);
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text)
 }
 
@@ -329,23 +336,9 @@ impl Shared {
     }
 }
 
-/// One of the streams that may be open; given back when it ends, however it ends.
-struct Place(Arc<Shared>);
-
-impl Place {
-    fn take(shared: &Arc<Shared>) -> Option<Self> {
-        let open = shared.streams.fetch_add(1, Ordering::Relaxed);
-        let place = Self(shared.clone());
-        (open < STREAMS_MAX).then_some(place)
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        self.0.streams.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
 #[cfg(test)]
 #[path = "tests.rs"]
 mod tests;
+#[cfg(test)]
+#[path = "hostile_tests.rs"]
+mod hostile_tests;
