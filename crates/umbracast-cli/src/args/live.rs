@@ -85,6 +85,13 @@ pub struct PageArgs {
     /// token, in the environment variable UMBRACAST_TOKEN.
     #[arg(long, default_value = "127.0.0.1:8600", value_name = "HOST:PORT")]
     pub serve: SocketAddr,
+    /// Serve the page over TLS with this certificate (PEM, its issuers behind it); needs a program built with the feature
+    /// `tls`.
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    pub tls_cert: Option<PathBuf>,
+    /// The certificate's key (PEM).
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    pub tls_key: Option<PathBuf>,
     /// Serve no page.
     #[arg(long, conflicts_with = "serve")]
     pub no_serve: bool,

@@ -23,6 +23,8 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::task::AbortHandle;
 use tokio::time::Sleep;
 
+use super::tls::Tls;
+
 /// A request's head and what is read ahead, bytes: ours have some hundreds.
 const HEAD_BYTES: usize = 16 << 10;
 /// What the system holds for a client that does not read: some frames, then it is noticed.
@@ -195,7 +197,7 @@ fn of_network(address: IpAddr) -> IpAddr {
 }
 
 /// Takes connections for good.
-pub async fn serve(listener: TcpListener, router: Router, connections: Arc<Connections>) {
+pub async fn serve(listener: TcpListener, tls: Option<Tls>, router: Router, connections: Arc<Connections>) {
     loop {
         let Ok((stream, from)) = listener.accept().await else {
             tokio::time::sleep(REST).await;
@@ -204,25 +206,37 @@ pub async fn serve(listener: TcpListener, router: Router, connections: Arc<Conne
         let Some(guest) = connections.take(from.ip()) else { continue };
         let _ = stream.set_nodelay(true); // Frames are small and late enough; without it they are only later.
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER_BYTES); // Or the system's own.
-        let task = tokio::spawn(converse(stream, router.clone(), guest.clone()));
+        let task = tokio::spawn(greet(stream, tls.clone(), router.clone(), guest.clone()));
         guest.with(|open| open.task = Some(task.abort_handle()));
     }
 }
 
+/// Agrees on a cipher where that is asked for, then converses.
+async fn greet(stream: TcpStream, tls: Option<Tls>, router: Router, guest: Guest) {
+    let limits = guest.0.connections.limits;
+    let stream = Patient { stream, take_within: limits.take_within, waiting: None };
+    let Some(tls) = tls else { return converse(stream, router, guest).await };
+    if let Ok(Some(stream)) = tokio::time::timeout(limits.ask_within, tls.accept(stream)).await {
+        converse(stream, router, guest).await;
+    }
+}
+
 /// One connection, from its first request to its end, or to the WebSocket that it becomes.
-async fn converse(stream: TcpStream, router: Router, guest: Guest) {
+async fn converse<S>(stream: S, router: Router, guest: Guest)
+where
+    S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
+{
     let limits = guest.0.connections.limits;
     let router = TowerToHyperService::new(router);
     let answer = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(guest.clone());
         router.call(request)
     });
-    let io = TokioIo::new(Patient { stream, take_within: limits.take_within, waiting: None });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(limits.ask_within)
         .max_buf_size(HEAD_BYTES)
-        .serve_connection(io, answer)
+        .serve_connection(TokioIo::new(stream), answer)
         .with_upgrades();
     let _ = connection.await; // Whatever it was, it is over.
 }

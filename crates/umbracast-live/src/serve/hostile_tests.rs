@@ -22,7 +22,8 @@ fn server(limits: Limits) -> Server {
         clock: HostClock::start(),
         title: "a test".to_owned(),
     };
-    start_with(limits, SocketAddr::from(([127, 0, 0, 1], 0)), None, watched).unwrap()
+    let door = Door { address: SocketAddr::from(([127, 0, 0, 1], 0)), token: None, tls: None };
+    start_with(limits, door, watched).unwrap()
 }
 
 fn brief() -> Limits {

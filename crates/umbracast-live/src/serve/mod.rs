@@ -18,8 +18,10 @@ mod watched;
 mod connections;
 mod metrics;
 mod openapi;
+mod tls;
 
 use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -42,6 +44,7 @@ use umbracast::Error;
 use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
 use crate::warnings::Event;
+use tls::Tls;
 pub use watched::Watched;
 
 /// The page: HTML, style and script in one, nothing loaded from elsewhere.
@@ -86,20 +89,27 @@ struct Shared {
     connections: Arc<Connections>,
 }
 
+/// Where it is served, and to whom.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Door {
+    /// Where it listens.
+    pub address: SocketAddr,
+    /// What clients must know.
+    pub token: Option<String>,
+    /// Files with the certificate and its key, PEM; without them it is served as it is.
+    pub tls: Option<(PathBuf, PathBuf)>,
+}
+
 /// Listens on an address. Others than loopback need a token: what is seen here is where people are.
 ///
 /// # Errors
-/// An address that is taken, or that others can reach without a token.
-pub fn start(address: SocketAddr, token: Option<String>, watched: Watched) -> Result<Server, Error> {
-    start_with(Limits::default(), address, token, watched)
+/// An address that is taken, or that others can reach without a token; files that hold no certificate and its key.
+pub fn start(door: Door, watched: Watched) -> Result<Server, Error> {
+    start_with(Limits::default(), door, watched)
 }
 
-fn start_with(
-    limits: Limits,
-    address: SocketAddr,
-    token: Option<String>,
-    watched: Watched,
-) -> Result<Server, Error> {
+fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Error> {
+    let Door { address, token, tls } = door;
     if !address.ip().is_loopback() && token.is_none() {
         return Err(Error::new(format!(
             "{address}: expected a token (UMBRACAST_TOKEN) for an address that other hosts can reach, found none"
@@ -112,6 +122,7 @@ fn start_with(
     if !token.as_ref().is_none_or(plain) {
         return Err(Error::new("UMBRACAST_TOKEN: expected letters, digits, - . _ ~, found something else"));
     }
+    let tls = tls.map(|(cert, key)| Tls::open(&cert, &key)).transpose()?;
     let listener = TcpListener::bind(address).map_err(|e| Error::new(e.to_string()).within(address))?;
     let failed = |e: std::io::Error| Error::new(e.to_string()).within(address);
     listener.set_nonblocking(true).map_err(failed)?;
@@ -128,7 +139,7 @@ fn start_with(
     let thread = std::thread::spawn(move || {
         runtime.block_on(async move {
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-            let serving = connections::serve(listener, router(Arc::new(shared)), open);
+            let serving = connections::serve(listener, tls, router(Arc::new(shared)), open);
             // Streams never end by themselves, so nobody is waited for.
             tokio::select! { () = serving => (), _ = stopped => () }
         });

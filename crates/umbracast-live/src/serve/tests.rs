@@ -18,7 +18,7 @@ fn server(token: Option<&str>) -> (Server, HostClock) {
         title: "a test".to_owned(),
     };
     let address = SocketAddr::from(([127, 0, 0, 1], 0));
-    (start(address, token.map(str::to_owned), watched).unwrap(), clock)
+    (start(Door { address, token: token.map(str::to_owned), tls: None }, watched).unwrap(), clock)
 }
 
 fn published(clock: HostClock) -> Arc<Published> {
@@ -141,7 +141,7 @@ fn an_address_that_others_reach_needs_a_token() {
         clock: HostClock::start(),
         title: String::new(),
     };
-    let message = start(SocketAddr::from(([0, 0, 0, 0], 0)), None, watched).err().unwrap().to_string();
+    let message = start(Door { address: SocketAddr::from(([0, 0, 0, 0], 0)), token: None, tls: None }, watched).err().unwrap().to_string();
     assert!(message.contains("UMBRACAST_TOKEN"), "{message}");
 }
 
