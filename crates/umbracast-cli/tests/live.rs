@@ -194,3 +194,14 @@ fn a_recording_of_a_killed_run_opens_with_all_but_its_last_chunk() {
     // Eight of the twelve megabytes at least: a chunk has little more than four, and a second is flushed.
     assert!(packets * 1206 > 8_000_000, "{packets} packets");
 }
+
+#[test]
+fn a_check_says_who_is_silent_and_ends_with_code_1() {
+    let port = std::net::UdpSocket::bind("0.0.0.0:0").expect("a port").local_addr().expect("bound").port();
+    let port = port.min(u16::MAX - 1).to_string();
+    let output = umbracast(&["check", "--port", &port, "--seconds", "0.2"]).output().expect("starts");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let expected = format!("lidar_east: silent: expected packets on UDP port {port}, found none");
+    assert!(said.lines().count() == 2 && said.starts_with(&expected), "{said}");
+}

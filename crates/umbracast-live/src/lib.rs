@@ -19,6 +19,7 @@ pub mod published;
 pub mod record;
 pub mod run;
 pub mod send;
+pub mod check;
 #[cfg(feature = "serve")]
 pub mod serve;
 

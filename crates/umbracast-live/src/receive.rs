@@ -21,7 +21,7 @@ const SOCKET_BUFFER_BYTES: usize = 4 << 20;
 /// How long a stop may go unnoticed.
 const WAKE: Duration = Duration::from_millis(100);
 /// No sensor's packet is longer: the largest Ouster's has 33 kB. Longer ones are cut here, and not understood later.
-const LONGEST_BYTES: usize = 33_280;
+pub(crate) const LONGEST_BYTES: usize = 33_280;
 
 /// Where a sensor's packets come in.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -120,7 +120,7 @@ fn told_apart(port: u16, doors: &[Door]) -> Result<(), Error> {
     Ok(())
 }
 
-fn bind(port: u16) -> std::io::Result<UdpSocket> {
+pub(crate) fn bind(port: u16) -> std::io::Result<UdpSocket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
     socket.set_recv_buffer_size(SOCKET_BUFFER_BYTES)?;
     socket.bind(&SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).into())?;

@@ -40,6 +40,19 @@ pub struct Live {
     pub seconds: Option<f64>,
 }
 
+/// `check`
+#[derive(Debug, Args)]
+pub struct Check {
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// Listen for so many seconds.
+    #[arg(long, default_value_t = 3.0, value_name = "S", value_parser = positive)]
+    pub seconds: f64,
+    /// UDP port of the site's first sensor; the others follow. Default: what the site file says, or its sensors' own.
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
+    pub port: Option<u16>,
+}
+
 /// `view`
 #[derive(Debug, Args)]
 pub struct View {

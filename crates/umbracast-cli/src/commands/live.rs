@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use umbracast::lidar::udp_port;
 use umbracast::site::Sensor;
-use umbracast::{Config, Error, Frame, Health};
+use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_eval::run::chain::{self, CIRCLE_M};
 use umbracast_live::receive::Door;
 use umbracast_live::record::RecordSettings;
@@ -38,7 +38,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     let settings = Settings {
         weights: Some(setup::weights(args.weights.as_deref())?),
         empty: empty_frames(args, &config)?,
-        doors: doors(args, &config)?,
+        doors: doors(&config.site, args.port, args.demo)?,
         record: recorder(&args.record),
         config: config.clone(),
         clock,
@@ -72,19 +72,19 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
 
 /// Where each sensor's packets come in: as the site says, or on ports from `--port` on. A demonstration takes free
 /// ports: nobody is disturbed who listens already.
-fn doors(args: &args::Live, config: &Config) -> Result<Vec<Door>, Error> {
+pub fn doors(site: &Site, port: Option<u16>, demo: bool) -> Result<Vec<Door>, Error> {
     let door = |(number, sensor): (usize, &Sensor)| {
-        let counted = args.port.map(|first| if first == 0 { 0 } else { first.saturating_add(number as u16) });
-        let port = if args.demo { Some(0) } else { counted.or(udp_port(sensor)) };
+        let counted = port.map(|first| if first == 0 { 0 } else { first.saturating_add(number as u16) });
+        let port = if demo { Some(0) } else { counted.or(udp_port(sensor)) };
         let port = port.ok_or_else(|| {
             let (name, model) = (&sensor.name, &sensor.model);
             Error::new(format!("sensor {name:?}: expected a model that sends packets, found {model:?}"))
         })?;
         // Simulated packets come from loopback, whatever the site file says.
-        let from = sensor.address_bytes().filter(|_| !args.demo).map(IpAddr::from);
+        let from = sensor.address_bytes().filter(|_| !demo).map(IpAddr::from);
         Ok(Door { sensor: number, port, from })
     };
-    config.site.sensors.iter().enumerate().map(door).collect()
+    site.sensors.iter().enumerate().map(door).collect()
 }
 
 fn recorder(args: &RecordArgs) -> Option<RecordSettings> {

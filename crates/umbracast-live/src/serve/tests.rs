@@ -141,7 +141,11 @@ fn an_address_that_others_reach_needs_a_token() {
         clock: HostClock::start(),
         title: String::new(),
     };
-    let message = start(Door { address: SocketAddr::from(([0, 0, 0, 0], 0)), token: None, tls: None }, watched).err().unwrap().to_string();
+    let message =
+        start(Door { address: SocketAddr::from(([0, 0, 0, 0], 0)), token: None, tls: None }, watched)
+            .err()
+            .unwrap()
+            .to_string();
     assert!(message.contains("UMBRACAST_TOKEN"), "{message}");
 }
 

@@ -33,9 +33,10 @@ mod with {
         /// # Errors
         /// Files that are not there or not what they should be; a key of another certificate.
         pub fn open(cert: &Path, key: &Path) -> Result<Self, Error> {
-            let certs: Vec<CertificateDer<'static>> = CertificateDer::pem_file_iter(cert)
-                .and_then(Iterator::collect)
-                .map_err(|e| Error::new(format!("expected a certificate, found {e}")).within(cert.display()))?;
+            let certs: Vec<CertificateDer<'static>> =
+                CertificateDer::pem_file_iter(cert).and_then(Iterator::collect).map_err(|e| {
+                    Error::new(format!("expected a certificate, found {e}")).within(cert.display())
+                })?;
             let secret = PrivateKeyDer::from_pem_file(key)
                 .map_err(|e| Error::new(format!("expected a key, found {e}")).within(key.display()))?;
             let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
