@@ -11,7 +11,7 @@ use serde::Serialize;
 use umbracast::geometry::DVec3;
 use umbracast::lidar::packet::decode;
 use umbracast::lidar::{Assembler, Cloud, Frame, Model, Packet, sensor_models};
-use umbracast::site::Sensor;
+use umbracast::site::{Sensor, TimeSource};
 use umbracast::{Error, Health, Site};
 
 pub use self::listen::{Ears, Heard};
@@ -92,7 +92,7 @@ pub fn look(site: &Site, doors: &[Door], heard: &[Heard]) -> Result<(Vec<Measure
         }
         measured.push(of);
     }
-    clocks(&measured, &mut findings);
+    clocks(site, &measured, &mut findings);
     Ok((measured, findings))
 }
 
@@ -261,17 +261,22 @@ fn returns_of(frame: &Frame) -> Vec<DVec3> {
     points
 }
 
-/// Clocks against this host's, and against that of the first sensor that agrees with it.
-fn clocks(measured: &[Measured], findings: &mut Vec<Finding>) {
+/// Clocks against this host's, and against that of the first sensor that agrees with it. One that sensors share need
+/// not be the host's; one that is not used is not asked for.
+fn clocks(site: &Site, measured: &[Measured], findings: &mut Vec<Finding>) {
     let mut first: Option<(&str, i64)> = None;
     for of in measured {
+        let time = site.sensors.iter().find(|sensor| sensor.name == of.sensor).map(|sensor| sensor.time);
+        if time == Some(TimeSource::Arrival) {
+            continue;
+        }
         let Some(ahead_ns) = of.clock_ahead_s.map(|s| (s * 1e9) as i64) else { continue };
         let mut tell = |text| findings.push(Finding { sensor: of.sensor.clone(), kind: "clock", text });
         let in_words = |ns: i64| {
             let side = if ns < 0 { "behind" } else { "ahead of" };
             format!("{:.3} s {side}", ns.unsigned_abs() as f64 * 1e-9)
         };
-        if ahead_ns.abs() > HOST_APART_NS {
+        if ahead_ns.abs() > HOST_APART_NS && time != Some(TimeSource::Ptp) {
             tell(format!("expected the time of this host within 0.1 s, found {} it", in_words(ahead_ns)));
             continue;
         }

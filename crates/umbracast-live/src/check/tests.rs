@@ -109,6 +109,15 @@ fn clocks_apart_are_told() {
 }
 
 #[test]
+fn a_clock_that_is_not_used_may_be_apart() {
+    let harm = |arrived: Arrived| vec![now(arrived, -5_000_000_000)];
+    for time in [TimeSource::Arrival, TimeSource::Ptp] {
+        let (_, findings) = check(harm, |site| site.sensors.iter_mut().for_each(|sensor| sensor.time = time));
+        assert_eq!(findings, [], "{time:?}: both alike");
+    }
+}
+
+#[test]
 fn a_sensor_that_looks_elsewhere_is_told() {
     let (measured, findings) = check(
         |arrived| vec![arrived],
