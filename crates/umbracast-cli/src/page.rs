@@ -74,6 +74,15 @@ impl Page {
         Box::new(|_: &Arc<Published>| {})
     }
 
+    /// Shows another site from now on.
+    #[cfg_attr(not(feature = "serve"), expect(unused_variables, reason = "nobody looks"))]
+    pub fn take_over(&self, site: &Site) {
+        #[cfg(feature = "serve")]
+        if let Some(server) = &self.server {
+            server.take_over(site);
+        }
+    }
+
     /// Closes it.
     pub fn close(self) {
         #[cfg(feature = "serve")]

@@ -3,10 +3,18 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use umbracast::{Error, Mode};
 
 use super::{CrowdArgs, SiteArgs};
+
+/// `--log`
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LogForm {
+    // Variants without a description keep the help to a line an option.
+    Text,
+    Json,
+}
 
 /// `live`
 #[derive(Debug, Args)]
@@ -35,6 +43,10 @@ pub struct Live {
     /// sensors' own.
     #[arg(long, value_name = "PORT")]
     pub port: Option<u16>,
+    /// How the events of the run (a sensor gone, frames skipped, a disk that fails) are told on stderr: lines for people, or
+    /// a JSON object a line.
+    #[arg(long, default_value = "text", env = "UMBRACAST_LOG", value_name = "FORM")]
+    pub log: LogForm,
     /// End after so many seconds; default: on a signal.
     #[arg(long, value_name = "S", value_parser = positive)]
     pub seconds: Option<f64>,

@@ -11,15 +11,16 @@ use umbracast::lidar::udp_port;
 use umbracast::site::Sensor;
 use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_eval::run::chain::{self, CIRCLE_M};
+use umbracast_live::log::{Event, Form, Level, Log, Watch};
 use umbracast_live::receive::Door;
 use umbracast_live::record::RecordSettings;
-use umbracast_live::run::Counters;
+use umbracast_live::run::{Counters, needs_restart};
 use umbracast_live::send::{self, Sent};
 use umbracast_live::{HostClock, Live, Settings, Summary};
 use umbracast_sim::crowd::Stroll;
 use umbracast_sim::sensor::Sensors;
 
-use crate::args::{self, Common, RecordArgs};
+use crate::args::{self, Common, LogForm, RecordArgs};
 use crate::ending::Ending;
 use crate::input;
 use crate::page::Page;
@@ -27,13 +28,16 @@ use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
 use crate::{say, signal};
 
+/// How often it is looked at how the run goes.
+const LOOK_NS: i64 = 1_000_000_000;
 /// How often the end may be asked for.
 const TICK: Duration = Duration::from_millis(50);
 
 /// Runs until the end is asked for, then says how it went.
 pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
-    let config = setup::config(args.mode, args.site.site.as_deref())?;
+    let mut config = setup::config(args.mode, args.site.site.as_deref())?;
     let asked = signal::asked_to_end()?;
+    let read_again = args.site.site.as_ref().map(|_| signal::asked_to_read_again()).transpose()?;
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
     let settings = Settings {
         weights: Some(setup::weights(args.weights.as_deref())?),
@@ -55,19 +59,81 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
         .then(|| demonstration(args, &config, live.receivers().bound(), clock, &asked))
         .transpose()?;
     let watch = Stopwatch::start();
+    let names = config.site.sensors.iter().map(|sensor| sensor.name.clone()).collect();
+    let mut events = Events::new(args, common, clock, names);
+    events.tell(Event::new(Level::Info, "start", format!("{} begins", config.site.name)));
     while !asked.load(Ordering::Relaxed) && args.seconds.is_none_or(|seconds| watch.seconds() < seconds) {
         std::thread::sleep(TICK);
+        events.look(&live);
+        if read_again.as_ref().is_some_and(|again| again.swap(false, Ordering::Relaxed)) {
+            events.tell(reload(args, &mut config, &live, &page));
+        }
         if !live.is_well() {
             // What there is shall be finished all the same.
             live.stop();
             return Err(Error::new("a thread of the pipeline ended; this is a bug"));
         }
     }
+    events.tell(Event::new(Level::Info, "end", "it ends"));
     asked.store(true, Ordering::Relaxed);
     let sent = demo.and_then(|demo| demo.join().ok()).transpose()?;
     let summary = live.stop();
     page.close();
     Ok(tell(&summary, sent, &watch, common))
+}
+
+/// Reads the site file again and takes over what can be; whatever is wrong with it, the run goes on as it was.
+fn reload(args: &args::Live, config: &mut Config, live: &Live, page: &Page) -> Event {
+    let stays =
+        |told: String| Event::new(Level::Warn, "reload_failed", format!("{told}; all stays as it was"));
+    let new = match setup::config(args.mode, args.site.site.as_deref()) {
+        Ok(new) => new,
+        Err(error) => return stays(error.to_string()),
+    };
+    let apart = needs_restart(config, &new);
+    if !apart.is_empty() {
+        return stays(format!("what differs needs a restart: {}", apart.join(", ")));
+    }
+    page.take_over(&new.site);
+    live.take_over(new.clone());
+    *config = new;
+    Event::new(
+        Level::Info,
+        "reload",
+        "the site file was read again: access points, UE and stage 3 are as it says now",
+    )
+}
+
+/// What happens, told on stderr.
+struct Events {
+    watch: Watch,
+    log: Log,
+    clock: HostClock,
+    looked_ns: i64,
+    quiet: bool,
+}
+
+impl Events {
+    fn new(args: &args::Live, common: &Common, clock: HostClock, sensors: Vec<String>) -> Self {
+        let form = if args.log == LogForm::Json { Form::Json } else { Form::Text };
+        // Who asks for JSON has somebody who reads it.
+        let quiet = common.quiet && form == Form::Text;
+        Self { watch: Watch::new(sensors), log: Log::new(form), clock, looked_ns: clock.now_ns(), quiet }
+    }
+
+    /// Once a second.
+    fn look(&mut self, live: &Live) {
+        if self.clock.now_ns() - self.looked_ns >= LOOK_NS {
+            self.looked_ns += LOOK_NS;
+            self.watch.look(live.summary()).into_iter().for_each(|event| self.tell(event));
+        }
+    }
+
+    fn tell(&mut self, event: Event) {
+        if let Some(line) = self.log.line(&event, self.clock.now_ns()).filter(|_| !self.quiet) {
+            eprintln!("{line}");
+        }
+    }
 }
 
 /// Where each sensor's packets come in: as the site says, or on ports from `--port` on. A demonstration takes free
@@ -133,6 +199,7 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
     let (latency, step) = (&summary.latencies, &summary.steps);
     let mut json = RunJson::new("live", watch)
         .with("packets", summary.packets)
+        .with("packets_dropped_by_system", summary.dropped_by_system)
         .with("packets_lost", summary.packets_lost)
         .with("packets_of_strangers", summary.strangers)
         .with("frames", summary.frames)
@@ -157,6 +224,7 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
     );
     json.print(common, &text);
     let lost = [
+        (summary.dropped_by_system, "packets given up by the system"),
         (summary.packets_lost, "packets given up"),
         (summary.strangers, "packets of no sensor's address"),
         (summary.frames_skipped, "frames skipped"),

@@ -144,7 +144,7 @@ fn who_never_reads_is_dropped_and_the_others_get_every_frame() {
     let deaf = ask(&server, "/api/live", UPGRADE);
     let deaf_to_events = ask(&server, "/api/events", "");
     let link = LinkRow::default();
-    let events = vec![Event { link, state: LinkState::Warned }; 500];
+    let events = vec![Event { access_point: String::new(), link, state: LinkState::Warned }; 500];
     let clock = HostClock::start();
     let begun_ns = clock.now_ns();
     let mut count = 0;

@@ -25,6 +25,16 @@ pub fn text(watched: &Watched, newest: &Published, connections: &Connections) ->
         "Packets of sensors.",
         counters.packets.load(Ordering::Relaxed) as f64,
     );
+    let dropped = counters.dropped_by_system.load(Ordering::Relaxed) as f64;
+    let what = "Packets that the system gave up because nobody received them in time.";
+    counter(&mut out, "packets_dropped_by_system_total", what, dropped);
+    head(&mut out, "sensor_packets_total", "Packets of each sensor.", "counter");
+    let of_sensors = counters.of_sensors.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    for (sensor, packets) in watched.site.sensors.iter().zip(of_sensors) {
+        // As Prometheus writes a label's value.
+        let name = sensor.name.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n");
+        let _ = writeln!(out, "umbracast_sensor_packets_total{{sensor=\"{name}\"}} {packets}");
+    }
     counter(&mut out, "frames_total", "Frames published.", counters.frames.load(Ordering::Relaxed) as f64);
     counter(
         &mut out,

@@ -22,7 +22,7 @@ mod tls;
 
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
@@ -39,7 +39,7 @@ use tokio::sync::{broadcast, oneshot, watch};
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::wrappers::errors::BroadcastStreamRecvError;
-use umbracast::Error;
+use umbracast::{Error, Site};
 
 use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
@@ -57,6 +57,7 @@ const STALE: Duration = Duration::from_secs(1);
 /// The server's thread, and where it listens.
 pub struct Server {
     address: SocketAddr,
+    site: Arc<RwLock<Site>>,
     newest: watch::Sender<Arc<Published>>,
     events: broadcast::Sender<Event>,
     stop: oneshot::Sender<()>,
@@ -74,7 +75,7 @@ impl Publisher {
     /// The newest frame.
     pub fn publish(&self, published: &Arc<Published>) {
         for event in &published.events {
-            let _ = self.events.send(*event); // Nobody listens: nobody misses it.
+            let _ = self.events.send(event.clone()); // Nobody listens: nobody misses it.
         }
         self.newest.send_replace(published.clone());
     }
@@ -82,7 +83,8 @@ impl Publisher {
 
 struct Shared {
     watched: Watched,
-    access_points: Vec<String>,
+    /// As the site file was last read.
+    site: Arc<RwLock<Site>>,
     newest: watch::Sender<Arc<Published>>,
     events: broadcast::Sender<Event>,
     token: Option<String>,
@@ -131,11 +133,12 @@ fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Er
     let newest = watch::Sender::new(Arc::new(Published::default()));
     let events = broadcast::Sender::new(EVENTS_WAITING);
     let (stop, stopped) = oneshot::channel();
-    let access_points = watched.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let site = Arc::new(RwLock::new(watched.site.clone()));
     let (sender, event_sender) = (newest.clone(), events.clone());
     let connections = Connections::new(limits);
     let open = connections.clone();
-    let shared = Shared { watched, access_points, newest: sender, events: event_sender, token, connections };
+    let shared =
+        Shared { watched, site: site.clone(), newest: sender, events: event_sender, token, connections };
     let thread = std::thread::spawn(move || {
         runtime.block_on(async move {
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
@@ -144,7 +147,7 @@ fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Er
             tokio::select! { () = serving => (), _ = stopped => () }
         });
     });
-    Ok(Server { address, newest, events, stop, thread })
+    Ok(Server { address, site, newest, events, stop, thread })
 }
 
 impl Server {
@@ -156,6 +159,11 @@ impl Server {
     /// For whoever makes frames.
     pub fn publisher(&self) -> Publisher {
         Publisher { newest: self.newest.clone(), events: self.events.clone() }
+    }
+
+    /// Another site from now on; frames tell that it was read again.
+    pub fn take_over(&self, site: &Site) {
+        *self.site.write().unwrap_or_else(PoisonError::into_inner) = site.clone();
     }
 
     /// Closes every connection.
@@ -232,7 +240,8 @@ async fn page() -> impl IntoResponse {
 }
 
 async fn site(State(shared): State<Arc<Shared>>) -> Json<Value> {
-    Json(json!({ "title": shared.watched.title, "site": shared.watched.site }))
+    let site = shared.site.read().unwrap_or_else(PoisonError::into_inner).clone();
+    Json(json!({ "title": shared.watched.title, "site": site }))
 }
 
 #[derive(serde::Deserialize)]
@@ -296,9 +305,7 @@ async fn events(State(shared): State<Arc<Shared>>, Extension(guest): Extension<G
     let stream = BroadcastStream::new(shared.events.subscribe()).map(move |event| {
         let _held = &place;
         Ok::<_, std::convert::Infallible>(match event {
-            Ok(event) => {
-                Sent::default().event(event.state.name()).data(event.json(&shared.access_points).to_string())
-            }
+            Ok(event) => Sent::default().event(event.state.name()).data(event.json().to_string()),
             Err(BroadcastStreamRecvError::Lagged(missed)) => {
                 Sent::default().event("missed").data(missed.to_string())
             }
@@ -335,7 +342,7 @@ async fn metrics_text(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
 
 impl Shared {
     fn frame_json(&self, published: &Published, with_points: bool) -> Value {
-        let mut value = published.json(&self.access_points, with_points);
+        let mut value = published.json(with_points);
         value["age_ms"] = json!(self.age(published).map(|age| age.as_millis() as u64));
         value
     }

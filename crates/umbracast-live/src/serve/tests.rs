@@ -28,7 +28,8 @@ fn published(clock: HostClock) -> Arc<Published> {
         published_ns: clock.now_ns(),
         tracks: vec![TrackRow { track: 4, x_m: 1.5, confirmed: true, ..TrackRow::default() }],
         links: vec![link],
-        events: Warnings::default().changes(&[link]),
+        events: Warnings::default().changes(&[link], &["side".to_owned()]),
+        access_points: Arc::from(["side".to_owned()]),
         points_cm: vec![[1, 2, 3]],
         sensors: vec![true, false],
         ..Published::default()
@@ -92,7 +93,7 @@ fn curl_gets_what_the_page_gets() {
 #[test]
 fn every_field_of_a_frame_is_in_the_interface() {
     let document = openapi::document();
-    let frame = published(HostClock::start()).json(&["side".to_owned()], true);
+    let frame = published(HostClock::start()).json(true);
     let known = &document["components"]["schemas"]["Frame"]["properties"];
     frame.as_object().unwrap().keys().for_each(|name| assert!(known.get(name).is_some(), "{name}"));
     let known = &document["components"]["schemas"]["Event"]["properties"];
