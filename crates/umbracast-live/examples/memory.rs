@@ -57,7 +57,7 @@ fn main() -> Result<(), Error> {
     let sending = std::thread::spawn(move || {
         let first = send::frame_of_hour(clock.now_ns());
         let stroll = Stroll::new(Preset::Orca03, PEOPLE, 10.0, SEED);
-        let packets = send::strolling(stroll, &config.site, &sensors, SEED, first);
+        let packets = send::strolling(stroll, config.site, sensors, SEED, first);
         send::send(packets, &to, 1.0, clock, &stopped)
     });
     let mut seen = Vec::new();

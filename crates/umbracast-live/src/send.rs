@@ -85,24 +85,23 @@ pub fn simulated(mut scene: Scene) -> impl Iterator<Item = Arrived> {
 /// they walk this one, so that nobody waits for it; it ends when the packets are wanted no more.
 pub fn strolling(
     mut stroll: Stroll,
-    site: &Site,
-    sensors: &Sensors,
+    site: Site,
+    sensors: Sensors,
     seed: u64,
     first: u64,
-) -> impl Iterator<Item = Arrived> + use<> {
+) -> impl Iterator<Item = Arrived> {
     let (legs, next_leg) = mpsc::sync_channel(0);
-    let hall = site.clone();
+    let nobody = Crowd { trajectories: Vec::new(), duration_ns: 0 };
+    let mut scene = Scene::in_hall(nobody, &site, &sensors, seed).starting_at(first);
     std::thread::spawn(move || {
         for leg in 0.. {
             let begins_ns = (first as i64 + leg * LEG_S as i64 * STEPS_PER_S) * STEP_NS;
-            let scene = Scene::truth_only(stroll.leg(LEG_S).later(begins_ns), &hall, seed);
+            let scene = Scene::truth_only(stroll.leg(LEG_S).later(begins_ns), &site, seed);
             if legs.send(scene).is_err() {
                 break;
             }
         }
     });
-    let nobody = Crowd { trajectories: Vec::new(), duration_ns: 0 };
-    let mut scene = Scene::in_hall(nobody, site, sensors, seed).starting_at(first);
     let frames = std::iter::from_fn(move || {
         scene.next_frame().or_else(|| {
             scene.go_on(next_leg.recv().ok()?);

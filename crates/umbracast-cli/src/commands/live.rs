@@ -190,7 +190,7 @@ fn demonstration(
     let stroll = Stroll::new(preset, people, CIRCLE_M, seed);
     Ok(std::thread::spawn(move || {
         let first = send::frame_of_hour(clock.now_ns());
-        send::send(send::strolling(stroll, &site, &sensors, seed, first), &to, 1.0, clock, &stop)
+        send::send(send::strolling(stroll, site, sensors, seed, first), &to, 1.0, clock, &stop)
     }))
 }
 

@@ -1,7 +1,6 @@
 //! One module a command.
 
 pub mod ablate;
-pub mod check;
 pub mod compare;
 pub mod config;
 pub mod coverage;
@@ -9,6 +8,7 @@ pub mod evaluate;
 pub mod demo;
 pub mod inspect;
 pub mod live;
+pub mod check;
 pub mod replay;
 pub mod reproduce;
 pub mod run;

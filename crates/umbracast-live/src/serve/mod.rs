@@ -15,10 +15,10 @@
 //! pipeline, which only leaves the newest frame here.
 
 mod watched;
+mod tls;
 mod connections;
 mod metrics;
 mod openapi;
-mod tls;
 
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::path::PathBuf;
