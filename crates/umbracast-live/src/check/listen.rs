@@ -37,7 +37,9 @@ impl Ears {
         for &port in ports {
             if let std::collections::btree_map::Entry::Vacant(free) = sockets.entry(port) {
                 free.insert(receive::bind(port).map_err(|e| {
-                    Error::new(format!("UDP port {port}: expected it free, for no live run to listen: {e}"))
+                    Error::new(format!(
+                        "UDP port {port}: expected it free (does a live run listen already?), found {e}"
+                    ))
                 })?);
             }
         }

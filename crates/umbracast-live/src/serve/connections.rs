@@ -154,11 +154,11 @@ impl Guest {
         let limits = self.0.connections.limits;
         let mut state = self.0.connections.lock();
         let all: usize = state.streams.values().sum();
-        let own = state.streams.entry(self.0.from).or_default();
-        if all >= limits.streams || *own >= limits.streams_of_address {
+        let own = state.streams.get(&self.0.from).copied().unwrap_or(0);
+        if all >= limits.streams || own >= limits.streams_of_address {
             return None;
         }
-        *own += 1;
+        state.streams.insert(self.0.from, own + 1);
         Some(Stream(self.clone()))
     }
 
