@@ -158,4 +158,24 @@ impl Pipeline {
         o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());
         o
     }
+
+    /// From the next step on links are those of this configuration's access points, UE and stage 3; everybody stays
+    /// followed. Whatever else differs needs a pipeline of its own.
+    ///
+    /// ```
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let mut config = umbracast::Config::default();
+    /// use umbracast::Pipeline;
+    ///
+    /// let mut pipeline = Pipeline::new(&config, None)?;
+    /// pipeline.step(&ray(0, 15.5));
+    /// config.site.access_points.truncate(1);
+    /// pipeline.take_over_links(&config);
+    /// assert_eq!(pipeline.step(&ray(1, 15.5)).frame, 1);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    pub fn take_over_links(&mut self, config: &Config) {
+        self.caster = Caster::new(&config.blockage, &config.site);
+    }
 }

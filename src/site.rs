@@ -138,6 +138,40 @@ pub struct Sensor {
     /// The IPv4 address that its packets come from, where several sensors send to one port.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
+    /// Which clock its points are timed by.
+    #[serde(default, skip_serializing_if = "TimeSource::is_sensor")]
+    pub time: TimeSource,
+}
+
+/// Which clock a sensor's points are timed by.
+///
+/// ```
+/// use umbracast::{Config, Mode, site::TimeSource};
+///
+/// let file = "[[site.sensors]]\nname = \"door\"\nposition_m = [0.0, 0.0, 3.0]\n\
+///             rotation_deg = { yaw = 0.0, pitch = 20.0, roll = 0.0 }\ntime = \"arrival\"";
+/// let config = Config::with_overlay(Mode::Default, file, "hall.toml")?;
+/// assert_eq!(config.site.sensors[0].time, TimeSource::Arrival);
+/// # Ok::<(), umbracast::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TimeSource {
+    /// Its own. One that is more than 100 ms from where the time of reception puts it is shifted there, alone.
+    #[default]
+    Sensor,
+    /// Its own, which others of this kind share (PTP, gPTP): when all of them are set, one shift serves all, and they
+    /// stay together to the nanosecond.
+    Ptp,
+    /// The host's, at reception. Its own clock spaces its columns and need not be set; the packets that were under way
+    /// for the shortest time tell what it reads.
+    Arrival,
+}
+
+impl TimeSource {
+    fn is_sensor(&self) -> bool {
+        *self == Self::Sensor
+    }
 }
 
 // What a site file need not say of a sensor: an HDL-32E as it is delivered, cut behind, as the default site has two.

@@ -47,10 +47,11 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 4] = [
+const OPTIONAL: [(&str, &str, &str); 5] = [
     ("site.sensors", "address", "a string"),
     ("site.sensors", "calibration", "a string"),
     ("site.sensors", "calibration_file", "a string"),
+    ("site.sensors", "time", "a string"),
     ("site.sensors", "udp_port", "a whole number"),
 ];
 

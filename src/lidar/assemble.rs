@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;
 
+use super::clock::{Clock, near};
 use super::model::TIME_LIMIT_NS;
 use super::packet::decode;
 use super::{Cloud, Column, Frame, Model, Packet, RangeImage, Scan, sensor_model};
@@ -18,7 +19,8 @@ use crate::{Error, Health, STEP_NS, Site};
 /// Each sensor's clock is its own. One that is not on the time of the others (more than a frame away from where
 /// the time of reception puts it, from its first packet on or after a jump) is shifted there and counted, so
 /// that a clock that was set, a sensor without one, or a broken time stamp loses no data. When all time leaps
-/// (every sensor was silent, or the host's clock was set forward) one packet is given up to be sure.
+/// (every sensor was silent, or the host's clock was set forward) one packet is given up to be sure. A site may say
+/// that sensors share a clock, or have none that is set: [`TimeSource`](crate::site::TimeSource).
 ///
 /// Memory: two frames beyond those that wait for [`pop`](Self::pop); call it after every push.
 ///
@@ -54,6 +56,8 @@ pub struct Assembler {
     now: Option<(i64, i64)>,
     /// Where the packet before would have taken the time, more than a frame ahead: believed when a second says so.
     leap_ns: Option<i64>,
+    /// From the clock that sensors share to the time of the frames.
+    shared_shift_ns: i64,
     /// Those of the packet at hand.
     columns: Columns,
 }
@@ -74,9 +78,7 @@ struct Intake {
     site_from_sensor: Pose,
     valid_range_m: RangeInclusive<f32>,
     /// From its own clock to the time of the frames.
-    shift_ns: i64,
-    /// Its latest column.
-    newest_ns: Option<i64>,
+    clock: Clock,
     /// Whether frames wait for it.
     awaited: bool,
 }
@@ -108,8 +110,7 @@ impl Assembler {
                 model,
                 site_from_sensor: sensor.site_from_sensor(),
                 valid_range_m: sensor.range_min_m as f32..=sensor.range_max_m as f32,
-                shift_ns: 0,
-                newest_ns: None,
+                clock: Clock::new(sensor.time),
             })
         };
         Ok(Self {
@@ -120,6 +121,7 @@ impl Assembler {
             closed: VecDeque::new(),
             now: None,
             leap_ns: None,
+            shared_shift_ns: 0,
             columns: Columns::default(),
         })
     }
@@ -151,7 +153,9 @@ impl Assembler {
         let (Some(first), Some(last)) = (columns.column.first(), columns.column.last()) else { return };
 
         let intake = &mut self.sensors[sensor];
-        let (shift_ns, jumped) = intake.settle_clock(first.time_ns, packet.time_ns, self.now);
+        let own_ns = (first.time_ns, last.time_ns);
+        let (shift_ns, jumped) =
+            intake.clock.settle(own_ns, packet.time_ns, self.now, &mut self.shared_shift_ns);
         health.clock_jumps += u64::from(jumped);
         let first_ns = first.time_ns.saturating_add(shift_ns);
         let last_ns = last.time_ns.saturating_add(shift_ns);
@@ -170,8 +174,8 @@ impl Assembler {
         }
         self.leap_ns = None;
         self.origin_ns = Some(origin_ns);
-        intake.shift_ns = shift_ns;
-        intake.newest_ns = intake.newest_ns.max(Some(last_ns));
+        intake.clock.shift_ns = shift_ns;
+        intake.clock.newest_ns = intake.clock.newest_ns.max(Some(last_ns));
         if !jumped {
             self.now = Some((first_ns, packet.time_ns));
         }
@@ -218,7 +222,7 @@ impl Assembler {
         let beams = model.beams.len();
         let (mut late, mut duplicate) = (false, false);
         for (c, &column) in self.columns.column.iter().enumerate() {
-            let column = Column { time_ns: column.time_ns + intake.shift_ns, ..column };
+            let column = Column { time_ns: column.time_ns + intake.clock.shift_ns, ..column };
             let number = frame_number(self.origin_ns, column.time_ns);
             if number < self.next {
                 late = true;
@@ -258,7 +262,7 @@ impl Assembler {
     /// Closes every frame that waits for no sensor any more.
     fn close_ready(&mut self, health: &mut Health) {
         while let Some((&number, _)) = self.open.first_key_value() {
-            let reached = |s: &Intake| s.newest_ns.map(|newest_ns| frame_number(self.origin_ns, newest_ns));
+            let reached = |s: &Intake| s.clock.newest_ns.map(|ns| frame_number(self.origin_ns, ns));
             let all_past = self.sensors.iter().all(|s| !s.awaited || reached(s) > Some(number));
             let one_far_past = self.sensors.iter().any(|s| reached(s) > Some(number + 1));
             if !all_past && !one_far_past {
@@ -290,24 +294,6 @@ impl Assembler {
     }
 }
 
-impl Intake {
-    /// The shift for a packet of this sensor whose clock says `own_ns`, and whether the clock jumped. `now` is the
-    /// time and the time of reception of the packet before, of any sensor.
-    fn settle_clock(&self, own_ns: i64, received_ns: i64, now: Option<(i64, i64)>) -> (i64, bool) {
-        let Some((now_ns, now_received_ns)) = now else { return (0, false) };
-        let expected_ns = now_ns.saturating_add(received_ns.saturating_sub(now_received_ns).max(0));
-        let time_ns = own_ns.saturating_add(self.shift_ns);
-        let runs_on = self.newest_ns.is_some_and(|newest_ns| near(time_ns, newest_ns));
-        if runs_on || near(time_ns, expected_ns) {
-            (self.shift_ns, false)
-        } else if near(own_ns, expected_ns) {
-            (0, true)
-        } else {
-            (expected_ns.saturating_sub(own_ns), true)
-        }
-    }
-}
-
 impl Columns {
     fn clear(&mut self) {
         self.column.clear();
@@ -320,11 +306,6 @@ impl Columns {
         self.range_m.extend_from_slice(range_m);
         self.reflectivity.extend_from_slice(reflectivity);
     }
-}
-
-/// Within a frame's length.
-fn near(a_ns: i64, b_ns: i64) -> bool {
-    a_ns.saturating_sub(b_ns).unsigned_abs() <= STEP_NS.unsigned_abs()
 }
 
 fn frame_number(origin_ns: Option<i64>, time_ns: i64) -> i64 {

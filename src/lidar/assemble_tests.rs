@@ -6,6 +6,7 @@ use rand_pcg::Pcg64Mcg;
 use super::*;
 use crate::Config;
 use crate::lidar::packet::{columns_per_packet, encode};
+use crate::site::TimeSource;
 
 const MS: i64 = 1_000_000;
 
@@ -44,7 +45,14 @@ fn both(east: Vec<Packet>, west: Vec<Packet>) -> Vec<(usize, Packet)> {
 }
 
 fn assemble(packets: &[(usize, Packet)]) -> (Vec<Frame>, Health) {
-    let mut assembler = Assembler::new(&Config::default().site).unwrap();
+    assemble_by(TimeSource::Sensor, packets)
+}
+
+/// The same with another clock of both sensors.
+fn assemble_by(time: TimeSource, packets: &[(usize, Packet)]) -> (Vec<Frame>, Health) {
+    let mut site = Config::default().site;
+    site.sensors.iter_mut().for_each(|sensor| sensor.time = time);
+    let mut assembler = Assembler::new(&site).unwrap();
     let mut health = Health::default();
     let mut frames = Vec::new();
     for (sensor, packet) in packets {
@@ -228,6 +236,77 @@ fn a_sensor_without_the_others_time_is_shifted_by_the_time_of_reception() {
     let (frames, health) = assemble(&both(packets(0, 500 * MS), west));
     assert_eq!(health.clock_jumps, 1);
     frames[..4].iter().for_each(assert_whole);
+}
+
+/// Received up to this much later than they were sent.
+fn delayed(mut packets: Vec<Packet>, most_ns: i64) -> Vec<Packet> {
+    let mut rng = Pcg64Mcg::seed_from_u64(5);
+    let mut last_ns = 0;
+    for packet in &mut packets {
+        last_ns = (packet.time_ns + rng.random_range(0..most_ns)).max(last_ns);
+        packet.time_ns = last_ns;
+    }
+    packets
+}
+
+/// When the first column of each sensor's scan fired.
+fn first_columns_ns(frame: &Frame) -> Vec<i64> {
+    let first = |scan: &Scan| match &scan.cloud {
+        Cloud::Organised(image) => image.columns[0].time_ns,
+        Cloud::Unorganised(_) => panic!("packets give organised clouds"),
+    };
+    frame.scans.iter().map(first).collect()
+}
+
+#[test]
+fn clocks_that_nobody_set_are_put_right_by_the_time_of_arrival() {
+    // West was switched on at another time, and its crystal runs 50 ppm too fast.
+    let mut west = packets(1_200_000 * MS, 20_000 * MS);
+    for packet in &mut west {
+        let after_ns = packet.time_ns - 1_200_000 * MS;
+        packet.time_ns = after_ns - after_ns / 20_000;
+    }
+    let all = both(delayed(packets(0, 20_000 * MS), 3 * MS), delayed(west, 3 * MS));
+    let (frames, health) = assemble_by(TimeSource::Arrival, &all);
+    assert!(health.is_clean(), "{health:?}");
+    // The packets that came soonest show both clocks at the same time: columns of one instant stay together.
+    for frame in &frames[20..195] {
+        assert_whole(frame);
+        let first_ns = first_columns_ns(frame);
+        assert!((first_ns[0] - first_ns[1]).abs() < MS, "frame {}: {first_ns:?}", frame.index);
+    }
+}
+
+#[test]
+fn a_host_that_stands_still_makes_no_jump_of_the_time_of_arrival() {
+    let mut all = both(packets(0, 3000 * MS), packets(0, 3000 * MS));
+    for (_, packet) in all.iter_mut().filter(|(_, p)| (1000 * MS..1300 * MS).contains(&p.time_ns)) {
+        packet.time_ns = 1300 * MS;
+    }
+    let (frames, health) = assemble_by(TimeSource::Arrival, &all);
+    assert!(health.is_clean(), "{health:?}");
+    frames[1..28].iter().for_each(assert_whole);
+}
+
+#[test]
+fn sensors_that_share_a_clock_stay_together_when_it_is_set() {
+    let of_sensor = |jump_ns: i64| {
+        let before = packets(60_000 * MS, 500 * MS);
+        let mut after = packets(60_500 * MS + jump_ns, 1000 * MS);
+        after.iter_mut().for_each(|packet| packet.time_ns -= jump_ns);
+        [before, after].concat()
+    };
+    let together = |time: TimeSource, jump_ns: i64| {
+        let all = both(of_sensor(jump_ns), delayed(of_sensor(jump_ns), 3 * MS));
+        let (frames, health) = assemble_by(time, &all);
+        assert_eq!(health.clock_jumps, 2, "{health:?}");
+        let last_ns = first_columns_ns(&frames[12]);
+        last_ns[0] == last_ns[1]
+    };
+    for jump_ns in [-10_000 * MS, 25_000 * MS] {
+        assert!(together(TimeSource::Ptp, jump_ns));
+        assert!(!together(TimeSource::Sensor, jump_ns), "each by the time of reception, which differs");
+    }
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod ouster;
 mod hesai;
 mod table;
 pub mod packet;
+mod clock;
 mod assemble;
 
 pub use assemble::Assembler;

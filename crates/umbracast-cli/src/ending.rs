@@ -5,6 +5,8 @@
 pub enum Ending {
     /// Everything was used.
     Done,
+    /// What was looked at is wrong, as was said.
+    Wrong,
     /// Something was lost or skipped; says what.
     DataLost(String),
 }

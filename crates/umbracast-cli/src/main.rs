@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Run(args) => commands::run::run(&args, &cli.common),
         Command::Live(args) => commands::live::run(&args, &cli.common),
+        Command::Check(args) => commands::check::run(&args, &cli.common),
         Command::View(args) => commands::view::run(&args, &cli.common),
         Command::Replay(args) => commands::replay::run(&args, &cli.common),
         Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),
@@ -47,6 +48,7 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::Wrong) => ExitCode::FAILURE,
         Ok(Ending::DataLost(what)) => {
             eprintln!("umbracast: done, but data was lost: {what}");
             ExitCode::from(3)

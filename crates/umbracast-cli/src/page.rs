@@ -38,8 +38,11 @@ impl Page {
             title: title.to_owned(),
         };
         let token = std::env::var("UMBRACAST_TOKEN").ok().filter(|token| !token.is_empty());
-        let server = umbracast_live::serve::start(args.serve, token, watched)?;
-        crate::say::line(format_args!("page: http://{}/", server.address()));
+        let tls = args.tls_cert.clone().zip(args.tls_key.clone());
+        let scheme = if tls.is_some() { "https" } else { "http" };
+        let door = umbracast_live::serve::Door { address: args.serve, token, tls };
+        let server = umbracast_live::serve::start(door, watched)?;
+        crate::say::line(format_args!("page: {scheme}://{}/", server.address()));
         Ok(Self { server: Some(server) })
     }
 
@@ -69,6 +72,15 @@ impl Page {
             return Box::new(move |published: &Arc<Published>| publisher.publish(published));
         }
         Box::new(|_: &Arc<Published>| {})
+    }
+
+    /// Shows another site from now on.
+    #[cfg_attr(not(feature = "serve"), expect(unused_variables, reason = "nobody looks"))]
+    pub fn take_over(&self, site: &Site) {
+        #[cfg(feature = "serve")]
+        if let Some(server) = &self.server {
+            server.take_over(site);
+        }
     }
 
     /// Closes it.

@@ -19,8 +19,14 @@ This page is made from the help of the command by a test, `crates/umbracast-cli/
 /// What `umbracast WORDS --help` prints.
 fn help(words: &[String]) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_umbracast"));
-    // The help shows what a variable holds on this machine.
-    let done = command.args(words).arg("--help").env_remove("UMBRACAST_DATA").output().expect("it runs");
+    // The help shows what variables hold on this machine.
+    let done = command
+        .args(words)
+        .arg("--help")
+        .env_remove("UMBRACAST_DATA")
+        .env_remove("UMBRACAST_LOG")
+        .output()
+        .expect("it runs");
     assert!(done.status.success(), "{words:?}: {}", done.status);
     String::from_utf8(done.stdout).expect("help is text")
 }

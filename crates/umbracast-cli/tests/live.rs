@@ -178,7 +178,7 @@ fn a_recording_of_a_killed_run_opens_with_all_but_its_last_chunk() {
             .map(|file| file.metadata().map_or(0, |m| m.len()))
             .sum::<u64>()
     };
-    while bytes() < 6_000_000 {
+    while bytes() < 12_000_000 {
         std::thread::sleep(std::time::Duration::from_millis(20));
         assert!(live.try_wait().expect("a child").is_none(), "ended by itself");
     }
@@ -191,6 +191,87 @@ fn a_recording_of_a_killed_run_opens_with_all_but_its_last_chunk() {
             packets += some.len();
         }
     }
-    // Four of the six megabytes at least: a chunk has less than one, and a second is flushed.
-    assert!(packets * 1206 > 4_000_000, "{packets} packets");
+    // Eight of the twelve megabytes at least: a chunk has little more than four, and a second is flushed.
+    assert!(packets * 1206 > 8_000_000, "{packets} packets");
+}
+
+#[test]
+fn a_check_says_who_is_silent_and_ends_with_code_1() {
+    let port = std::net::UdpSocket::bind("0.0.0.0:0").expect("a port").local_addr().expect("bound").port();
+    let port = port.min(u16::MAX - 1).to_string();
+    let output = umbracast(&["check", "--port", &port, "--seconds", "0.2"]).output().expect("starts");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let expected = format!("lidar_east: silent: expected packets on UDP port {port}, found none");
+    assert!(said.lines().count() == 2 && said.starts_with(&expected), "{said}");
+}
+
+/// The next line of the log that is of this event.
+fn told(log: &mut impl BufRead, event: &str) -> serde_json::Value {
+    loop {
+        let mut line = String::new();
+        assert!(log.read_line(&mut line).expect("reads") > 0, "ended before {event}");
+        let value: serde_json::Value = serde_json::from_str(&line).unwrap_or_else(|e| panic!("{e}: {line}"));
+        if value["event"] == event {
+            return value;
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_site_file_read_again_moves_access_points_and_loses_nobody() {
+    let folder = folder("reload");
+    let (site, records) = (folder.join("hall.toml"), folder.join("records"));
+    let text = |path: &Path| path.to_str().expect("a plain name").to_owned();
+    let door = "[[site.access_points]]\nname = \"door\"\nposition_m = [10.0, 0.0, 2.0]\n";
+    fs::write(&site, "").expect("writes");
+    let mut live = umbracast(&["live", "--demo", "--people", "3", "--no-serve", "--log", "json"])
+        .args(["--site", &text(&site), "--record", &text(&records)])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    let mut log = BufReader::new(live.stderr.take().expect("piped"));
+    let hang_up = || {
+        let pid = live.id().to_string();
+        assert!(Command::new("kill").args(["-HUP", &pid]).status().expect("kill").success());
+    };
+    assert!(told(&mut log, "file")["text"].as_str().expect("a text").contains("records"));
+    std::thread::sleep(std::time::Duration::from_secs(2)); // People are followed by then.
+    for (wrong, why) in [
+        ("[site.hall]\nlength_m = \"long\"", "expected a number"),
+        (
+            "[[site.sensors]]\nname = \"one\"\nposition_m = [0.0, 0.0, 3.0]\nrotation_deg = { yaw = 0.0, pitch = 9.0, roll = 0.0 }",
+            "site.sensors",
+        ),
+    ] {
+        fs::write(&site, wrong).expect("writes");
+        hang_up();
+        // The same is said once in ten seconds, so the second is only counted.
+        if why == "expected a number" {
+            let failed = told(&mut log, "reload_failed");
+            assert!(failed["text"].as_str().expect("a text").contains(why), "{failed}");
+        }
+        std::thread::sleep(std::time::Duration::from_millis(300));
+    }
+    fs::write(&site, door).expect("writes");
+    hang_up();
+    told(&mut log, "reload");
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    let pid = live.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().expect("kill").success());
+    assert!(live.wait().expect("ends").code().is_some_and(|code| code == 0 || code == 3));
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(&records).expect("records").flatten().map(|e| e.path()).collect();
+    files.sort();
+    assert_eq!(files.len(), 2, "a file for each configuration: {files:?}");
+    let followed = |file: &Path, names: &[String]| -> std::collections::BTreeSet<u64> {
+        recorded::<TrackRow>(file, names).iter().filter(|row| row.confirmed).map(|row| row.track).collect()
+    };
+    let before = followed(&files[0], &["side".to_owned(), "centre".to_owned()]);
+    let after = followed(&files[1], &["door".to_owned()]);
+    assert!(!before.is_empty() && before.is_subset(&after), "{before:?} are followed on: {after:?}");
+    let links = recorded::<LinkRow>(&files[1], &["door".to_owned()]);
+    assert!(!links.is_empty() && links.iter().all(|link| link.access_point == 0), "links of the door alone");
 }

@@ -25,6 +25,9 @@ use crate::rows::{PeopleLinkRow, PeopleRow};
 use crate::wire::{self, WireRow};
 
 const CONFIG_TOPIC: &str = "/umbracast/config";
+/// A chunk of what goes on for hours, at most, bytes: a second of two HDL-32E. The index of the file, some 250 bytes a
+/// chunk, stays in memory until the file ends, so chunks should be few.
+const LIVE_CHUNK_BYTES: u64 = 4 << 20;
 
 /// Writes a recording, in chunks of a frame or two.
 pub struct RecordingWriter {
@@ -55,7 +58,8 @@ impl RecordingWriter {
     /// # Errors
     /// A file that cannot be written.
     pub fn create_live(path: &Path, config_toml: &str, site: &Site) -> Result<Self, Error> {
-        Self::create_with(mcap::WriteOptions::new().disable_seeking(true), path, config_toml, site, false)
+        let options = mcap::WriteOptions::new().disable_seeking(true).chunk_size(Some(LIVE_CHUNK_BYTES));
+        Self::create_with(options, path, config_toml, site, false)
     }
 
     fn create_with(

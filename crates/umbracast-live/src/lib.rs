@@ -18,7 +18,9 @@ pub mod receive;
 pub mod published;
 pub mod record;
 pub mod run;
+pub mod log;
 pub mod send;
+pub mod check;
 #[cfg(feature = "serve")]
 pub mod serve;
 

@@ -1,9 +1,10 @@
 //! What leaves the pipeline of one frame: the rows that tables have, the points that are drawn, and how old it is.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use umbracast::{Frame, Health, Outcome};
+use umbracast::{Frame, Health, Outcome, Site};
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::wire;
 
@@ -41,11 +42,15 @@ pub struct Published {
     pub frames_skipped: u64,
     /// For each sensor, whether it gave anything to this frame.
     pub sensors: Vec<bool>,
+    /// The names of the site's access points.
+    pub access_points: Arc<[String]>,
+    /// How often the site file was read again.
+    pub reloads: u64,
 }
 
 impl Published {
     /// The rows and points of a frame's outcome, and which of the site's `sensors` gave to it.
-    pub fn of(outcome: &Outcome, frame: &Frame, sensors: usize) -> Self {
+    pub fn of(outcome: &Outcome, frame: &Frame, sensors: usize, access_points: &Arc<[String]>) -> Self {
         let (mut tracks, mut links) = (Vec::new(), Vec::new());
         rows::of_outcome(0, outcome, &mut tracks, &mut links);
         let every = outcome.foreground.len().div_ceil(POINTS_DRAWN).max(1);
@@ -61,13 +66,15 @@ impl Published {
                 .collect(),
             health: outcome.health,
             sensors: (0..sensors).map(|s| frame.scans.iter().any(|scan| scan.sensor == s)).collect(),
+            access_points: access_points.clone(),
             ..Self::default()
         }
     }
 
     /// As the page, `curl` and every client get it. Names are those of the tables.
-    pub fn json(&self, access_points: &[String], with_points: bool) -> Value {
+    pub fn json(&self, with_points: bool) -> Value {
         let ms = |time: Duration| (time.as_secs_f64() * 1e6).round() / 1e3;
+        let access_points = &self.access_points;
         let mut value = json!({
             "frame": self.frame,
             "time_ns": self.time_ns,
@@ -75,15 +82,21 @@ impl Published {
             "latency_ms": ms(self.latency),
             "step_ms": ms(self.step),
             "frames_skipped": self.frames_skipped,
+            "reloads": self.reloads,
             "sensors": self.sensors,
             "health": self.health,
             "tracks": self.tracks.iter().map(|&row| wire::json(row, access_points)).collect::<Vec<_>>(),
             "blockages": self.links.iter().map(|&row| wire::json(row, access_points)).collect::<Vec<_>>(),
-            "events": self.events.iter().map(|event| event.json(access_points)).collect::<Vec<_>>(),
+            "events": self.events.iter().map(|event| event.json()).collect::<Vec<_>>(),
         });
         if with_points {
             value["points_cm"] = json!(self.points_cm.as_flattened());
         }
         value
     }
+}
+
+/// The names of a site's access points, as every frame carries them.
+pub fn access_points(site: &Site) -> Arc<[String]> {
+    site.access_points.iter().map(|ap| ap.name.clone()).collect()
 }

@@ -21,7 +21,7 @@ const SOCKET_BUFFER_BYTES: usize = 4 << 20;
 /// How long a stop may go unnoticed.
 const WAKE: Duration = Duration::from_millis(100);
 /// No sensor's packet is longer: the largest Ouster's has 33 kB. Longer ones are cut here, and not understood later.
-const LONGEST_BYTES: usize = 33_280;
+pub(crate) const LONGEST_BYTES: usize = 33_280;
 
 /// Where a sensor's packets come in.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -98,13 +98,34 @@ impl Receivers {
         self.strangers.load(Ordering::Relaxed)
     }
 
-    /// Ends every thread.
-    pub fn stop(self) {
+    /// Packets that the system gave up because nobody read them in time, since the sockets were opened; `None` where it
+    /// does not say (it does on Linux).
+    pub fn dropped_by_system(&self) -> Option<u64> {
+        let table = std::fs::read_to_string("/proc/net/udp").ok()?;
+        let ports: Vec<u16> = self.bound.iter().map(SocketAddr::port).collect();
+        Some(dropped(&table, &ports))
+    }
+
+    /// Ends every thread, and closes the sockets with it.
+    pub fn stop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        for thread in self.threads {
+        for thread in self.threads.drain(..) {
             let _ = thread.join(); // A receiver does not panic; if one did, the others end all the same.
         }
     }
+}
+
+/// The last column of `/proc/net/udp`, of sockets that are bound to these ports of every address: `local_address` is the
+/// second, in hexadecimal numbers.
+fn dropped(table: &str, ports: &[u16]) -> u64 {
+    let of_line = |line: &str| {
+        let mut columns = line.split_whitespace();
+        let (address, port) = columns.nth(1)?.split_once(':')?;
+        let port = u16::from_str_radix(port, 16).ok()?;
+        let own = address == "00000000" && ports.contains(&port);
+        if own { columns.last()?.parse::<u64>().ok() } else { None }
+    };
+    table.lines().skip(1).filter_map(of_line).sum()
 }
 
 fn told_apart(port: u16, doors: &[Door]) -> Result<(), Error> {
@@ -120,7 +141,7 @@ fn told_apart(port: u16, doors: &[Door]) -> Result<(), Error> {
     Ok(())
 }
 
-fn bind(port: u16) -> std::io::Result<UdpSocket> {
+pub(crate) fn bind(port: u16) -> std::io::Result<UdpSocket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
     socket.set_recv_buffer_size(SOCKET_BUFFER_BYTES)?;
     socket.bind(&SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).into())?;
@@ -174,7 +195,7 @@ mod tests {
         // A free port is known once it is bound: bound twice here, the second time with both sensors on it.
         let port = UdpSocket::bind("0.0.0.0:0").unwrap().local_addr().unwrap().port();
         let doors = [door(0, port, Some([127, 0, 0, 2])), door(1, port, Some([127, 0, 0, 3]))];
-        let receivers = Receivers::start(&doors, HostClock::start(), &packets).unwrap();
+        let mut receivers = Receivers::start(&doors, HostClock::start(), &packets).unwrap();
         for last in [3, 2, 9] {
             let sender = UdpSocket::bind(SocketAddr::from(([127, 0, 0, last], 0))).unwrap();
             sender.send_to(&[last; 5], ("127.0.0.1", port)).unwrap();
@@ -186,6 +207,20 @@ mod tests {
             std::thread::yield_now();
         }
         receivers.stop();
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_the_system_gives_up_is_counted() {
+        let socket = bind(0).unwrap();
+        let port = socket.local_addr().unwrap().port();
+        let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+        // Twice of what the system may hold for it, and nobody reads.
+        for _ in 0..2 * SOCKET_BUFFER_BYTES / 1206 {
+            sender.send_to(&[7; 1206], ("127.0.0.1", port)).unwrap();
+        }
+        let table = std::fs::read_to_string("/proc/net/udp").unwrap();
+        assert!(dropped(&table, &[port]) > 100 && dropped(&table, &[]) == 0, "{table}");
     }
 
     #[test]

@@ -43,6 +43,8 @@ pub struct RecordSettings {
 pub struct RecordStatus {
     /// Files begun.
     pub files: u64,
+    /// The one that was begun last.
+    pub newest: Option<String>,
     /// Bytes of packets and results handed to the disk.
     pub bytes: u64,
     /// Packets and results that came while the queue was full or the disk failed.
@@ -52,6 +54,8 @@ pub struct RecordStatus {
 }
 
 enum Item {
+    /// Another configuration from now on: a file of its own.
+    Config(Box<Config>),
     Packet(Arrived),
     Result(Arc<Published>),
 }
@@ -107,6 +111,11 @@ impl Recorder {
         self.queue.push(Item::Result(published));
     }
 
+    /// Another configuration of the same sensors, in a new file.
+    pub fn take_over(&self, config: &Config) {
+        self.queue.push(Item::Config(Box::new(config.clone())));
+    }
+
     /// True while its thread works.
     pub fn is_well(&self) -> bool {
         !self.thread.is_finished()
@@ -158,6 +167,10 @@ impl Files {
 
     fn take(&mut self, item: Item) {
         match item {
+            Item::Config(config) => {
+                self.close();
+                self.config = *config;
+            }
             Item::Packet(Arrived { sensor, packet }) => {
                 let start_ns = *self.batch_start_ns.get_or_insert(packet.time_ns);
                 if packet.time_ns - start_ns >= STEP_NS {
@@ -252,6 +265,7 @@ impl Files {
             let writer = begun.inspect_err(|_| {
                 let _ = fs::remove_file(&path);
             })?;
+            self.status.newest = Some(path.display().to_string());
             self.ours.push_back(path);
             self.make_room();
             self.status.files += 1;

@@ -1,7 +1,7 @@
 //! The whole of a live run: receive, assemble, step, publish, record. One thread each, a queue between.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -11,11 +11,11 @@ use umbracast::{Config, Error, Frame, Health, Pipeline};
 
 use crate::clock::HostClock;
 use crate::latency::Latencies;
-use crate::published::Published;
+use crate::published::{self, Published};
 use crate::queue::{Queue, WhenFull};
 use crate::receive::{Arrived, Door, Receivers};
 use crate::record::{RecordSettings, RecordStatus, Recorder};
-use crate::warnings::Warnings;
+use crate::warnings::{Event, Warnings};
 
 /// Packets that wait for the assembler: a second of four HDL-32E.
 const PACKETS_WAITING: usize = 8192;
@@ -49,10 +49,13 @@ pub struct Live {
     receivers: Receivers,
     packets: Arc<Queue<Arrived>>,
     frames: Arc<Queue<Closed>>,
-    assembling: JoinHandle<()>,
-    stepping: JoinHandle<()>,
+    /// The threads; none once they have ended.
+    assembling: Option<JoinHandle<()>>,
+    stepping: Option<JoinHandle<()>>,
     recorder: Option<Arc<Recorder>>,
     counters: Arc<Counters>,
+    /// What the pipeline takes over before its next frame.
+    next: Arc<Mutex<Option<Config>>>,
 }
 
 /// What is counted while it runs, for `/metrics` and the summary.
@@ -60,6 +63,10 @@ pub struct Live {
 pub struct Counters {
     /// Packets that came from sensors.
     pub packets: AtomicU64,
+    /// The same of each.
+    pub of_sensors: Mutex<Vec<u64>>,
+    /// Packets that the system gave up before they were received, as of the last [`Live::summary`].
+    pub dropped_by_system: AtomicU64,
     /// Frames that were published.
     pub frames: AtomicU64,
     /// From the packet before the one that closed a frame to its results.
@@ -75,15 +82,19 @@ pub struct Counters {
 impl Counters {
     /// How the recorder does now.
     pub fn recorder(&self) -> RecordStatus {
-        self.recorder.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        lock(&self.recorder).clone()
     }
 }
 
 /// A run's account.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Summary {
     /// Packets that came from sensors.
     pub packets: u64,
+    /// The same of each sensor.
+    pub of_sensors: Vec<u64>,
+    /// Packets that the system gave up because nobody received them in time.
+    pub dropped_by_system: u64,
     /// Packets given up because the assembler was busy.
     pub packets_lost: u64,
     /// Packets from addresses that no sensor has.
@@ -134,15 +145,33 @@ impl Live {
             })
         };
         let sensors = config.site.sensors.len();
+        *lock(&counters.of_sensors) = vec![0; sensors];
+        let next = Arc::new(Mutex::new(None));
         let stepping = {
             let (frames, recorder, counters) = (frames.clone(), recorder.clone(), counters.clone());
-            std::thread::spawn(move || {
-                let publish =
-                    Publish { clock, sensors, recorder, counters, listener, warnings: Warnings::default() };
-                step(pipeline, &frames, publish);
-            })
+            let publish = Publish {
+                clock,
+                sensors,
+                recorder,
+                counters,
+                listener,
+                warnings: Warnings::default(),
+                access_points: published::access_points(&config.site),
+                reloads: 0,
+                next: next.clone(),
+                left: Vec::new(),
+            };
+            std::thread::spawn(move || step(pipeline, &frames, publish))
         };
-        Ok(Self { receivers, packets, frames, assembling, stepping, recorder, counters })
+        let (assembling, stepping) = (Some(assembling), Some(stepping));
+        Ok(Self { receivers, packets, frames, assembling, stepping, recorder, counters, next })
+    }
+
+    /// Another configuration of the same sensors from the next frame on: access points, UE and stage 3 are taken over
+    /// ([`Pipeline::take_over_links`]), nobody is lost, and a recording goes on in a new file. Whoever calls it sees that
+    /// nothing else differs: [`needs_restart`].
+    pub fn take_over(&self, config: Config) {
+        *lock(&self.next) = Some(config);
     }
 
     /// The sockets.
@@ -153,32 +182,70 @@ impl Live {
     /// True while every thread works. One that does not is a bug: then everything had better end and be started anew.
     pub fn is_well(&self) -> bool {
         let recording = self.recorder.as_ref().is_none_or(|recorder| recorder.is_well());
-        recording && !self.assembling.is_finished() && !self.stepping.is_finished()
+        let works =
+            |thread: &Option<JoinHandle<()>>| thread.as_ref().is_some_and(|thread| !thread.is_finished());
+        recording && works(&self.assembling) && works(&self.stepping)
+    }
+
+    /// How it goes.
+    pub fn summary(&self) -> Summary {
+        self.count_dropped();
+        let counters = &self.counters;
+        Summary {
+            packets: counters.packets.load(Ordering::Relaxed),
+            of_sensors: lock(&counters.of_sensors).clone(),
+            dropped_by_system: counters.dropped_by_system.load(Ordering::Relaxed),
+            packets_lost: self.packets.lost(),
+            strangers: self.receivers.strangers(),
+            frames: counters.frames.load(Ordering::Relaxed),
+            frames_skipped: self.frames.lost(),
+            latencies: lock(&counters.latencies).clone(),
+            steps: lock(&counters.steps).clone(),
+            health: *lock(&counters.health),
+            recorded: counters.recorder(),
+        }
+    }
+
+    /// What the system says of the sockets; it forgets it when they are closed.
+    fn count_dropped(&self) {
+        let dropped = self.receivers.dropped_by_system().unwrap_or(0);
+        self.counters.dropped_by_system.fetch_max(dropped, Ordering::Relaxed);
     }
 
     /// Ends in the order of the data, so that what has come is finished, published and recorded.
-    pub fn stop(self) -> Summary {
-        let strangers = self.receivers.strangers();
+    pub fn stop(mut self) -> Summary {
+        let ended = |thread: &mut Option<JoinHandle<()>>| thread.take().map(JoinHandle::join);
+        self.count_dropped();
         self.receivers.stop();
         self.packets.close();
-        let _ = self.assembling.join();
+        let _ = ended(&mut self.assembling);
         self.frames.close(); // Also where the assembler panicked: the pipeline must not wait for it.
-        let _ = self.stepping.join();
-        let recorded = self.recorder.and_then(Arc::into_inner).map(Recorder::stop).unwrap_or_default();
-        let of =
-            |latencies: &Mutex<Latencies>| latencies.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        Summary {
-            packets: self.counters.packets.load(Ordering::Relaxed),
-            packets_lost: self.packets.lost(),
-            strangers,
-            frames: self.counters.frames.load(Ordering::Relaxed),
-            frames_skipped: self.frames.lost(),
-            latencies: of(&self.counters.latencies),
-            steps: of(&self.counters.steps),
-            health: *self.counters.health.lock().unwrap_or_else(PoisonError::into_inner),
-            recorded,
-        }
+        let _ = ended(&mut self.stepping);
+        let recorded = self.recorder.take().and_then(Arc::into_inner).map(Recorder::stop).unwrap_or_default();
+        Summary { recorded, ..self.summary() }
     }
+}
+
+/// What of `new` a run of `old` cannot take over while it goes on, by key; empty where it can take over all.
+pub fn needs_restart(old: &Config, new: &Config) -> Vec<&'static str> {
+    let (a, b) = (&old.site, &new.site);
+    let differs = [
+        ("mode", old.mode != new.mode),
+        ("site.name", a.name != b.name),
+        ("site.hall", a.hall != b.hall),
+        ("site.pillars", a.pillars != b.pillars),
+        ("site.furniture", a.furniture != b.furniture),
+        ("site.sensors", a.sensors != b.sensors),
+        ("detect", old.detect != new.detect),
+        ("track", old.track != new.track),
+        ("forecast", old.forecast != new.forecast),
+    ];
+    differs.into_iter().filter(|(_, differs)| *differs).map(|(key, _)| key).collect()
+}
+
+/// What a thread that panicked left is whole: every change is one assignment.
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Packets to frames. Stamps are made strictly increasing, so that a recording, which keeps a list for each sensor,
@@ -194,6 +261,9 @@ fn assemble(
     let mut before_ns = i64::MIN;
     while let Some(mut arrived) = packets.pop() {
         counters.packets.fetch_add(1, Ordering::Relaxed);
+        if let Some(count) = lock(&counters.of_sensors).get_mut(arrived.sensor) {
+            *count += 1;
+        }
         let came_ns = arrived.packet.time_ns.max(before_ns.saturating_add(1));
         arrived.packet.time_ns = came_ns;
         assembler.push(arrived.sensor, &arrived.packet, &mut health);
@@ -220,17 +290,25 @@ struct Publish {
     counters: Arc<Counters>,
     listener: Listener,
     warnings: Warnings,
+    access_points: Arc<[String]>,
+    reloads: u64,
+    next: Arc<Mutex<Option<Config>>>,
+    /// What happened to links that are no more, told with the next frame.
+    left: Vec<Event>,
 }
 
 fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
     while let Some(Closed { frame, arrived_ns, health }) = frames.pop() {
+        publish.take_over(&mut pipeline);
         let begun_ns = publish.clock.now_ns();
         let outcome = pipeline.step(&frame);
         let stepped_ns = publish.clock.now_ns();
-        let mut published = Published::of(outcome, &frame, publish.sensors);
+        let mut published = Published::of(outcome, &frame, publish.sensors, &publish.access_points);
         published.health.add(&health);
         published.frames_skipped = frames.lost();
-        published.events = publish.warnings.changes(&published.links);
+        published.reloads = publish.reloads;
+        published.events = std::mem::take(&mut publish.left);
+        published.events.extend(publish.warnings.changes(&published.links, &publish.access_points));
         published.step = Duration::from_nanos((stepped_ns - begun_ns).max(0) as u64);
         published.published_ns = publish.clock.now_ns();
         published.latency = Duration::from_nanos((published.published_ns - arrived_ns).max(0) as u64);
@@ -239,12 +317,25 @@ fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
 }
 
 impl Publish {
+    /// The configuration that waits, if one does.
+    fn take_over(&mut self, pipeline: &mut Pipeline) {
+        let Some(config) = lock(&self.next).take() else { return };
+        pipeline.take_over_links(&config);
+        let after = published::access_points(&config.site);
+        self.left = self.warnings.rename(&self.access_points, &after);
+        self.access_points = after;
+        self.reloads += 1;
+        if let Some(recorder) = &self.recorder {
+            recorder.take_over(&config);
+        }
+    }
+
     fn out(&self, published: Published) {
         let counters = &self.counters;
         counters.frames.fetch_add(1, Ordering::Relaxed);
-        counters.latencies.lock().unwrap_or_else(PoisonError::into_inner).add(published.latency);
-        counters.steps.lock().unwrap_or_else(PoisonError::into_inner).add(published.step);
-        *counters.health.lock().unwrap_or_else(PoisonError::into_inner) = published.health;
+        lock(&counters.latencies).add(published.latency);
+        lock(&counters.steps).add(published.step);
+        *lock(&counters.health) = published.health;
         let published = Arc::new(published);
         (self.listener)(&published);
         if let Some(recorder) = &self.recorder {

@@ -2,16 +2,24 @@
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
 
 use umbracast::lidar::Packet;
-use umbracast::{Error, STEP_NS};
+use umbracast::{Error, STEP_NS, Site};
+use umbracast_sim::crowd::{Crowd, Stroll};
 use umbracast_sim::scene::{Scene, SceneFrame};
+use umbracast_sim::sensor::Sensors;
 
 use crate::clock::HostClock;
 use crate::receive::Arrived;
 
 /// From a packet to the next one of the same recording.
 const SAME_PACE_NS: std::ops::Range<i64> = -STEP_NS..100 * STEP_NS;
+
+/// People who stroll are simulated so far at a time: their ways take some 60 kB a person and leg, twice.
+const LEG_S: u64 = 30;
+/// Frames.
+const STEPS_PER_S: i64 = 1_000_000_000 / STEP_NS;
 
 /// What was sent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -71,6 +79,36 @@ pub fn send(
 /// The packets of a simulated scene in the order in which they are sent.
 pub fn simulated(mut scene: Scene) -> impl Iterator<Item = Arrived> {
     std::iter::from_fn(move || scene.next_frame()).flat_map(in_order)
+}
+
+/// The packets of people who stroll for good, from frame `first` on. A thread draws up the next leg of their way while
+/// they walk this one, so that nobody waits for it; it ends when the packets are wanted no more.
+pub fn strolling(
+    mut stroll: Stroll,
+    site: Site,
+    sensors: Sensors,
+    seed: u64,
+    first: u64,
+) -> impl Iterator<Item = Arrived> {
+    let (legs, next_leg) = mpsc::sync_channel(0);
+    let nobody = Crowd { trajectories: Vec::new(), duration_ns: 0 };
+    let mut scene = Scene::in_hall(nobody, &site, &sensors, seed).starting_at(first);
+    std::thread::spawn(move || {
+        for leg in 0.. {
+            let begins_ns = (first as i64 + leg * LEG_S as i64 * STEPS_PER_S) * STEP_NS;
+            let scene = Scene::truth_only(stroll.leg(LEG_S).later(begins_ns), &site, seed);
+            if legs.send(scene).is_err() {
+                break;
+            }
+        }
+    });
+    let frames = std::iter::from_fn(move || {
+        scene.next_frame().or_else(|| {
+            scene.go_on(next_leg.recv().ok()?);
+            scene.next_frame()
+        })
+    });
+    frames.flat_map(in_order)
 }
 
 fn in_order(frame: SceneFrame) -> Vec<Arrived> {

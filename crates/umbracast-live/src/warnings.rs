@@ -20,8 +20,10 @@ pub enum State {
 }
 
 /// A change of one link.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Event {
+    /// The access point's name.
+    pub access_point: String,
     /// The link, with its probabilities and quantiles.
     pub link: LinkRow,
     /// What it is from now on.
@@ -55,30 +57,54 @@ impl State {
 impl Warnings {
     /// The links that are something else than in the frame before. A link is clear before its first frame; one that was
     /// not when its track ended is gone, with the row that it had.
-    pub fn changes(&mut self, links: &[LinkRow]) -> Vec<Event> {
+    pub fn changes(&mut self, links: &[LinkRow], access_points: &[String]) -> Vec<Event> {
+        let event = |link: LinkRow, state| Event::of(link, state, access_points);
         let mut now = BTreeMap::new();
         let mut events = Vec::new();
         for &link in links {
             let (key, state) = ((link.access_point, link.track), State::of(&link));
             if self.0.remove(&key).map_or(State::Clear, |(before, _)| before) != state {
-                events.push(Event { link, state });
+                events.push(event(link, state));
             }
             now.insert(key, (state, link));
         }
         let gone = self.0.values().filter(|(before, _)| *before != State::Clear);
-        events.extend(gone.map(|&(_, link)| Event { link, state: State::Gone }));
+        events.extend(gone.map(|&(_, link)| event(link, State::Gone)));
         self.0 = now;
+        events
+    }
+
+    /// Other access points from now on: what a link was goes with its access point's name. Links of names that are no
+    /// more are gone.
+    pub fn rename(&mut self, before: &[String], after: &[String]) -> Vec<Event> {
+        let mut events = Vec::new();
+        for ((index, track), (state, link)) in std::mem::take(&mut self.0) {
+            let name = before.get(index as usize);
+            match after.iter().position(|other| Some(other) == name) {
+                Some(place) => {
+                    let link = LinkRow { access_point: place as u32, ..link };
+                    self.0.insert((place as u32, track), (state, link));
+                }
+                None if state != State::Clear => events.push(Event::of(link, State::Gone, before)),
+                None => {}
+            }
+        }
         events
     }
 }
 
 impl Event {
+    fn of(link: LinkRow, state: State, access_points: &[String]) -> Self {
+        let access_point = access_points.get(link.access_point as usize).cloned().unwrap_or_default();
+        Self { access_point, link, state }
+    }
+
     /// As events are sent.
-    pub fn json(&self, access_points: &[String]) -> Value {
-        let Self { link, state } = self;
+    pub fn json(&self) -> Value {
+        let Self { access_point, link, state } = self;
         json!({
             "event": state.name(),
-            "access_point": access_points.get(link.access_point as usize),
+            "access_point": access_point,
             "track": link.track,
             "frame": link.frame,
             "time_ns": link.time_ns,
@@ -108,7 +134,7 @@ mod tests {
         let said: Vec<Vec<&str>> = frames
             .iter()
             .map(|&(now, soon)| {
-                warnings.changes(&[link(now, soon)]).iter().map(|event| event.state.name()).collect()
+                warnings.changes(&[link(now, soon)], &[]).iter().map(|event| event.state.name()).collect()
             })
             .collect();
         assert_eq!(said, [vec![], vec!["warning"], vec![], vec!["blocked"], vec!["clear"]]);
@@ -117,10 +143,23 @@ mod tests {
     #[test]
     fn a_link_whose_track_ends_is_gone_and_begins_anew() {
         let mut warnings = Warnings::default();
-        assert_eq!(warnings.changes(&[link(false, true)]).len(), 1);
-        let gone = warnings.changes(&[]);
+        assert_eq!(warnings.changes(&[link(false, true)], &[]).len(), 1);
+        let gone = warnings.changes(&[], &[]);
         assert_eq!((gone[0].state, gone[0].link.track), (State::Gone, 5));
-        assert!(warnings.changes(&[]).is_empty(), "said once");
-        assert_eq!(warnings.changes(&[link(false, true)])[0].state, State::Warned);
+        assert!(warnings.changes(&[], &[]).is_empty(), "said once");
+        assert_eq!(warnings.changes(&[link(false, true)], &[])[0].state, State::Warned);
+    }
+
+    #[test]
+    fn other_access_points_keep_what_their_links_were_by_name() {
+        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let (before, after) = (names(&["side", "centre"]), names(&["door", "side"]));
+        let of = |access_point: u32| LinkRow { access_point, ..link(false, true) };
+        let mut warnings = Warnings::default();
+        assert_eq!(warnings.changes(&[of(0), of(1)], &before).len(), 2);
+        let gone = warnings.rename(&before, &after);
+        assert_eq!((gone.len(), gone[0].access_point.as_str(), gone[0].state), (1, "centre", State::Gone));
+        let events = warnings.changes(&[of(0), of(1)], &after);
+        assert_eq!((events.len(), events[0].access_point.as_str()), (1, "door"), "side is warned of already");
     }
 }

@@ -110,6 +110,13 @@ impl Scene {
         self
     }
 
+    /// Goes on with the people of `next`, whose time goes on where this scene's ends: sensors, noise and the count of
+    /// frames are this scene's.
+    pub fn go_on(&mut self, next: Self) {
+        self.walkers = next.walkers;
+        self.frames = next.frames;
+    }
+
     /// The packets of `frames` revolutions in the hall without people: one list a frame, in it one a sensor.
     ///
     /// # Errors
@@ -222,6 +229,23 @@ mod tests {
         assert!(sent(0).iter().all(|&packets| packets > 170), "{:?}", sent(0));
         assert!(sent(1)[0] > 170 && (80..100).contains(&sent(1)[1]) && sent(1)[2] == 0, "{:?}", sent(1));
         assert!(Scene::empty(&site, 7, 3).unwrap().iter().all(|packets| packets[1].len() > 170));
+    }
+
+    #[test]
+    fn a_scene_that_goes_on_misses_no_packet() {
+        let site = Config::default().site;
+        let later = |by_s: i64| crowd().later(by_s * 1_000_000_000);
+        let mut scene = Scene::new(crowd(), &site, 7).unwrap();
+        let mut sent = Vec::new();
+        for by_s in [2, 4] {
+            sent.extend(std::iter::from_fn(|| scene.next_frame()));
+            scene.go_on(Scene::truth_only(later(by_s), &site, 7));
+        }
+        assert_eq!(sent.iter().map(|frame| frame.index).collect::<Vec<_>>(), (0..40).collect::<Vec<_>>());
+        assert!(sent.iter().all(|frame| frame.people.len() == 2));
+        let times_ns: Vec<i64> = sent.iter().flat_map(|frame| &frame.packets[0]).map(|p| p.time_ns).collect();
+        let longest_ns = times_ns.windows(2).map(|pair| pair[1] - pair[0]).max();
+        assert!(longest_ns < Some(1_000_000), "{longest_ns:?} between two packets");
     }
 
     #[test]

@@ -57,7 +57,7 @@ fn read(tokens: &[String], module: &mut Module) {
         if at(0) == "mod" && at(2) == ";" {
             module.children.push(at(1).to_owned());
             i += 3;
-        } else if at(0) == "use" {
+        } else if at(0) == "use" && at(1) != "<" {
             // `pub use` and `pub(crate) use` pass a name on and use nothing themselves.
             let passed_on = i > 0 && matches!(tokens[i - 1].as_str(), "pub" | ")");
             let mut found = Vec::new();

@@ -3,10 +3,18 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use umbracast::{Error, Mode};
 
 use super::{CrowdArgs, SiteArgs};
+
+/// `--log`
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LogForm {
+    // Variants without a description keep the help to a line an option.
+    Text,
+    Json,
+}
 
 /// `live`
 #[derive(Debug, Args)]
@@ -35,9 +43,26 @@ pub struct Live {
     /// sensors' own.
     #[arg(long, value_name = "PORT")]
     pub port: Option<u16>,
+    /// How the events of the run (a sensor gone, frames skipped, a disk that fails) are told on stderr: lines for people, or
+    /// a JSON object a line.
+    #[arg(long, default_value = "text", env = "UMBRACAST_LOG", value_name = "FORM")]
+    pub log: LogForm,
     /// End after so many seconds; default: on a signal.
     #[arg(long, value_name = "S", value_parser = positive)]
     pub seconds: Option<f64>,
+}
+
+/// `check`
+#[derive(Debug, Args)]
+pub struct Check {
+    #[command(flatten)]
+    pub site: SiteArgs,
+    /// Listen for so many seconds.
+    #[arg(long, default_value_t = 3.0, value_name = "S", value_parser = positive)]
+    pub seconds: f64,
+    /// UDP port of the site's first sensor; the others follow. Default: what the site file says, or its sensors' own.
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
+    pub port: Option<u16>,
 }
 
 /// `view`
@@ -85,6 +110,13 @@ pub struct PageArgs {
     /// token, in the environment variable UMBRACAST_TOKEN.
     #[arg(long, default_value = "127.0.0.1:8600", value_name = "HOST:PORT")]
     pub serve: SocketAddr,
+    /// Serve the page over TLS with this certificate (PEM, its issuers behind it); needs a program built with the feature
+    /// `tls`.
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    pub tls_cert: Option<PathBuf>,
+    /// The certificate's key (PEM).
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    pub tls_key: Option<PathBuf>,
     /// Serve no page.
     #[arg(long, conflicts_with = "serve")]
     pub no_serve: bool,

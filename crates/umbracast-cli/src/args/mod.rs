@@ -11,7 +11,7 @@ use umbracast_sim::crowd::Preset;
 
 mod live;
 
-pub use live::{Live, PageArgs, RecordArgs, ReplayPackets, View};
+pub use live::{Check, Live, LogForm, PageArgs, RecordArgs, ReplayPackets, View};
 
 /// Sees people with LiDARs, foresees where they walk, and tells which radio links they are about to block.
 #[derive(Debug, Parser)]
@@ -50,6 +50,8 @@ pub enum Command {
     Run(Run),
     /// Sensors in, warnings out: receives packets, runs all stages as frames close, serves a page, records.
     Live(Live),
+    /// Listen to the sensors of a site and say what is wrong with them, before the first person comes.
+    Check(Check),
     /// Watch a recording in the browser as if it were live.
     View(View),
     /// Send the packets of recordings again, at the pace they came.

@@ -9,18 +9,18 @@ use std::time::Duration;
 
 use umbracast::lidar::udp_port;
 use umbracast::site::Sensor;
-use umbracast::{Config, Error, Frame, Health, STEP_NS};
+use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_eval::run::chain::{self, CIRCLE_M};
+use umbracast_live::log::{Event, Form, Level, Log, Watch};
 use umbracast_live::receive::Door;
 use umbracast_live::record::RecordSettings;
-use umbracast_live::run::Counters;
+use umbracast_live::run::{Counters, needs_restart};
 use umbracast_live::send::{self, Sent};
 use umbracast_live::{HostClock, Live, Settings, Summary};
-use umbracast_sim::crowd;
-use umbracast_sim::scene::Scene;
+use umbracast_sim::crowd::Stroll;
 use umbracast_sim::sensor::Sensors;
 
-use crate::args::{self, Common, RecordArgs};
+use crate::args::{self, Common, LogForm, RecordArgs};
 use crate::ending::Ending;
 use crate::input;
 use crate::page::Page;
@@ -28,20 +28,21 @@ use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
 use crate::{say, signal};
 
-/// A demonstration's people walk so long before others take their place.
-const DEMO_S: u64 = 300;
+/// How often it is looked at how the run goes.
+const LOOK_NS: i64 = 1_000_000_000;
 /// How often the end may be asked for.
 const TICK: Duration = Duration::from_millis(50);
 
 /// Runs until the end is asked for, then says how it went.
 pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
-    let config = setup::config(args.mode, args.site.site.as_deref())?;
+    let mut config = setup::config(args.mode, args.site.site.as_deref())?;
     let asked = signal::asked_to_end()?;
+    let read_again = args.site.site.as_ref().map(|_| signal::asked_to_read_again()).transpose()?;
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
     let settings = Settings {
         weights: Some(setup::weights(args.weights.as_deref())?),
         empty: empty_frames(args, &config)?,
-        doors: doors(args, &config)?,
+        doors: doors(&config.site, args.port, args.demo)?,
         record: recorder(&args.record),
         config: config.clone(),
         clock,
@@ -58,14 +59,22 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
         .then(|| demonstration(args, &config, live.receivers().bound(), clock, &asked))
         .transpose()?;
     let watch = Stopwatch::start();
+    let names = config.site.sensors.iter().map(|sensor| sensor.name.clone()).collect();
+    let mut events = Events::new(args, common, clock, names);
+    events.tell(Event::new(Level::Info, "start", format!("{} begins", config.site.name)));
     while !asked.load(Ordering::Relaxed) && args.seconds.is_none_or(|seconds| watch.seconds() < seconds) {
         std::thread::sleep(TICK);
+        events.look(&live);
+        if read_again.as_ref().is_some_and(|again| again.swap(false, Ordering::Relaxed)) {
+            events.tell(reload(args, &mut config, &live, &page));
+        }
         if !live.is_well() {
             // What there is shall be finished all the same.
             live.stop();
             return Err(Error::new("a thread of the pipeline ended; this is a bug"));
         }
     }
+    events.tell(Event::new(Level::Info, "end", "it ends"));
     asked.store(true, Ordering::Relaxed);
     let sent = demo.and_then(|demo| demo.join().ok()).transpose()?;
     let summary = live.stop();
@@ -73,21 +82,75 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     Ok(tell(&summary, sent, &watch, common))
 }
 
+/// Reads the site file again and takes over what can be; whatever is wrong with it, the run goes on as it was.
+fn reload(args: &args::Live, config: &mut Config, live: &Live, page: &Page) -> Event {
+    let stays =
+        |told: String| Event::new(Level::Warn, "reload_failed", format!("{told}; all stays as it was"));
+    let new = match setup::config(args.mode, args.site.site.as_deref()) {
+        Ok(new) => new,
+        Err(error) => return stays(error.to_string()),
+    };
+    let apart = needs_restart(config, &new);
+    if !apart.is_empty() {
+        return stays(format!("what differs needs a restart: {}", apart.join(", ")));
+    }
+    page.take_over(&new.site);
+    live.take_over(new.clone());
+    *config = new;
+    Event::new(
+        Level::Info,
+        "reload",
+        "the site file was read again: access points, UE and stage 3 are as it says now",
+    )
+}
+
+/// What happens, told on stderr.
+struct Events {
+    watch: Watch,
+    log: Log,
+    clock: HostClock,
+    looked_ns: i64,
+    quiet: bool,
+}
+
+impl Events {
+    fn new(args: &args::Live, common: &Common, clock: HostClock, sensors: Vec<String>) -> Self {
+        let form = if args.log == LogForm::Json { Form::Json } else { Form::Text };
+        // Who asks for JSON has somebody who reads it.
+        let quiet = common.quiet && form == Form::Text;
+        Self { watch: Watch::new(sensors), log: Log::new(form), clock, looked_ns: clock.now_ns(), quiet }
+    }
+
+    /// Once a second.
+    fn look(&mut self, live: &Live) {
+        if self.clock.now_ns() - self.looked_ns >= LOOK_NS {
+            self.looked_ns += LOOK_NS;
+            self.watch.look(live.summary()).into_iter().for_each(|event| self.tell(event));
+        }
+    }
+
+    fn tell(&mut self, event: Event) {
+        if let Some(line) = self.log.line(&event, self.clock.now_ns()).filter(|_| !self.quiet) {
+            eprintln!("{line}");
+        }
+    }
+}
+
 /// Where each sensor's packets come in: as the site says, or on ports from `--port` on. A demonstration takes free
 /// ports: nobody is disturbed who listens already.
-fn doors(args: &args::Live, config: &Config) -> Result<Vec<Door>, Error> {
+pub fn doors(site: &Site, port: Option<u16>, demo: bool) -> Result<Vec<Door>, Error> {
     let door = |(number, sensor): (usize, &Sensor)| {
-        let counted = args.port.map(|first| if first == 0 { 0 } else { first.saturating_add(number as u16) });
-        let port = if args.demo { Some(0) } else { counted.or(udp_port(sensor)) };
+        let counted = port.map(|first| if first == 0 { 0 } else { first.saturating_add(number as u16) });
+        let port = if demo { Some(0) } else { counted.or(udp_port(sensor)) };
         let port = port.ok_or_else(|| {
             let (name, model) = (&sensor.name, &sensor.model);
             Error::new(format!("sensor {name:?}: expected a model that sends packets, found {model:?}"))
         })?;
-        // Ports that were counted, or are free, are each a sensor's own.
-        let from = sensor.address_bytes().filter(|_| !args.demo && args.port.is_none()).map(IpAddr::from);
+        // Simulated packets come from loopback, whatever the site file says.
+        let from = sensor.address_bytes().filter(|_| !demo).map(IpAddr::from);
         Ok(Door { sensor: number, port, from })
     };
-    config.site.sensors.iter().enumerate().map(door).collect()
+    site.sensors.iter().enumerate().map(door).collect()
 }
 
 fn recorder(args: &RecordArgs) -> Option<RecordSettings> {
@@ -124,22 +187,10 @@ fn demonstration(
     let to: Vec<SocketAddr> =
         to.iter().map(|at| SocketAddr::from((Ipv4Addr::LOCALHOST, at.port()))).collect();
     let sensors = Sensors::new(&site, seed)?;
+    let stroll = Stroll::new(preset, people, CIRCLE_M, seed);
     Ok(std::thread::spawn(move || {
-        let mut sent = Sent::default();
-        for seed in seed.. {
-            if stop.load(Ordering::Relaxed) {
-                break;
-            }
-            let first = send::frame_of_hour(clock.now_ns());
-            let crowd =
-                crowd::strolling(preset, people, CIRCLE_M, seed, DEMO_S).later(first as i64 * STEP_NS);
-            let scene = Scene::in_hall(crowd, &site, &sensors, seed).starting_at(first);
-            let more = send::send(send::simulated(scene), &to, 1.0, clock, &stop)?;
-            sent.packets += more.packets;
-            sent.failed += more.failed;
-            sent.latest_ns = sent.latest_ns.max(more.latest_ns);
-        }
-        Ok(sent)
+        let first = send::frame_of_hour(clock.now_ns());
+        send::send(send::strolling(stroll, site, sensors, seed, first), &to, 1.0, clock, &stop)
     }))
 }
 
@@ -148,6 +199,7 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
     let (latency, step) = (&summary.latencies, &summary.steps);
     let mut json = RunJson::new("live", watch)
         .with("packets", summary.packets)
+        .with("packets_dropped_by_system", summary.dropped_by_system)
         .with("packets_lost", summary.packets_lost)
         .with("packets_of_strangers", summary.strangers)
         .with("frames", summary.frames)
@@ -172,6 +224,7 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
     );
     json.print(common, &text);
     let lost = [
+        (summary.dropped_by_system, "packets given up by the system"),
         (summary.packets_lost, "packets given up"),
         (summary.strangers, "packets of no sensor's address"),
         (summary.frames_skipped, "frames skipped"),

@@ -8,6 +8,7 @@ pub mod evaluate;
 pub mod demo;
 pub mod inspect;
 pub mod live;
+pub mod check;
 pub mod replay;
 pub mod reproduce;
 pub mod run;

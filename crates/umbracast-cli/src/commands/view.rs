@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use umbracast::{Error, Health, Pipeline};
+use umbracast_live::published;
 use umbracast_live::run::Counters;
 use umbracast_live::warnings::Warnings;
 use umbracast_live::{HostClock, Published};
@@ -26,7 +27,7 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
     let asked = signal::asked_to_end()?;
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
     let page = Page::open(&args.page, &config.site, &counters, clock, &inputs[0].to_string())?;
-    let publish = page.listener();
+    let (publish, names) = (page.listener(), published::access_points(&config.site));
     let mut lost = Vec::new();
     loop {
         lost.clear(); // Another pass loses the same.
@@ -40,8 +41,8 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
             let told = input.frames(&config.site, &mut Health::default(), |frame| {
                 let (host_ns, frame_ns) = *first.get_or_insert((clock.now_ns(), frame.time_ns));
                 let outcome = pipeline.step(frame);
-                let mut published = Published::of(outcome, frame, config.site.sensors.len());
-                published.events = warnings.changes(&published.links);
+                let mut published = Published::of(outcome, frame, config.site.sensors.len(), &names);
+                published.events = warnings.changes(&published.links, &names);
                 clock.sleep_until(host_ns + ((frame.time_ns - frame_ns) as f64 / args.rate) as i64);
                 published.published_ns = clock.now_ns();
                 counters.frames.fetch_add(1, Ordering::Relaxed);

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use super::connections::Connections;
 use super::watched::Watched;
 use crate::latency::Latencies;
 use crate::published::Published;
@@ -15,7 +16,7 @@ use crate::published::Published;
 const BUCKETS_MS: [f64; 9] = [0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0];
 
 /// Everything that is counted.
-pub fn text(watched: &Watched, newest: &Published, streams: usize) -> String {
+pub fn text(watched: &Watched, newest: &Published, connections: &Connections) -> String {
     let mut out = String::new();
     let counters = &watched.counters;
     counter(
@@ -24,6 +25,16 @@ pub fn text(watched: &Watched, newest: &Published, streams: usize) -> String {
         "Packets of sensors.",
         counters.packets.load(Ordering::Relaxed) as f64,
     );
+    let dropped = counters.dropped_by_system.load(Ordering::Relaxed) as f64;
+    let what = "Packets that the system gave up because nobody received them in time.";
+    counter(&mut out, "packets_dropped_by_system_total", what, dropped);
+    head(&mut out, "sensor_packets_total", "Packets of each sensor.", "counter");
+    let of_sensors = counters.of_sensors.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    for (sensor, packets) in watched.site.sensors.iter().zip(of_sensors) {
+        // As Prometheus writes a label's value.
+        let name = sensor.name.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n");
+        let _ = writeln!(out, "umbracast_sensor_packets_total{{sensor=\"{name}\"}} {packets}");
+    }
     counter(&mut out, "frames_total", "Frames published.", counters.frames.load(Ordering::Relaxed) as f64);
     counter(
         &mut out,
@@ -34,7 +45,9 @@ pub fn text(watched: &Watched, newest: &Published, streams: usize) -> String {
     gauge(&mut out, "tracks", "People followed now.", newest.tracks.len() as f64);
     let state = |blocked: bool| newest.links.iter().filter(|link| link.blocked_now == blocked).count() as f64;
     gauge(&mut out, "links_blocked", "Links blocked now.", state(true));
-    gauge(&mut out, "streams", "Open WebSockets and event streams.", streams as f64);
+    gauge(&mut out, "streams", "Open WebSockets and event streams.", connections.streams() as f64);
+    let what = "Connections closed unheard because there were too many.";
+    counter(&mut out, "connections_refused_total", what, connections.refused() as f64);
     if let Ok(Value::Object(health)) = serde_json::to_value(newest.health) {
         for (name, value) in health {
             let what = "What was skipped, by the name that `health` has for it.";

@@ -15,12 +15,14 @@
 //! pipeline, which only leaves the newest frame here.
 
 mod watched;
+mod tls;
+mod connections;
 mod metrics;
 mod openapi;
 
 use std::net::{IpAddr, SocketAddr, TcpListener};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::path::PathBuf;
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
@@ -31,32 +33,31 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::get;
-use axum::{Json, Router};
+use axum::{Extension, Json, Router};
 use serde_json::{Value, json};
 use tokio::sync::{broadcast, oneshot, watch};
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::wrappers::errors::BroadcastStreamRecvError;
-use umbracast::Error;
+use umbracast::{Error, Site};
 
+use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
 use crate::warnings::Event;
+use tls::Tls;
 pub use watched::Watched;
 
 /// The page: HTML, style and script in one, nothing loaded from elsewhere.
 const PAGE: &str = include_str!("page.html");
-/// More WebSockets and event streams than this at once are refused.
-const STREAMS_MAX: usize = 64;
 /// Events that wait for a slow client; beyond it is told how many it missed.
 const EVENTS_WAITING: usize = 1024;
-/// A client that takes nothing for so long is let go.
-const PATIENCE: Duration = Duration::from_secs(5);
 /// Without a frame for so long, something is wrong.
 const STALE: Duration = Duration::from_secs(1);
 
 /// The server's thread, and where it listens.
 pub struct Server {
     address: SocketAddr,
+    site: Arc<RwLock<Site>>,
     newest: watch::Sender<Arc<Published>>,
     events: broadcast::Sender<Event>,
     stop: oneshot::Sender<()>,
@@ -74,7 +75,7 @@ impl Publisher {
     /// The newest frame.
     pub fn publish(&self, published: &Arc<Published>) {
         for event in &published.events {
-            let _ = self.events.send(*event); // Nobody listens: nobody misses it.
+            let _ = self.events.send(event.clone()); // Nobody listens: nobody misses it.
         }
         self.newest.send_replace(published.clone());
     }
@@ -82,18 +83,35 @@ impl Publisher {
 
 struct Shared {
     watched: Watched,
-    access_points: Vec<String>,
+    /// As the site file was last read.
+    site: Arc<RwLock<Site>>,
     newest: watch::Sender<Arc<Published>>,
     events: broadcast::Sender<Event>,
     token: Option<String>,
-    streams: AtomicUsize,
+    connections: Arc<Connections>,
+}
+
+/// Where it is served, and to whom.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Door {
+    /// Where it listens.
+    pub address: SocketAddr,
+    /// What clients must know.
+    pub token: Option<String>,
+    /// Files with the certificate and its key, PEM; without them it is served as it is.
+    pub tls: Option<(PathBuf, PathBuf)>,
 }
 
 /// Listens on an address. Others than loopback need a token: what is seen here is where people are.
 ///
 /// # Errors
-/// An address that is taken, or that others can reach without a token.
-pub fn start(address: SocketAddr, token: Option<String>, watched: Watched) -> Result<Server, Error> {
+/// An address that is taken, or that others can reach without a token; files that hold no certificate and its key.
+pub fn start(door: Door, watched: Watched) -> Result<Server, Error> {
+    start_with(Limits::default(), door, watched)
+}
+
+fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Error> {
+    let Door { address, token, tls } = door;
     if !address.ip().is_loopback() && token.is_none() {
         return Err(Error::new(format!(
             "{address}: expected a token (UMBRACAST_TOKEN) for an address that other hosts can reach, found none"
@@ -106,6 +124,7 @@ pub fn start(address: SocketAddr, token: Option<String>, watched: Watched) -> Re
     if !token.as_ref().is_none_or(plain) {
         return Err(Error::new("UMBRACAST_TOKEN: expected letters, digits, - . _ ~, found something else"));
     }
+    let tls = tls.map(|(cert, key)| Tls::open(&cert, &key)).transpose()?;
     let listener = TcpListener::bind(address).map_err(|e| Error::new(e.to_string()).within(address))?;
     let failed = |e: std::io::Error| Error::new(e.to_string()).within(address);
     listener.set_nonblocking(true).map_err(failed)?;
@@ -114,26 +133,21 @@ pub fn start(address: SocketAddr, token: Option<String>, watched: Watched) -> Re
     let newest = watch::Sender::new(Arc::new(Published::default()));
     let events = broadcast::Sender::new(EVENTS_WAITING);
     let (stop, stopped) = oneshot::channel();
-    let access_points = watched.site.access_points.iter().map(|ap| ap.name.clone()).collect();
+    let site = Arc::new(RwLock::new(watched.site.clone()));
     let (sender, event_sender) = (newest.clone(), events.clone());
-    let shared = Shared {
-        watched,
-        access_points,
-        newest: sender,
-        events: event_sender,
-        token,
-        streams: AtomicUsize::new(0),
-    };
+    let connections = Connections::new(limits);
+    let open = connections.clone();
+    let shared =
+        Shared { watched, site: site.clone(), newest: sender, events: event_sender, token, connections };
     let thread = std::thread::spawn(move || {
         runtime.block_on(async move {
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-            let serving =
-                std::future::IntoFuture::into_future(axum::serve(listener, router(Arc::new(shared))));
+            let serving = connections::serve(listener, tls, router(Arc::new(shared)), open);
             // Streams never end by themselves, so nobody is waited for.
-            tokio::select! { _ = serving => (), _ = stopped => () }
+            tokio::select! { () = serving => (), _ = stopped => () }
         });
     });
-    Ok(Server { address, newest, events, stop, thread })
+    Ok(Server { address, site, newest, events, stop, thread })
 }
 
 impl Server {
@@ -145,6 +159,11 @@ impl Server {
     /// For whoever makes frames.
     pub fn publisher(&self) -> Publisher {
         Publisher { newest: self.newest.clone(), events: self.events.clone() }
+    }
+
+    /// Another site from now on; frames tell that it was read again.
+    pub fn take_over(&self, site: &Site) {
+        *self.site.write().unwrap_or_else(PoisonError::into_inner) = site.clone();
     }
 
     /// Closes every connection.
@@ -172,7 +191,12 @@ fn router(shared: Arc<Shared>) -> Router {
 async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
     match refused(shared.token.as_deref(), &request) {
         Some(refusal) => refusal.into_response(),
-        None => next.run(request).await,
+        None => {
+            if let Some(guest) = request.extensions().get::<Guest>() {
+                guest.let_in();
+            }
+            next.run(request).await
+        }
     }
 }
 
@@ -216,7 +240,8 @@ async fn page() -> impl IntoResponse {
 }
 
 async fn site(State(shared): State<Arc<Shared>>) -> Json<Value> {
-    Json(json!({ "title": shared.watched.title, "site": shared.watched.site }))
+    let site = shared.site.read().unwrap_or_else(PoisonError::into_inner).clone();
+    Json(json!({ "title": shared.watched.title, "site": site }))
 }
 
 #[derive(serde::Deserialize)]
@@ -238,18 +263,20 @@ async fn frame(State(shared): State<Arc<Shared>>, Query(query): Query<FrameQuery
 
 async fn live(
     State(shared): State<Arc<Shared>>,
+    Extension(guest): Extension<Guest>,
     Query(query): Query<FrameQuery>,
     upgrade: WebSocketUpgrade,
 ) -> Response {
-    let Some(place) = Place::take(&shared) else { return full() };
+    let Some(place) = guest.stream() else { return full() };
     // Nothing is expected from a client but that it closes.
-    upgrade.max_message_size(4096).on_upgrade(move |socket| stream(socket, place, query.with_points()))
+    let upgrade = upgrade.max_message_size(4096);
+    upgrade.on_upgrade(move |socket| stream(socket, shared, place, query.with_points()))
 }
 
 /// Every frame that the client can take. A watch holds the newest only, so a slow one skips frames, and the others
 /// notice nothing.
-async fn stream(mut socket: WebSocket, place: Place, with_points: bool) {
-    let mut newest = place.0.newest.subscribe();
+async fn stream(mut socket: WebSocket, shared: Arc<Shared>, _place: Stream, with_points: bool) {
+    let mut newest = shared.newest.subscribe();
     newest.mark_changed();
     loop {
         tokio::select! {
@@ -258,9 +285,9 @@ async fn stream(mut socket: WebSocket, place: Place, with_points: bool) {
                     return;
                 }
                 let frame = newest.borrow_and_update().clone();
-                let text = place.0.frame_json(&frame, with_points).to_string();
-                let sent = tokio::time::timeout(PATIENCE, socket.send(Message::Text(text.into()))).await;
-                if !matches!(sent, Ok(Ok(()))) {
+                let text = shared.frame_json(&frame, with_points).to_string();
+                // Fails where the other end takes nothing: see `connections`.
+                if socket.send(Message::Text(text.into())).await.is_err() {
                     return;
                 }
             }
@@ -273,14 +300,12 @@ async fn stream(mut socket: WebSocket, place: Place, with_points: bool) {
     }
 }
 
-async fn events(State(shared): State<Arc<Shared>>) -> Response {
-    let Some(place) = Place::take(&shared) else { return full() };
+async fn events(State(shared): State<Arc<Shared>>, Extension(guest): Extension<Guest>) -> Response {
+    let Some(place) = guest.stream() else { return full() };
     let stream = BroadcastStream::new(shared.events.subscribe()).map(move |event| {
-        let shared = &place.0;
+        let _held = &place;
         Ok::<_, std::convert::Infallible>(match event {
-            Ok(event) => {
-                Sent::default().event(event.state.name()).data(event.json(&shared.access_points).to_string())
-            }
+            Ok(event) => Sent::default().event(event.state.name()).data(event.json().to_string()),
             Err(BroadcastStreamRecvError::Lagged(missed)) => {
                 Sent::default().event("missed").data(missed.to_string())
             }
@@ -311,13 +336,13 @@ async fn health(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
 
 async fn metrics_text(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
     let newest = shared.newest.borrow().clone();
-    let text = metrics::text(&shared.watched, &newest, shared.streams.load(Ordering::Relaxed));
+    let text = metrics::text(&shared.watched, &newest, &shared.connections);
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text)
 }
 
 impl Shared {
     fn frame_json(&self, published: &Published, with_points: bool) -> Value {
-        let mut value = published.json(&self.access_points, with_points);
+        let mut value = published.json(with_points);
         value["age_ms"] = json!(self.age(published).map(|age| age.as_millis() as u64));
         value
     }
@@ -329,23 +354,9 @@ impl Shared {
     }
 }
 
-/// One of the streams that may be open; given back when it ends, however it ends.
-struct Place(Arc<Shared>);
-
-impl Place {
-    fn take(shared: &Arc<Shared>) -> Option<Self> {
-        let open = shared.streams.fetch_add(1, Ordering::Relaxed);
-        let place = Self(shared.clone());
-        (open < STREAMS_MAX).then_some(place)
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        self.0.streams.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
 #[cfg(test)]
 #[path = "tests.rs"]
 mod tests;
+#[cfg(test)]
+#[path = "hostile_tests.rs"]
+mod hostile_tests;

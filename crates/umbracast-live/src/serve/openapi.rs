@@ -49,6 +49,7 @@ fn frame_schema() -> Value {
             "latency_ms": { "type": "number", "description": "From the packet before the one that closed the frame to its results." },
             "step_ms": { "type": "number", "description": "The stages alone." },
             "frames_skipped": { "type": "integer" },
+            "reloads": { "type": "integer", "description": "How often the site file was read again; then /api/site is another." },
             "sensors": { "type": "array", "items": { "type": "boolean" }, "description": "Which gave to this frame." },
             "health": { "type": "object", "description": "What was skipped since the start." },
             "tracks": list("Track"),

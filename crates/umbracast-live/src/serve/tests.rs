@@ -18,7 +18,7 @@ fn server(token: Option<&str>) -> (Server, HostClock) {
         title: "a test".to_owned(),
     };
     let address = SocketAddr::from(([127, 0, 0, 1], 0));
-    (start(address, token.map(str::to_owned), watched).unwrap(), clock)
+    (start(Door { address, token: token.map(str::to_owned), tls: None }, watched).unwrap(), clock)
 }
 
 fn published(clock: HostClock) -> Arc<Published> {
@@ -28,7 +28,8 @@ fn published(clock: HostClock) -> Arc<Published> {
         published_ns: clock.now_ns(),
         tracks: vec![TrackRow { track: 4, x_m: 1.5, confirmed: true, ..TrackRow::default() }],
         links: vec![link],
-        events: Warnings::default().changes(&[link]),
+        events: Warnings::default().changes(&[link], &["side".to_owned()]),
+        access_points: Arc::from(["side".to_owned()]),
         points_cm: vec![[1, 2, 3]],
         sensors: vec![true, false],
         ..Published::default()
@@ -92,7 +93,7 @@ fn curl_gets_what_the_page_gets() {
 #[test]
 fn every_field_of_a_frame_is_in_the_interface() {
     let document = openapi::document();
-    let frame = published(HostClock::start()).json(&["side".to_owned()], true);
+    let frame = published(HostClock::start()).json(true);
     let known = &document["components"]["schemas"]["Frame"]["properties"];
     frame.as_object().unwrap().keys().for_each(|name| assert!(known.get(name).is_some(), "{name}"));
     let known = &document["components"]["schemas"]["Event"]["properties"];
@@ -141,7 +142,11 @@ fn an_address_that_others_reach_needs_a_token() {
         clock: HostClock::start(),
         title: String::new(),
     };
-    let message = start(SocketAddr::from(([0, 0, 0, 0], 0)), None, watched).err().unwrap().to_string();
+    let message =
+        start(Door { address: SocketAddr::from(([0, 0, 0, 0], 0)), token: None, tls: None }, watched)
+            .err()
+            .unwrap()
+            .to_string();
     assert!(message.contains("UMBRACAST_TOKEN"), "{message}");
 }
 

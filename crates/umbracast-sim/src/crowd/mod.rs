@@ -15,5 +15,5 @@ pub use mixed::pairs;
 pub use preset::Preset;
 pub use replay::{Recorded, replay};
 pub use speed_augmentation::speed_augmented;
-pub use strolling::strolling;
+pub use strolling::{Stroll, strolling};
 pub use trajectory::{Crowd, Trajectory};

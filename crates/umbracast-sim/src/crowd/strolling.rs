@@ -2,6 +2,7 @@
 
 use glam::Vec2;
 use rand::RngExt;
+use rand_pcg::Pcg64;
 use umbracast::geometry::DVec2;
 
 use super::circle::setting;
@@ -16,42 +17,68 @@ const PREFERRED_MPS: std::ops::Range<f32> = 0.8..1.3;
 /// The next goal lies opposite, or so far to its side, radians.
 const ASIDE_RAD: f32 = 0.8;
 
-/// Everybody walks across the circle, and on arrival to another point of it, for `seconds`. Nobody ever arrives for
-/// good. Spacing and manners are those of the preset; a mixed crowd or pairs stroll like `orca-03`.
-pub fn strolling(preset: Preset, people: usize, radius_m: f64, seed: u64, seconds: u64) -> Crowd {
-    let (mut parameters, spacing_m) = setting(preset);
-    parameters.max_speed_mps = parameters.max_speed_mps.max(PREFERRED_MPS.end);
-    let mut rng = stream(seed, "strolling", 0);
-    let mut starts = Vec::new();
-    scatter(&mut starts, people, radius_m as f32, |_, _| spacing_m, &mut rng);
-    let preferred_mps: Vec<f32> = starts.iter().map(|_| rng.random_range(PREFERRED_MPS)).collect();
-    let mut goals: Vec<Vec2> = starts.iter().map(|start| -*start).collect();
-    let agents = starts.iter().map(|&start| Agent::new(parameters, start)).collect();
-    let mut orca = Orca::new(STEP_S, agents, &[]);
-    let steps = seconds as usize * (1_000_000_000 / STEP_NS) as usize;
-    let way = |start: &Vec2| {
-        let mut positions_m = Vec::with_capacity(steps + 1);
-        positions_m.push(start.as_dvec2());
-        positions_m
-    };
-    let mut positions: Vec<Vec<DVec2>> = starts.iter().map(way).collect();
-    for _ in 0..steps {
-        for ((agent, goal), &speed) in orca.agents.iter_mut().zip(&mut goals).zip(&preferred_mps) {
+/// People who stroll for as long as they are asked to.
+#[derive(Debug)]
+pub struct Stroll {
+    orca: Orca,
+    goals: Vec<Vec2>,
+    preferred_mps: Vec<f32>,
+    radius_m: f32,
+    rng: Pcg64,
+}
+
+impl Stroll {
+    /// Everybody walks across the circle, and on arrival to another point of it. Nobody ever arrives for good. Spacing
+    /// and manners are those of the preset; a mixed crowd or pairs stroll like `orca-03`.
+    pub fn new(preset: Preset, people: usize, radius_m: f64, seed: u64) -> Self {
+        let (mut parameters, spacing_m) = setting(preset);
+        parameters.max_speed_mps = parameters.max_speed_mps.max(PREFERRED_MPS.end);
+        let mut rng = stream(seed, "strolling", 0);
+        let mut starts = Vec::new();
+        scatter(&mut starts, people, radius_m as f32, |_, _| spacing_m, &mut rng);
+        let preferred_mps: Vec<f32> = starts.iter().map(|_| rng.random_range(PREFERRED_MPS)).collect();
+        let goals: Vec<Vec2> = starts.iter().map(|start| -*start).collect();
+        let agents = starts.iter().map(|&start| Agent::new(parameters, start)).collect();
+        Self { orca: Orca::new(STEP_S, agents, &[]), goals, preferred_mps, radius_m: radius_m as f32, rng }
+    }
+
+    /// The next `seconds` of everybody, from where the last ones ended. Time begins at 0 again.
+    pub fn leg(&mut self, seconds: u64) -> Crowd {
+        let steps = seconds as usize * (1_000_000_000 / STEP_NS) as usize;
+        let way = |agent: &Agent| {
+            let mut positions_m = Vec::with_capacity(steps + 1);
+            positions_m.push(agent.position_m.as_dvec2());
+            positions_m
+        };
+        let mut positions: Vec<Vec<DVec2>> = self.orca.agents.iter().map(way).collect();
+        for _ in 0..steps {
+            self.step();
+            for (way, agent) in positions.iter_mut().zip(&self.orca.agents) {
+                way.push(agent.position_m.as_dvec2());
+            }
+        }
+        let trajectories = Trajectory::from_steps(positions, std::iter::repeat(None));
+        Crowd { trajectories, duration_ns: steps as i64 * STEP_NS }
+    }
+
+    fn step(&mut self) {
+        let people = self.orca.agents.iter_mut().zip(&mut self.goals).zip(&self.preferred_mps);
+        for ((agent, goal), &speed) in people {
             let mut to_goal = *goal - agent.position_m;
             if to_goal.length() < ARRIVED_M {
-                let aside = Vec2::from_angle(rng.random_range(-ASIDE_RAD..ASIDE_RAD));
-                *goal = aside.rotate(-agent.position_m.normalize_or(Vec2::X)) * radius_m as f32;
+                let aside = Vec2::from_angle(self.rng.random_range(-ASIDE_RAD..ASIDE_RAD));
+                *goal = aside.rotate(-agent.position_m.normalize_or(Vec2::X)) * self.radius_m;
                 to_goal = *goal - agent.position_m;
             }
             agent.preferred_mps = to_goal.normalize_or_zero() * speed;
         }
-        orca.step();
-        for (way, agent) in positions.iter_mut().zip(&orca.agents) {
-            way.push(agent.position_m.as_dvec2());
-        }
+        self.orca.step();
     }
-    let trajectories = Trajectory::from_steps(positions, std::iter::repeat(None));
-    Crowd { trajectories, duration_ns: steps as i64 * STEP_NS }
+}
+
+/// People who stroll for `seconds`: see [`Stroll`].
+pub fn strolling(preset: Preset, people: usize, radius_m: f64, seed: u64, seconds: u64) -> Crowd {
+    Stroll::new(preset, people, radius_m, seed).leg(seconds)
 }
 
 #[cfg(test)]
@@ -68,6 +95,20 @@ mod tests {
             assert!(way.positions_m.iter().all(|p| p.length() < 10.0), "person {}", way.person);
             let speed_mps = |p: &[DVec2]| p[0].distance(p[1]) / f64::from(STEP_S);
             assert!(way.positions_m.windows(2).all(|p| speed_mps(p) < 1.4));
+        }
+    }
+
+    #[test]
+    fn legs_are_the_same_way_as_one_long_walk() {
+        let mut stroll = Stroll::new(Preset::Orca03, 4, 8.0, 3);
+        let (first, second) = (stroll.leg(7), stroll.leg(5));
+        let whole = strolling(Preset::Orca03, 4, 8.0, 3, 12);
+        for ((first, second), whole) in
+            first.trajectories.iter().zip(&second.trajectories).zip(&whole.trajectories)
+        {
+            let both: Vec<DVec2> =
+                first.positions_m.iter().chain(&second.positions_m[1..]).copied().collect();
+            assert_eq!(both, whole.positions_m, "person {}", whole.person);
         }
     }
 }
