@@ -85,6 +85,23 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
     Ok(scenes)
 }
 
+/// The same where the site is known: captures of all its sensors are scenes of their own.
+///
+/// # Errors
+/// Captures that are neither a whole recording each nor one for each sensor.
+pub fn of_site(inputs: Vec<Input>, site: &Site) -> Result<Vec<Input>, Error> {
+    let mut scenes = Vec::new();
+    for input in inputs {
+        match input {
+            Input::Captures(files) => {
+                scenes.extend(captures::in_scenes(files, site)?.into_iter().map(Input::Captures));
+            }
+            other => scenes.push(other),
+        }
+    }
+    Ok(scenes)
+}
+
 /// A folder's recordings, or its clouds, or its captures.
 fn folder(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut files = recordings(path)?;
@@ -147,7 +164,7 @@ pub fn empty_frames(
     config: &Config,
     health: &mut Health,
 ) -> Result<(Vec<Frame>, Option<String>), Error> {
-    let [empty] = &scenes(std::slice::from_ref(&path.to_owned()))?[..] else {
+    let [empty] = &of_site(scenes(std::slice::from_ref(&path.to_owned()))?, &config.site)?[..] else {
         return Err(Error::new("expected one scene without people, found several").within(path.display()));
     };
     let mut frames = Vec::new();

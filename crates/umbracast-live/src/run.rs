@@ -120,6 +120,7 @@ impl Live {
         let mut pipeline = Pipeline::new(&config, weights.as_ref())?;
         empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let assembler = Assembler::new(&config.site)?;
+        let points = record.as_ref().is_some_and(|record| record.points);
         let start = |record| Recorder::start(record, &config, counters.recorder.clone());
         let recorder = record.map(start).transpose()?.map(Arc::new);
         let packets = Arc::new(Queue::new(PACKETS_WAITING, WhenFull::DropNewest));
@@ -137,8 +138,8 @@ impl Live {
         let stepping = {
             let (frames, recorder, counters) = (frames.clone(), recorder.clone(), counters.clone());
             std::thread::spawn(move || {
-                let publish =
-                    Publish { clock, sensors, recorder, counters, listener, warnings: Warnings::default() };
+                let warnings = Warnings::default();
+                let publish = Publish { clock, sensors, points, recorder, counters, listener, warnings };
                 step(pipeline, &frames, publish);
             })
         };
@@ -216,6 +217,8 @@ fn assemble(
 struct Publish {
     clock: HostClock,
     sensors: usize,
+    /// Whether the recorder wants the foreground.
+    points: bool,
     recorder: Option<Arc<Recorder>>,
     counters: Arc<Counters>,
     listener: Listener,
@@ -228,6 +231,7 @@ fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
         let outcome = pipeline.step(&frame);
         let stepped_ns = publish.clock.now_ns();
         let mut published = Published::of(outcome, &frame, publish.sensors);
+        published.foreground = publish.points.then(|| outcome.foreground.clone());
         published.health.add(&health);
         published.frames_skipped = frames.lost();
         published.events = publish.warnings.changes(&published.links);

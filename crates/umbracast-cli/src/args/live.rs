@@ -105,6 +105,9 @@ pub struct RecordArgs {
     /// Keep the newest so many files and delete older ones; default: delete none.
     #[arg(long, value_name = "N", requires = "record")]
     pub record_keep: Option<usize>,
+    /// Record the foreground points too, as PointCloud2: what every viewer draws.
+    #[arg(long, requires = "record")]
+    pub record_points: bool,
 }
 
 fn positive(text: &str) -> Result<f64, Error> {

@@ -189,8 +189,8 @@ pub struct Simulate {
 /// `run`
 #[derive(Debug, Args)]
 pub struct Run {
-    /// A folder of recordings or PCD clouds, or files: .mcap, .pcd, or .pcap with one for each sensor in the
-    /// site's order, or one of all.
+    /// A folder of recordings or PCD clouds, or files: .mcap, .pcd, or .pcap. A capture of all sensors is a scene of its
+    /// own; captures of single sensors are one scene, one for each sensor in the site's order.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -211,6 +211,12 @@ pub struct Run {
     /// Write every table as CSV too.
     #[arg(long)]
     pub csv: bool,
+    /// Write the results of each scene as a recording too, results-0000.mcap, which ROS 2, Foxglove and Rerun open.
+    #[arg(long)]
+    pub mcap: bool,
+    /// The foreground points too, as PointCloud2 in that recording.
+    #[arg(long, requires = "mcap")]
+    pub points: bool,
     /// Where detections, tracks and links go.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

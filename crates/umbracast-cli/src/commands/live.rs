@@ -96,6 +96,7 @@ fn recorder(args: &RecordArgs) -> Option<RecordSettings> {
         file_bytes: args.record_mb << 20,
         file_s: args.record_minutes * 60,
         keep: args.record_keep,
+        points: args.record_points,
     })
 }
 

@@ -26,6 +26,7 @@ pub fn run(args: &ReplayPackets, common: &Common) -> Result<Ending, Error> {
     if args.site.site.is_none() {
         site = input::recorded_site(&inputs)?.unwrap_or(site);
     }
+    let inputs = input::of_site(inputs, &site)?;
     let to: Vec<SocketAddr> =
         (0..site.sensors.len()).filter_map(|sensor| address_of(sensor, &args.to)).collect();
     let asked: Arc<AtomicBool> = signal::asked_to_end()?;
