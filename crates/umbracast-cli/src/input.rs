@@ -102,6 +102,11 @@ pub fn of_site(inputs: Vec<Input>, site: &Site) -> Result<Vec<Input>, Error> {
     Ok(scenes)
 }
 
+/// Whether one capture of all of a site's sensors could be read.
+pub fn can_share_a_capture(site: &Site) -> bool {
+    captures::whole_site(site).is_ok()
+}
+
 /// A folder's recordings, or its clouds, or its captures.
 fn folder(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut files = recordings(path)?;

@@ -206,6 +206,30 @@ const CROSSING: &str = "t_s,id,x_m,y_m,height_m\n\
     0.0,2,1.0,0.3,1.70\n1.0,2,0.0,0.3,1.70\n2.0,2,-1.0,0.3,1.70\n3.0,2,-2.0,0.3,1.70\n";
 
 #[test]
+fn simulated_packets_are_received_whole() {
+    let folder = folder("simulated-packets");
+    let crossing = folder.join("crossing.csv");
+    fs::write(&crossing, CROSSING).expect("writes");
+    let live = Live::start(&[]);
+    let to = live.ports.iter().map(|port| format!("127.0.0.1:{port}")).collect::<Vec<_>>().join(",");
+    let walk = crossing.to_str().expect("a plain name");
+    let simulate =
+        ["simulate", "--json", "--quiet", "--trajectories", walk, "--packets", &format!("udp:{to}")];
+    let output = umbracast(&simulate).output().expect("starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let sent: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let summary = live.stop();
+    // Three seconds of two HDL-32E, 1808 packets a second each.
+    assert!(sent["packets_sent"].as_u64() > Some(10_000), "{sent}");
+    assert_eq!(summary["packets"], sent["packets_sent"], "{summary}");
+    for nothing in ["packets_lost", "packets_of_strangers"] {
+        assert_eq!(summary[nothing], 0, "{summary}");
+    }
+    let frames = ["frames", "frames_skipped"].iter().filter_map(|name| summary[name].as_u64()).sum::<u64>();
+    assert!(frames >= 30, "{summary}");
+}
+
+#[test]
 fn a_recording_of_a_killed_run_opens_with_all_but_its_last_chunk() {
     let folder = folder("killed");
     let text = |path: &Path| path.to_str().expect("a plain name").to_owned();

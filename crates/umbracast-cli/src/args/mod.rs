@@ -11,7 +11,7 @@ use umbracast_sim::crowd::Preset;
 
 mod live;
 
-pub use live::{Live, PageArgs, RecordArgs, ReplayPackets, View};
+pub use live::{Live, Packets, PageArgs, RecordArgs, ReplayPackets, View};
 
 /// Sees people with LiDARs, foresees where they walk, and tells which radio links they are about to block.
 #[derive(Debug, Parser)]
@@ -181,9 +181,14 @@ pub struct Simulate {
     /// Write every table as CSV too.
     #[arg(long)]
     pub csv: bool,
-    /// Where the recordings go.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
+    /// The sensors' packets as they send them. udp:HOST:PORT: in real time, the site's first sensor to that port and the
+    /// others to those that follow, or each to one of several addresses with commas. pcap: captures beside the recordings,
+    /// one of all sensors, or one for each where neither `udp_port` nor `address` tells them apart.
+    #[arg(long, value_name = "udp:HOST:PORT|pcap")]
+    pub packets: Option<Packets>,
+    /// Where the recordings go; may be left out with --packets udp.
+    #[arg(long, value_name = "DIR", required_unless_present = "packets")]
+    pub out: Option<PathBuf>,
 }
 
 /// `run`

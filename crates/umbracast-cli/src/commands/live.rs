@@ -135,10 +135,8 @@ fn demonstration(
             let crowd =
                 crowd::strolling(preset, people, CIRCLE_M, seed, DEMO_S).later(first as i64 * STEP_NS);
             let scene = Scene::in_hall(crowd, &site, &sensors, seed).starting_at(first);
-            let more = send::send(send::simulated(scene), &to, 1.0, clock, &stop)?;
-            sent.packets += more.packets;
-            sent.failed += more.failed;
-            sent.latest_ns = sent.latest_ns.max(more.latest_ns);
+            let packets = send::ahead(send::simulated(scene));
+            sent.add(&send::send(packets, &to, 1.0, clock, &stop)?);
         }
         Ok(sent)
     }))

@@ -70,7 +70,7 @@ pub fn packets(files: &[PathBuf], site: &Site, sink: PacketSink) -> Result<Optio
 }
 
 /// A sensor as its datagrams show it.
-struct Sender {
+pub struct Sender {
     sensor: usize,
     port: Option<u16>,
     address: Option<[u8; 4]>,
@@ -90,7 +90,7 @@ impl Sender {
 ///
 /// # Errors
 /// Two of them whose datagrams cannot be told apart.
-fn whole_site(site: &Site) -> Result<Vec<Sender>, Error> {
+pub fn whole_site(site: &Site) -> Result<Vec<Sender>, Error> {
     let senders: Vec<Sender> =
         site.sensors.iter().enumerate().map(|(s, sensor)| Sender::of(s, sensor)).collect();
     for (i, one) in senders.iter().enumerate() {
