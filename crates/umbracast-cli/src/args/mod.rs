@@ -194,7 +194,7 @@ pub struct Simulate {
 /// `run`
 #[derive(Debug, Args)]
 pub struct Run {
-    /// A folder of recordings or PCD clouds, or files: .mcap, .pcd, or .pcap. A capture of all sensors is a scene of its
+    /// A folder of recordings or PCD clouds, or files: .mcap, .db3, .pcd, or .pcap. A capture of all sensors is a scene of its
     /// own; captures of single sensors are one scene, one for each sensor in the site's order.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,

@@ -12,8 +12,9 @@
 //! | `/umbracast/detections`, `/umbracast/tracks`, `/umbracast/blockages` | what a run made of them: see [`crate::wire`] |
 //! | `/tf`, `/umbracast/markers`, `/umbracast/people`, `/umbracast/foreground` | the same for viewers: see [`crate::viewers`] |
 
+use std::borrow::Cow;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use umbracast::Error;
@@ -21,11 +22,15 @@ use umbracast::lidar::Packet;
 
 use crate::messages;
 
+#[cfg(feature = "db3")]
+mod db3;
 mod writer;
 
 pub use writer::{RecordingWriter, Results};
 
 const CONFIG_TOPIC: &str = "/umbracast/config";
+/// How every SQLite file begins.
+const SQLITE_MAGIC: &[u8; 16] = b"SQLite format 3\0";
 
 /// What a reader finds in a recording, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,23 +45,45 @@ pub enum Entry {
     Other(String, String, Vec<u8>),
 }
 
-/// Reads a recording from its beginning, one message at a time.
+/// Reads a recording from its beginning, one message at a time: MCAP, or the SQLite storage of rosbag2 (`.db3`, with the
+/// feature `db3`).
 pub struct RecordingReader {
-    messages: mcap::io::MessageReader<BufReader<File>>,
+    source: Source,
     path: PathBuf,
     begun: bool,
     lost: Option<String>,
+}
+
+enum Source {
+    Mcap(Box<mcap::io::MessageReader<BufReader<File>>>),
+    #[cfg(feature = "db3")]
+    Db3(db3::Messages),
 }
 
 impl RecordingReader {
     /// Opens a file.
     ///
     /// # Errors
-    /// A file that is not there.
+    /// A file that is not there, or of a kind that this program was built without.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let file = File::open(path).map_err(|e| Error::new(e.to_string()).within(path.display()))?;
-        let messages = mcap::io::MessageReader::new(BufReader::new(file));
-        Ok(Self { messages, path: path.to_owned(), begun: false, lost: None })
+        let fail = |e: std::io::Error| Error::new(e.to_string()).within(path.display());
+        let mut file = File::open(path).map_err(fail)?;
+        let mut magic = [0; SQLITE_MAGIC.len()];
+        let is_sqlite = file.read_exact(&mut magic).is_ok() && magic == *SQLITE_MAGIC;
+        file.rewind().map_err(fail)?;
+        let source = match is_sqlite {
+            false => Source::Mcap(Box::new(mcap::io::MessageReader::new(BufReader::new(file)))),
+            #[cfg(feature = "db3")]
+            true => Source::Db3(db3::Messages::open(path)?),
+            #[cfg(not(feature = "db3"))]
+            true => {
+                let story = "expected an MCAP recording, found rosbag2's SQLite storage, which this program was built \
+                             without: build it with `--features db3`, or convert the bag with `rosbags-convert --src BAG \
+                             --dst OUT --dst-storage mcap` (pip install rosbags) or `ros2 bag convert`";
+                return Err(Error::new(story).within(path.display()));
+            }
+        };
+        Ok(Self { source, path: path.to_owned(), begun: false, lost: None })
     }
 
     /// The next message; `None` at the end, also at the end of what is whole in a damaged file: see
@@ -65,19 +92,32 @@ impl RecordingReader {
     /// # Errors
     /// A file that is no recording at all.
     pub fn next_entry(&mut self) -> Result<Option<Entry>, Error> {
-        match self.messages.next() {
-            None => Ok(None),
-            Some(Ok(message)) => {
-                self.begun = true;
-                Ok(Some(self.understand(&message)))
+        let next = match &mut self.source {
+            Source::Mcap(messages) => match messages.next() {
+                None => Ok(None),
+                Some(Ok(message)) => {
+                    let kind = message.channel.schema.as_ref().map_or("", |schema| &schema.name);
+                    Ok(Some(understand(&message.channel.topic, kind, message.data)))
+                }
+                Some(Err(error)) => Err(("an MCAP recording", plain(&error))),
+            },
+            #[cfg(feature = "db3")]
+            Source::Db3(messages) => match messages.next() {
+                Ok(next) => Ok(next.map(|(topic, kind, data)| understand(&topic, &kind, data.into()))),
+                Err(error) => Err(("a recording of rosbag2", error.to_string())),
+            },
+        };
+        match next {
+            Ok(entry) => {
+                self.begun |= entry.is_some();
+                Ok(entry)
             }
-            Some(Err(error)) if self.begun => {
-                self.lost = Some(format!("{}: {error}; everything before is used", self.path.display()));
+            Err((_, found)) if self.begun => {
+                self.lost = Some(format!("{}: {found}; everything before is used", self.path.display()));
                 Ok(None)
             }
-            Some(Err(error)) => {
-                Err(Error::new(format!("expected an MCAP recording, found {}", plain(&error)))
-                    .within(self.path.display()))
+            Err((expected, found)) => {
+                Err(Error::new(format!("expected {expected}, found {found}")).within(self.path.display()))
             }
         }
     }
@@ -86,36 +126,38 @@ impl RecordingReader {
     pub fn lost(&self) -> Option<&str> {
         self.lost.as_deref()
     }
+}
 
-    fn understand(&mut self, message: &mcap::Message<'_>) -> Entry {
-        let topic = &message.channel.topic;
-        let kind = message.channel.schema.as_ref().map_or(String::new(), |schema| schema.name.clone());
-        if topic == CONFIG_TOPIC {
-            let text = crate::cdr::Decoder::new(&message.data).and_then(|mut d| d.string());
-            if let Some(text) = text {
-                return Entry::Config(text.to_owned());
-            }
+fn understand(topic: &str, kind: &str, data: Cow<[u8]>) -> Entry {
+    if topic == CONFIG_TOPIC {
+        let text = crate::cdr::Decoder::new(&data).and_then(|mut d| d.string());
+        if let Some(text) = text {
+            return Entry::Config(text.to_owned());
         }
-        let packets = match kind.as_str() {
-            name if name == messages::SCAN.name => messages::read_scan(&message.data),
-            name if name == messages::SENSOR_PACKETS.name => messages::read_sensor_packets(&message.data),
-            _ => None,
-        };
-        if let Some(packets) = packets {
-            let sensor = topic.trim_matches('/').trim_end_matches("packets").trim_end_matches('/');
-            return Entry::Packets(sensor.to_owned(), packets);
-        }
-        if kind == messages::CLOUD.name {
-            return Entry::Cloud(topic.clone(), message.data.to_vec());
-        }
-        Entry::Other(topic.clone(), kind, message.data.to_vec())
     }
+    let packets = match kind {
+        name if name == messages::SCAN.name => messages::read_scan(&data),
+        name if name == messages::SENSOR_PACKETS.name => messages::read_sensor_packets(&data),
+        _ => None,
+    };
+    if let Some(packets) = packets {
+        let sensor = topic.trim_matches('/').trim_end_matches("packets").trim_end_matches('/');
+        return Entry::Packets(sensor.to_owned(), packets);
+    }
+    if kind == messages::CLOUD.name {
+        return Entry::Cloud(topic.to_owned(), data.into_owned());
+    }
+    Entry::Other(topic.to_owned(), kind.to_owned(), data.into_owned())
 }
 
 fn plain(error: &mcap::McapError) -> String {
     match error {
         mcap::McapError::BadMagic => "other bytes at its beginning".to_owned(),
         mcap::McapError::UnexpectedEof => "its end before the first message".to_owned(),
+        mcap::McapError::UnsupportedCompression(codec) => format!(
+            "chunks in {codec}, which this program reads if it is built with `--features compression`; `mcap \
+             decompress` writes the recording without"
+        ),
         other => other.to_string(),
     }
 }
