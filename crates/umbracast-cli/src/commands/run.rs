@@ -21,7 +21,7 @@ use crate::run_json::{Ranges, RunJson, Stopwatch};
 use crate::setup;
 
 /// Frames of a scene that runs ahead of an earlier one, whose rows wait for the tables.
-const AHEAD: usize = 1024;
+const AHEAD: usize = 512;
 
 /// What came out of one frame.
 struct Step {
