@@ -81,6 +81,9 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     }
     let inputs = input::of_site(inputs, &config.site)?;
     let numbered: Vec<(u32, &Input)> = inputs.iter().enumerate().map(number_of).collect();
+    if args.mcap {
+        refuse_twice(&numbered)?;
+    }
     let weights = setup::weights(args.weights.as_deref())?;
     let (mut health, mut lost) = (Health::default(), Vec::new());
     let empty = empty_frames(args, &inputs[0], &config, &mut health, &mut lost)?;
@@ -88,9 +91,6 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let recordings = args.mcap.then_some((args.out.as_path(), args.points));
     let method = Method { config: &config, weights: &weights, empty: &empty, recordings };
-    if args.mcap {
-        refuse_twice(&numbered)?;
-    }
     let watch = Stopwatch::start();
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut tables = Tables::create(&args.out, &names, args.csv)?;
