@@ -39,6 +39,9 @@ pub fn without_effect(command: &ArgMatches) -> Vec<String> {
             idle(&["gait"], "without people of the kind cmu-walk (--bodies)");
         }
     }
+    if given("packets") && !given("out") {
+        idle(&["clouds", "csv"], "without --out: nothing is written");
+    }
     if given("no_empty") {
         idle(&["empty"], "with --no-empty");
     }
@@ -76,6 +79,11 @@ mod tests {
                 "u evaluate no/such/run --truth sim --seed 3 --mode default",
                 "--seed has no effect on a run that is done: nothing is simulated",
             ),
+            (
+                "u simulate --packets udp:127.0.0.1:2368 --clouds",
+                "--clouds has no effect without --out: nothing is written",
+            ),
+            ("u simulate --packets pcap --clouds --out o", ""),
             ("u coverage --step 1", ""),
         ] {
             assert_eq!(told(arguments), story, "{arguments}");

@@ -32,7 +32,7 @@ pub fn scene_number(input: &Input) -> Option<u32> {
 /// One scene's input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Input {
-    /// An MCAP recording.
+    /// An MCAP recording, or one in rosbag2's SQLite storage.
     Recording(PathBuf),
     /// PCD clouds of one sensor, a frame each, in natural order of their names.
     Clouds(Vec<PathBuf>),
@@ -56,8 +56,10 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
                 continue;
             }
             if found.is_empty() {
-                return Err(Error::new("expected .mcap, .pcd or .pcap files in the folder, found none")
-                    .within(path.display()));
+                return Err(Error::new(
+                    "expected .mcap, .db3, .pcd or .pcap files in the folder, found none",
+                )
+                .within(path.display()));
             }
             files.extend(found);
         } else {
@@ -67,11 +69,11 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
     let (mut scenes, mut clouds, mut captures) = (Vec::new(), Vec::new(), Vec::new());
     for file in files {
         match file.extension().and_then(|e| e.to_str()) {
-            Some("mcap") => scenes.push(Input::Recording(file)),
+            Some("mcap" | "db3") => scenes.push(Input::Recording(file)),
             Some("pcd") => clouds.push(file),
             Some("pcap") => captures.push(file),
             _ if !file.exists() => return Err(Error::new("no such file or folder").within(file.display())),
-            _ => return Err(Error::new("expected .mcap, .pcd or .pcap").within(file.display())),
+            _ => return Err(Error::new("expected .mcap, .db3, .pcd or .pcap").within(file.display())),
         }
     }
     scenes.extend(folders_of_clouds);
@@ -85,10 +87,32 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
     Ok(scenes)
 }
 
+/// The same where the site is known: captures of all its sensors are scenes of their own.
+///
+/// # Errors
+/// Captures that are neither a whole recording each nor one for each sensor.
+pub fn of_site(inputs: Vec<Input>, site: &Site) -> Result<Vec<Input>, Error> {
+    let mut scenes = Vec::new();
+    for input in inputs {
+        match input {
+            Input::Captures(files) => {
+                scenes.extend(captures::in_scenes(files, site)?.into_iter().map(Input::Captures));
+            }
+            other => scenes.push(other),
+        }
+    }
+    Ok(scenes)
+}
+
+/// Whether one capture of all of a site's sensors could be read.
+pub fn can_share_a_capture(site: &Site) -> bool {
+    captures::whole_site(site).is_ok()
+}
+
 /// A folder's recordings, or its clouds, or its captures.
 fn folder(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut files = recordings(path)?;
-    for extension in ["pcd", "pcap"] {
+    for extension in ["db3", "pcd", "pcap"] {
         if files.is_empty() {
             files = setup::files_with_extension(path, extension)?;
         }
@@ -147,7 +171,7 @@ pub fn empty_frames(
     config: &Config,
     health: &mut Health,
 ) -> Result<(Vec<Frame>, Option<String>), Error> {
-    let [empty] = &scenes(std::slice::from_ref(&path.to_owned()))?[..] else {
+    let [empty] = &of_site(scenes(std::slice::from_ref(&path.to_owned()))?, &config.site)?[..] else {
         return Err(Error::new("expected one scene without people, found several").within(path.display()));
     };
     let mut frames = Vec::new();

@@ -32,21 +32,43 @@ impl Stopwatch {
     }
 }
 
-/// Ascending frame numbers in a line: `0-299,301`.
-pub fn ranges(frames: &[u64]) -> String {
-    let runs = frames.chunk_by(|before, frame| *frame == before + 1);
-    let run = |run: &[u64]| match run {
-        [one] => one.to_string(),
-        _ => format!("{}-{}", run[0], run[run.len() - 1]),
-    };
-    runs.map(run).collect::<Vec<_>>().join(",")
+/// Ascending frame numbers, kept and written as runs: `0-299,301`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Ranges(Vec<(u64, u64)>);
+
+impl Ranges {
+    /// Adds the next one.
+    pub fn push(&mut self, frame: u64) {
+        match self.0.last_mut() {
+            Some((_, last)) if last.checked_add(1) == Some(frame) => *last = frame,
+            _ => self.0.push((frame, frame)),
+        }
+    }
+
+    /// True before the first one.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
 }
 
-/// The frames of one scene as `run.json` has them: [`ranges`], or each number as older runs wrote them.
+impl std::fmt::Display for Ranges {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (place, (first, last)) in self.0.iter().enumerate() {
+            let comma = if place == 0 { "" } else { "," };
+            match first == last {
+                true => write!(f, "{comma}{first}")?,
+                false => write!(f, "{comma}{first}-{last}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The frames of one scene as `run.json` has them: [`Ranges`], or each number as older runs wrote them.
 #[derive(Debug, serde::Deserialize)]
 #[serde(untagged)]
 pub enum Frames {
-    /// As [`ranges`] writes them.
+    /// As [`Ranges`] writes them.
     Ranges(String),
     /// One by one.
     Each(Vec<u64>),
@@ -124,8 +146,10 @@ mod tests {
     #[test]
     fn frames_are_written_as_ranges_and_read_in_both_forms() {
         let frames = [0, 1, 2, 5, 7, 8];
-        assert_eq!(ranges(&frames), "0-2,5,7-8");
-        assert_eq!(ranges(&[]), "");
+        let mut ranges = Ranges::default();
+        assert_eq!((ranges.to_string().as_str(), ranges.is_empty()), ("", true));
+        frames.iter().for_each(|&frame| ranges.push(frame));
+        assert_eq!((ranges.to_string().as_str(), ranges.is_empty()), ("0-2,5,7-8", false));
         for text in ["\"0-2,5,7-8\"", "[0, 1, 2, 5, 7, 8]"] {
             let read: Frames = serde_json::from_str(text).unwrap();
             assert!(read.numbers().unwrap().into_iter().eq(frames), "{text}");

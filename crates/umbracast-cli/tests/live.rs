@@ -1,5 +1,6 @@
 //! Live as a user meets it: packets over loopback, a recording, and the same results from it again.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -8,6 +9,7 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 use umbracast_io::recording::{Entry, RecordingReader};
 use umbracast_io::rows::{DetectionRow, LinkRow, TrackRow};
 use umbracast_io::tables;
+use umbracast_io::viewers;
 use umbracast_io::wire::{self, WireRow};
 
 fn umbracast(arguments: &[&str]) -> Command {
@@ -92,7 +94,7 @@ fn live_and_replayed_results_are_the_same_to_the_byte() {
     let (recording, summary) = (["1", "0.5", "0.25", "0.1"].iter())
         .find_map(|rate| {
             let records = folder.join(format!("records-{rate}"));
-            let live = Live::start(&["--empty", &empty, "--record", &text(&records)]);
+            let live = Live::start(&["--empty", &empty, "--record", &text(&records), "--record-points"]);
             let to = live.ports.iter().map(|port| format!("127.0.0.1:{port}")).collect::<Vec<_>>().join(",");
             done(&["replay", &scene, "--to", &to, "--rate", rate]);
             let summary = live.stop();
@@ -102,7 +104,7 @@ fn live_and_replayed_results_are_the_same_to_the_byte() {
         .expect("a run without a skipped frame");
     assert!(summary["frames"].as_u64().expect("a count") >= 30, "{summary}");
 
-    done(&["run", &text(&recording), "--empty", &empty, "--out", &out]);
+    done(&["run", &text(&recording), "--empty", &empty, "--out", &out, "--mcap", "--points"]);
     let access_points = ["side".to_owned(), "centre".to_owned()];
     let tables = |name: &str| format!("{name}: rows of the table and of the recording");
     let out = Path::new(&out);
@@ -112,13 +114,37 @@ fn live_and_replayed_results_are_the_same_to_the_byte() {
     let links = recorded::<LinkRow>(&recording, &access_points);
     assert!(links.iter().any(|link| link.blocked_now), "somebody crosses in front of the access point");
     assert!(tables::read::<LinkRow>(out, &access_points).unwrap() == links, "{}", tables("links"));
+    let results = out.join("results-0000.mcap");
+    let (live_messages, run_messages) = (results_in(&recording), results_in(&results));
+    for topic in
+        ["/tf", "/umbracast/tracks", "/umbracast/markers", "/umbracast/people", "/umbracast/foreground"]
+    {
+        assert!(live_messages[topic].len() >= 30, "{topic}");
+    }
+    assert!(live_messages == run_messages, "what a run records is what the live run recorded");
     peers_read(&recording, &tracks);
+    peers_read(&results, &tracks);
     let detections = recorded::<DetectionRow>(&recording, &access_points);
     assert!(
         tables::read::<DetectionRow>(out, &access_points).unwrap() == detections,
         "{}",
         tables("detections")
     );
+}
+
+/// Every message by topic, but for packets and what is said once at the beginning of a file.
+fn results_in(file: &Path) -> BTreeMap<String, Vec<Vec<u8>>> {
+    let mut reader = RecordingReader::open(file).expect("opens");
+    let mut messages = BTreeMap::<_, Vec<_>>::new();
+    while let Some(entry) = reader.next_entry().expect("reads") {
+        match entry {
+            Entry::Other(topic, _, message) | Entry::Cloud(topic, message) if topic != "/tf_static" => {
+                messages.entry(topic).or_default().push(message);
+            }
+            _ => {}
+        }
+    }
+    messages
 }
 
 /// `rosbags` and `mcap-ros2-support` read every topic, and the same values.
@@ -143,22 +169,65 @@ fn peers_read(recording: &Path, tracks: &[TrackRow]) {
     let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(found["rosbags"], found["mcap-ros2-support"]);
     let topics = found["rosbags"].as_object().expect("topics");
-    for topic in ["/umbracast/config", "/tf_static", "/lidar_east/packets", "/lidar_west/packets"] {
+    assert_eq!(found["types that are not those of ROS 2"], serde_json::json!([]));
+    for topic in ["/umbracast/config", "/tf_static"] {
         assert!(topics.contains_key(topic), "{topic} of {topics:?}");
     }
-    for topic in [DetectionRow::TOPIC, TrackRow::TOPIC, LinkRow::TOPIC] {
+    let viewers = ["/tf", viewers::MARKERS_TOPIC, viewers::PEOPLE_TOPIC, viewers::FOREGROUND_TOPIC];
+    for topic in [DetectionRow::TOPIC, TrackRow::TOPIC, LinkRow::TOPIC].into_iter().chain(viewers) {
         assert!(topics[topic]["messages"].as_u64() >= Some(30), "{topic}: {}", topics[topic]);
     }
     let last = tracks.last().expect("tracks").frame;
     let first = tracks.iter().find(|row| row.frame == last).expect("a first row");
     let read = &topics[TrackRow::TOPIC]["last"]["first"];
     assert_eq!((&read["track"], &read["x_m"]), (&first.track.into(), &first.x_m.into()));
+    // What viewers draw is of the same people, in the same place and at the same time.
+    let confirmed: Vec<&TrackRow> = tracks.iter().filter(|row| row.frame == last && row.confirmed).collect();
+    let people = &topics[viewers::PEOPLE_TOPIC]["last"];
+    assert_eq!(people["rows"].as_u64(), Some(confirmed.len() as u64));
+    assert_eq!(people["time_ns"], serde_json::json!(first.time_ns));
+    if let Some(person) = confirmed.first() {
+        let expected =
+            serde_json::json!({ "id": person.track.to_string(), "x_m": person.x_m, "y_m": person.y_m });
+        assert_eq!(people["first"], expected);
+    }
+    let markers = &topics[viewers::MARKERS_TOPIC]["last"]["drawn"];
+    let drawn = |ns: &str| markers[ns].as_u64();
+    assert_eq!(drawn("deleted first"), Some(1), "{markers}");
+    for ns in ["box", "name", "way", "in_300ms", "in_600ms", "in_900ms"] {
+        assert_eq!(drawn(ns).unwrap_or(0), confirmed.len() as u64, "{ns}: {markers}");
+    }
+    assert_eq!(drawn("access_points"), Some(2), "{markers}");
 }
 
 /// Two people who cross in front of the `side` access point, for three seconds.
 const CROSSING: &str = "t_s,id,x_m,y_m,height_m\n\
     0.0,1,6.0,-2.0,1.80\n1.0,1,6.0,-0.7,1.80\n2.0,1,6.0,0.6,1.80\n3.0,1,6.0,1.9,1.80\n\
     0.0,2,1.0,0.3,1.70\n1.0,2,0.0,0.3,1.70\n2.0,2,-1.0,0.3,1.70\n3.0,2,-2.0,0.3,1.70\n";
+
+#[test]
+fn simulated_packets_are_received_whole() {
+    let folder = folder("simulated-packets");
+    let crossing = folder.join("crossing.csv");
+    fs::write(&crossing, CROSSING).expect("writes");
+    let live = Live::start(&[]);
+    let to = live.ports.iter().map(|port| format!("127.0.0.1:{port}")).collect::<Vec<_>>().join(",");
+    let walk = crossing.to_str().expect("a plain name");
+    let simulate =
+        ["simulate", "--json", "--quiet", "--trajectories", walk, "--packets", &format!("udp:{to}")];
+    let output = umbracast(&simulate).output().expect("starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let sent: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let summary = live.stop();
+    // Three seconds of two HDL-32E, 1808 packets a second each.
+    assert!(sent["packets_sent"].as_u64() > Some(10_000), "{sent}");
+    assert_eq!(summary["packets"], sent["packets_sent"], "{summary}");
+    for nothing in ["packets_lost", "packets_of_strangers"] {
+        assert_eq!(summary[nothing], 0, "{summary}");
+    }
+    let frames = ["frames", "frames_skipped"].iter().filter_map(|name| summary[name].as_u64()).sum::<u64>();
+    assert!(frames >= 30, "{summary}");
+}
 
 #[test]
 fn a_recording_of_a_killed_run_opens_with_all_but_its_last_chunk() {

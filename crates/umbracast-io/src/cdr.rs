@@ -43,6 +43,16 @@ impl Encoder {
         self.bytes.extend(value.to_le_bytes());
     }
 
+    /// `int32`
+    pub fn i32(&mut self, value: i32) {
+        self.u32(value as u32);
+    }
+
+    /// `float32`
+    pub fn f32(&mut self, value: f32) {
+        self.u32(value.to_bits());
+    }
+
     /// `uint64`
     pub fn u64(&mut self, value: u64) {
         self.align(8);

@@ -9,6 +9,7 @@ pub mod messages;
 pub mod point_cloud;
 pub mod tables;
 pub mod wire;
+pub mod viewers;
 pub mod recording;
 pub mod trajectories;
 pub mod bvh;

@@ -79,7 +79,7 @@ pub const TRANSFORMS: Schema = Schema::new(
          ================================================================================\n\
          MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n\
          ================================================================================\n\
-         MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
+         MSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n"
     ),
 );
 
@@ -179,14 +179,14 @@ pub fn read_scan(bytes: &[u8]) -> Option<Vec<Packet>> {
         .collect()
 }
 
-/// The pose of every sensor in the frame `site`.
-pub fn transforms(site: &Site) -> Vec<u8> {
+/// The pose of every sensor in the frame `site`, from this time on.
+pub fn transforms(site: &Site, time_ns: i64) -> Vec<u8> {
     let mut e = Encoder::default();
     e.u32(site.sensors.len() as u32);
     for sensor in &site.sensors {
         let Pose { rotation, translation_m: t } = sensor.site_from_sensor();
         let q = glam::DQuat::from_mat3(&rotation);
-        e.header(0, "site");
+        e.header(time_ns, "site");
         e.string(&sensor.name);
         [t.x, t.y, t.z, q.x, q.y, q.z, q.w].into_iter().for_each(|value| e.f64(value));
     }

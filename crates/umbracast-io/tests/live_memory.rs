@@ -6,7 +6,7 @@ use std::alloc::System;
 use umbracast::Config;
 use umbracast::lidar::Packet;
 use umbracast_io::messages::PACKET_BYTES;
-use umbracast_io::recording::RecordingWriter;
+use umbracast_io::recording::{RecordingWriter, Results};
 use umbracast_io::rows::TrackRow;
 
 #[global_allocator]
@@ -23,7 +23,8 @@ fn an_hour_of_recording_holds_no_more_than_its_index() {
     let folder = tempfile::tempdir().expect("a folder");
     let config = Config::default();
     let path = folder.path().join("hour.mcap");
-    let mut writer = RecordingWriter::create_live(&path, &config.to_toml(), &config.site).expect("creates");
+    let mut writer =
+        RecordingWriter::create_live(&path, &config.to_toml(), &config.site, 0).expect("creates");
     let packet = Packet { time_ns: 0, payload: vec![7; PACKET_BYTES] };
     let rows = [TrackRow::default(); 10];
     let mut by_minute = Vec::new();
@@ -31,7 +32,8 @@ fn an_hour_of_recording_holds_no_more_than_its_index() {
         let time_ns = frame as i64 * umbracast::STEP_NS;
         // One packet for 180: the disk need not hold the hour, and memory does not know what a chunk holds.
         writer.write_packets(time_ns, &[vec![packet.clone()], vec![packet.clone()]]).expect("writes");
-        writer.write_rows(time_ns, frame, &rows).expect("writes");
+        let results = Results { frame, time_ns, logged_ns: time_ns, tracks: &rows, ..Results::default() };
+        writer.write_results(&results).expect("writes");
         // As the recorder does, once a second.
         if frame % 10 == 9 {
             writer.flush().expect("flushes");

@@ -128,7 +128,13 @@ fn run(fault: &Fault, config: &Config, sensors: &Sensors, empty: &[Frame]) -> Re
         weights: None,
         empty: empty.to_vec(),
         doors: (0..config.site.sensors.len()).map(|sensor| Door { sensor, port: 0, from: None }).collect(),
-        record: Some(RecordSettings { folder: folder.clone(), file_bytes: u64::MAX, file_s: 1, keep: None }),
+        record: Some(RecordSettings {
+            folder: folder.clone(),
+            file_bytes: u64::MAX,
+            file_s: 1,
+            keep: None,
+            points: false,
+        }),
         clock,
         counters: counters.clone(),
     };

@@ -40,6 +40,7 @@ fn main() -> Result<(), Error> {
         empty: Vec::new(),
         doors: (0..config.site.sensors.len()).map(|sensor| Door { sensor, port: 0, from: None }).collect(),
         record: Some(RecordSettings {
+            points: false,
             folder: folder.clone(),
             file_bytes: 4 << 30,
             file_s: 3600,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use umbracast::detect::Point;
 use umbracast::{Frame, Health, Outcome, Site};
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::wire;
@@ -36,6 +37,8 @@ pub struct Published {
     pub events: Vec<Event>,
     /// New points, site frame, centimetres.
     pub points_cm: Vec<[i16; 3]>,
+    /// All of them as they are, where they are recorded.
+    pub foreground: Option<Vec<Point>>,
     /// Of assembler and stages since the start.
     pub health: Health,
     /// Frames since the start that were given up because the pipeline was busy.

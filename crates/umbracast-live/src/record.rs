@@ -10,7 +10,7 @@ use std::time::{Duration, SystemTime};
 use serde::Serialize;
 use umbracast::lidar::Packet;
 use umbracast::{Config, Error, STEP_NS};
-use umbracast_io::recording::RecordingWriter;
+use umbracast_io::recording::{RecordingWriter, Results};
 
 use crate::published::Published;
 use crate::queue::{Popped, Queue, WhenFull};
@@ -36,6 +36,8 @@ pub struct RecordSettings {
     pub file_s: u64,
     /// The oldest are deleted beyond so many; none are without.
     pub keep: Option<usize>,
+    /// Foreground points are written too.
+    pub points: bool,
 }
 
 /// What a recorder did so far.
@@ -152,7 +154,6 @@ struct Open {
     writer: RecordingWriter,
     started_ns: i64,
     flushed_ns: i64,
-    bytes: u64,
     /// Packets and results that the disk has not seen.
     unflushed: u64,
 }
@@ -182,13 +183,16 @@ impl Files {
                 }
             }
             Item::Result(published) => {
-                let (frame, sensor_time_ns) = (published.frame, published.time_ns);
-                let bytes = 700 * published.tracks.len() + 250 * published.links.len();
-                self.write(published.published_ns, bytes as u64, 1, |writer| {
-                    writer.write_rows(sensor_time_ns, frame, &published.detections)?;
-                    writer.write_rows(sensor_time_ns, frame, &published.tracks)?;
-                    writer.write_rows(sensor_time_ns, frame, &published.links)
-                });
+                let results = Results {
+                    frame: published.frame,
+                    time_ns: published.time_ns,
+                    logged_ns: published.published_ns,
+                    detections: &published.detections,
+                    tracks: &published.tracks,
+                    links: &published.links,
+                    foreground: published.foreground.as_deref(),
+                };
+                self.write(published.published_ns, 1, |writer| writer.write_results(&results));
             }
         }
     }
@@ -196,9 +200,8 @@ impl Files {
     fn write_batch(&mut self) {
         let mut batch = std::mem::take(&mut self.batch);
         let count: u64 = batch.iter().map(|packets| packets.len() as u64).sum();
-        let bytes: usize = batch.iter().flatten().map(|packet| packet.payload.len() + 8).sum();
         if let Some(time_ns) = batch.iter().flatten().map(|packet| packet.time_ns).max() {
-            self.write(time_ns, bytes as u64, count, |writer| writer.write_packets(time_ns, &batch));
+            self.write(time_ns, count, |writer| writer.write_packets(time_ns, &batch));
         }
         batch.iter_mut().for_each(Vec::clear);
         self.batch = batch;
@@ -209,22 +212,21 @@ impl Files {
     fn write(
         &mut self,
         now_ns: i64,
-        bytes: u64,
         items: u64,
         write: impl FnOnce(&mut RecordingWriter) -> Result<(), Error>,
     ) {
         let written = self.file_for(now_ns).and_then(|open| {
+            let before = open.writer.bytes();
             write(&mut open.writer)?;
-            open.bytes += bytes;
             open.unflushed += items;
             if now_ns - open.flushed_ns >= FLUSH_NS {
                 open.writer.flush()?;
                 (open.flushed_ns, open.unflushed) = (now_ns, 0);
             }
-            Ok(())
+            Ok(open.writer.bytes() - before)
         });
         match written {
-            Ok(()) => {
+            Ok(bytes) => {
                 self.status.bytes += bytes;
                 self.status.failing = None;
             }
@@ -243,7 +245,7 @@ impl Files {
     fn file_for(&mut self, now_ns: i64) -> Result<&mut Open, Error> {
         let full = |open: &Open| {
             let s = (now_ns - open.started_ns) / 1_000_000_000;
-            open.bytes >= self.settings.file_bytes || s >= self.settings.file_s as i64
+            open.writer.bytes() >= self.settings.file_bytes || s >= self.settings.file_s as i64
         };
         if self.open.as_ref().is_some_and(full) {
             self.finish_file();
@@ -259,7 +261,7 @@ impl Files {
                 stamp(now_ns)
             ));
             let toml = self.config.to_toml();
-            let begun = RecordingWriter::create_live(&path, &toml, &self.config.site)
+            let begun = RecordingWriter::create_live(&path, &toml, &self.config.site, now_ns)
                 .and_then(|mut writer| writer.flush().map(|()| writer));
             // A full disk still makes files: one that holds nothing would count as a recording.
             let writer = begun.inspect_err(|_| {
@@ -269,7 +271,7 @@ impl Files {
             self.ours.push_back(path);
             self.make_room();
             self.status.files += 1;
-            self.open = Some(Open { writer, started_ns: now_ns, flushed_ns: now_ns, bytes: 0, unflushed: 0 });
+            self.open = Some(Open { writer, started_ns: now_ns, flushed_ns: now_ns, unflushed: 0 });
         }
         self.open.as_mut().ok_or_else(|| Error::new("no open file"))
     }
@@ -347,7 +349,13 @@ mod tests {
     const START_NS: i64 = 1_795_330_000_000_000_000;
 
     fn settings(folder: &Path) -> RecordSettings {
-        RecordSettings { folder: folder.to_owned(), file_bytes: u64::MAX, file_s: 3600, keep: None }
+        RecordSettings {
+            folder: folder.to_owned(),
+            file_bytes: u64::MAX,
+            file_s: 3600,
+            keep: None,
+            points: false,
+        }
     }
 
     fn arrived(k: i64) -> Arrived {

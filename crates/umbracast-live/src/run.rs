@@ -131,6 +131,7 @@ impl Live {
         let mut pipeline = Pipeline::new(&config, weights.as_ref())?;
         empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let assembler = Assembler::new(&config.site)?;
+        let points = record.as_ref().is_some_and(|record| record.points);
         let start = |record| Recorder::start(record, &config, counters.recorder.clone());
         let recorder = record.map(start).transpose()?.map(Arc::new);
         let packets = Arc::new(Queue::new(PACKETS_WAITING, WhenFull::DropNewest));
@@ -152,6 +153,7 @@ impl Live {
             let publish = Publish {
                 clock,
                 sensors,
+                points,
                 recorder,
                 counters,
                 listener,
@@ -286,6 +288,8 @@ fn assemble(
 struct Publish {
     clock: HostClock,
     sensors: usize,
+    /// Whether the recorder wants the foreground.
+    points: bool,
     recorder: Option<Arc<Recorder>>,
     counters: Arc<Counters>,
     listener: Listener,
@@ -304,6 +308,7 @@ fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
         let outcome = pipeline.step(&frame);
         let stepped_ns = publish.clock.now_ns();
         let mut published = Published::of(outcome, &frame, publish.sensors, &publish.access_points);
+        published.foreground = publish.points.then(|| outcome.foreground.clone());
         published.health.add(&health);
         published.frames_skipped = frames.lost();
         published.reloads = publish.reloads;

@@ -13,6 +13,8 @@ use umbracast_sim::sensor::Sensors;
 use crate::clock::HostClock;
 use crate::receive::Arrived;
 
+/// Packets that are made ahead of their time: about a second of two HDL-32E.
+const AHEAD: usize = 4096;
 /// From a packet to the next one of the same recording.
 const SAME_PACE_NS: std::ops::Range<i64> = -STEP_NS..100 * STEP_NS;
 
@@ -30,6 +32,15 @@ pub struct Sent {
     pub failed: u64,
     /// The packet that left latest after its time, by so much.
     pub latest_ns: i64,
+}
+
+impl Sent {
+    /// Together with what was sent before or after.
+    pub fn add(&mut self, more: &Self) {
+        self.packets += more.packets;
+        self.failed += more.failed;
+        self.latest_ns = self.latest_ns.max(more.latest_ns);
+    }
 }
 
 /// Sends packets, each `rate` times as fast as the times they carry follow one another. `to` has an address for each
@@ -74,6 +85,35 @@ pub fn send(
         }
     }
     Ok(sent)
+}
+
+/// Where each of so many sensors' packets go: those without an address follow the last one that is given, on the ports
+/// that follow its.
+pub fn addresses(sensors: usize, given: &[SocketAddr]) -> Vec<SocketAddr> {
+    let of_sensor = |sensor: usize| {
+        given.get(sensor).copied().or_else(|| {
+            let (last, further) = (given.last()?, (sensor + 1).saturating_sub(given.len()));
+            Some(SocketAddr::new(last.ip(), last.port().saturating_add(further as u16)))
+        })
+    };
+    (0..sensors).filter_map(of_sensor).collect()
+}
+
+/// The same packets from a thread of their own, which is some frames ahead: what takes long to make leaves in time all the
+/// same.
+pub fn ahead(
+    packets: impl Iterator<Item = Arrived> + Send + 'static,
+) -> impl Iterator<Item = Arrived> + Send + 'static {
+    let (made, coming) = mpsc::sync_channel(AHEAD);
+    std::thread::spawn(move || {
+        // Nobody takes them any more: the end.
+        for packet in packets {
+            if made.send(packet).is_err() {
+                break;
+            }
+        }
+    });
+    coming.into_iter()
 }
 
 /// The packets of a simulated scene in the order in which they are sent.
@@ -124,4 +164,25 @@ fn in_order(frame: SceneFrame) -> Vec<Arrived> {
 /// takes the hour from his own clock.
 pub fn frame_of_hour(time_ns: i64) -> u64 {
     (time_ns.rem_euclid(3_600_000_000_000) / STEP_NS) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sensors_without_an_address_follow_the_last_one() {
+        let to: Vec<SocketAddr> = vec!["10.0.0.1:7502".parse().unwrap(), "10.0.0.2:2368".parse().unwrap()];
+        let found: Vec<String> = addresses(4, &to).iter().map(SocketAddr::to_string).collect();
+        assert_eq!(found, ["10.0.0.1:7502", "10.0.0.2:2368", "10.0.0.2:2369", "10.0.0.2:2370"]);
+    }
+
+    #[test]
+    fn what_is_made_ahead_comes_whole_and_in_order() {
+        let packet = |k: i64| Arrived { sensor: 0, packet: Packet { time_ns: k, payload: vec![k as u8; 4] } };
+        let taken: Vec<i64> = ahead((0..3 * AHEAD as i64).map(packet)).map(|a| a.packet.time_ns).collect();
+        assert!(taken.into_iter().eq(0..3 * AHEAD as i64));
+        // Whoever leaves early leaves nobody behind.
+        assert_eq!(ahead((0..).map(packet)).take(2).count(), 2);
+    }
 }

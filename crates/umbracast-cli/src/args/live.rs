@@ -1,7 +1,8 @@
 //! Arguments of what runs live.
 
-use std::net::SocketAddr;
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use umbracast::{Error, Mode};
@@ -103,6 +104,32 @@ pub struct ReplayPackets {
     pub rate: f64,
 }
 
+/// `simulate --packets`
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Packets {
+    /// Over UDP to these addresses: see [`umbracast_live::send::addresses`].
+    Udp(Vec<SocketAddr>),
+    /// Into captures.
+    Pcap,
+}
+
+impl FromStr for Packets {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let wrong = |found: &str| Error::new(format!("expected pcap or udp:HOST:PORT, found {found}"));
+        let address = |text: &str| {
+            let mut found = text.to_socket_addrs().map_err(|e| wrong(&format!("{text:?} ({e})")))?;
+            found.next().ok_or_else(|| wrong(text))
+        };
+        match text.strip_prefix("udp:") {
+            Some(addresses) => addresses.split(',').map(address).collect::<Result<_, _>>().map(Self::Udp),
+            None if text == "pcap" => Ok(Self::Pcap),
+            None => Err(wrong(text)),
+        }
+    }
+}
+
 /// The page.
 #[derive(Debug, Clone, Args)]
 pub struct PageArgs {
@@ -137,9 +164,29 @@ pub struct RecordArgs {
     /// Keep the newest so many files and delete older ones; default: delete none.
     #[arg(long, value_name = "N", requires = "record")]
     pub record_keep: Option<usize>,
+    /// Record the foreground points too, as PointCloud2: what every viewer draws.
+    #[arg(long, requires = "record")]
+    pub record_points: bool,
 }
 
 fn positive(text: &str) -> Result<f64, Error> {
     let number: Option<f64> = text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite());
     number.ok_or_else(|| Error::new(format!("expected a number above 0, found {text}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packets_go_to_captures_or_to_addresses() {
+        let at = |text: &str| text.parse::<SocketAddr>().unwrap();
+        assert_eq!("pcap".parse::<Packets>().unwrap(), Packets::Pcap);
+        let two = Packets::Udp(vec![at("127.0.0.1:2368"), at("10.0.0.2:7502")]);
+        assert_eq!("udp:127.0.0.1:2368,10.0.0.2:7502".parse::<Packets>().unwrap(), two);
+        for wrong in ["udp:2368", "tcp:127.0.0.1:2368", "udp:", ""] {
+            let told = wrong.parse::<Packets>().unwrap_err().to_string();
+            assert!(told.contains("expected pcap or udp:HOST:PORT"), "{told}");
+        }
+    }
 }

@@ -11,7 +11,7 @@ use umbracast_sim::crowd::Preset;
 
 mod live;
 
-pub use live::{Check, Live, LogForm, PageArgs, RecordArgs, ReplayPackets, View};
+pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
 
 /// Sees people with LiDARs, foresees where they walk, and tells which radio links they are about to block.
 #[derive(Debug, Parser)]
@@ -183,16 +183,21 @@ pub struct Simulate {
     /// Write every table as CSV too.
     #[arg(long)]
     pub csv: bool,
-    /// Where the recordings go.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
+    /// The sensors' packets as they send them. udp:HOST:PORT: in real time, the site's first sensor to that port and the
+    /// others to those that follow, or each to one of several addresses with commas. pcap: captures beside the recordings,
+    /// one of all sensors, or one for each where neither `udp_port` nor `address` tells them apart.
+    #[arg(long, value_name = "udp:HOST:PORT|pcap")]
+    pub packets: Option<Packets>,
+    /// Where the recordings go; may be left out with --packets udp.
+    #[arg(long, value_name = "DIR", required_unless_present = "packets")]
+    pub out: Option<PathBuf>,
 }
 
 /// `run`
 #[derive(Debug, Args)]
 pub struct Run {
-    /// A folder of recordings or PCD clouds, or files: .mcap, .pcd, or .pcap with one for each sensor in the
-    /// site's order, or one of all.
+    /// A folder of recordings or PCD clouds, or files: .mcap, .db3, .pcd, or .pcap. A capture of all sensors is a scene of its
+    /// own; captures of single sensors are one scene, one for each sensor in the site's order.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -213,6 +218,12 @@ pub struct Run {
     /// Write every table as CSV too.
     #[arg(long)]
     pub csv: bool,
+    /// Write the results of each scene as a recording too, results-0000.mcap, which ROS 2, Foxglove and Rerun open.
+    #[arg(long)]
+    pub mcap: bool,
+    /// The foreground points too, as PointCloud2 in that recording.
+    #[arg(long, requires = "mcap")]
+    pub points: bool,
     /// Where detections, tracks and links go.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

@@ -60,7 +60,7 @@ fn look(file: &Path) -> Result<Findings, Error> {
     }
     let extension = file.extension().and_then(|e| e.to_str()).unwrap_or_default();
     match extension {
-        "mcap" => recording(file, &mut found)?,
+        "mcap" | "db3" => recording(file, &mut found)?,
         "parquet" => table(file, &mut found)?,
         "pcd" => cloud(&bytes()?, file, &mut found)?,
         "pcap" => capture(file, &mut found)?,
@@ -116,7 +116,7 @@ fn look(file: &Path) -> Result<Findings, Error> {
         }
         other => {
             return Err(Error::new(format!(
-                "expected .mcap, .parquet, .csv, .pcd, .pcap, .safetensors, .toml or .json, found {other:?}"
+                "expected .mcap, .db3, .parquet, .csv, .pcd, .pcap, .safetensors, .toml or .json, found {other:?}"
             ))
             .within(file.display()));
         }

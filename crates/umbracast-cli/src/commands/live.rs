@@ -159,6 +159,7 @@ fn recorder(args: &RecordArgs) -> Option<RecordSettings> {
         file_bytes: args.record_mb << 20,
         file_s: args.record_minutes * 60,
         keep: args.record_keep,
+        points: args.record_points,
     })
 }
 
@@ -190,7 +191,8 @@ fn demonstration(
     let stroll = Stroll::new(preset, people, CIRCLE_M, seed);
     Ok(std::thread::spawn(move || {
         let first = send::frame_of_hour(clock.now_ns());
-        send::send(send::strolling(stroll, site, sensors, seed, first), &to, 1.0, clock, &stop)
+        let packets = send::ahead(send::strolling(stroll, site, sensors, seed, first));
+        send::send(packets, &to, 1.0, clock, &stop)
     }))
 }
 

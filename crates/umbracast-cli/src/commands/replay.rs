@@ -1,6 +1,5 @@
 //! `replay`: the packets of recordings over UDP, at the pace they came.
 
-use std::net::SocketAddr;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, mpsc};
 
@@ -26,8 +25,8 @@ pub fn run(args: &ReplayPackets, common: &Common) -> Result<Ending, Error> {
     if args.site.site.is_none() {
         site = input::recorded_site(&inputs)?.unwrap_or(site);
     }
-    let to: Vec<SocketAddr> =
-        (0..site.sensors.len()).filter_map(|sensor| address_of(sensor, &args.to)).collect();
+    let inputs = input::of_site(inputs, &site)?;
+    let to = send::addresses(site.sensors.len(), &args.to);
     let asked: Arc<AtomicBool> = signal::asked_to_end()?;
     let watch = Stopwatch::start();
     let (packets, coming) = mpsc::sync_channel(AHEAD);
@@ -53,24 +52,4 @@ pub fn run(args: &ReplayPackets, common: &Common) -> Result<Ending, Error> {
         .with("late_ms_max", sent.latest_ns as f64 * 1e-6);
     summary.print(common, &format!("{} packets sent in {:.1} s", sent.packets, watch.seconds()));
     if lost.is_empty() { Ok(Ending::Done) } else { Ok(Ending::DataLost(lost.join("; "))) }
-}
-
-/// Where a sensor's packets go: see `--to`.
-fn address_of(sensor: usize, to: &[SocketAddr]) -> Option<SocketAddr> {
-    to.get(sensor).copied().or_else(|| {
-        let (last, further) = (to.last()?, (sensor + 1).saturating_sub(to.len()));
-        Some(SocketAddr::new(last.ip(), last.port().saturating_add(further as u16)))
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sensors_without_an_address_follow_the_last_one() {
-        let to: Vec<SocketAddr> = vec!["10.0.0.1:7502".parse().unwrap(), "10.0.0.2:2368".parse().unwrap()];
-        let found: Vec<String> = (0..4).filter_map(|s| address_of(s, &to)).map(|at| at.to_string()).collect();
-        assert_eq!(found, ["10.0.0.1:7502", "10.0.0.2:2368", "10.0.0.2:2369", "10.0.0.2:2370"]);
-    }
 }

@@ -1,37 +1,44 @@
-//! `run`: recorded input through the pipeline; detections, tracks and links to tables.
+//! `run`: recorded input through the pipeline; detections, tracks and links to tables, and to recordings where asked.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::panic::resume_unwind;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, SyncSender};
+use std::time::Duration;
 
-use rayon::prelude::*;
 use umbracast::forecast::Weights;
-use umbracast::{Config, Error, Frame, Health, Pipeline};
-use umbracast_eval::score::scene::SceneRun;
+use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline};
+use umbracast_io::recording::{RecordingWriter, Results};
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::tables::TableWriter;
+use umbracast_live::latency::Latencies;
 
 use crate::args::{Common, Run};
 use crate::ending::Ending;
 use crate::input::{self, Input};
 use crate::progress::bar;
-use crate::run_json::{RunJson, Stopwatch, ranges};
+use crate::run_json::{Ranges, RunJson, Stopwatch};
 use crate::setup;
 
-/// What came out of one scene.
-#[derive(Debug, Default)]
-struct Done {
-    health: Health,
-    lost: Option<String>,
-    /// Of each frame's `step`, seconds.
-    step_s: Vec<f64>,
-    /// Number of every frame, with tracks or without.
-    frames: Vec<u64>,
+/// Frames of a scene that runs ahead of an earlier one, whose rows wait for the tables.
+const AHEAD: usize = 512;
+
+/// What came out of one frame.
+struct Step {
+    frame: u64,
+    took: Duration,
+    detections: Vec<DetectionRow>,
+    tracks: Vec<TrackRow>,
+    links: Vec<LinkRow>,
 }
 
-/// The rows of some frames.
-#[derive(Debug, Default)]
-struct Rows {
-    detections: Vec<DetectionRow>,
-    said: SceneRun,
+/// What every scene is run with.
+struct Method<'a> {
+    config: &'a Config,
+    weights: &'a Weights,
+    empty: &'a [Frame],
+    /// Where recordings of the results go, and whether with points.
+    recordings: Option<(&'a Path, bool)>,
 }
 
 /// The tables of a run.
@@ -50,10 +57,10 @@ impl Tables {
         })
     }
 
-    fn write(&mut self, rows: &Rows) -> Result<(), Error> {
-        self.detections.write(&rows.detections)?;
-        self.tracks.write(&rows.said.tracks)?;
-        self.links.write(&rows.said.links)
+    fn write(&mut self, step: &Step) -> Result<(), Error> {
+        self.detections.write(&step.detections)?;
+        self.tracks.write(&step.tracks)?;
+        self.links.write(&step.links)
     }
 
     fn finish(self) -> Result<(), Error> {
@@ -63,7 +70,8 @@ impl Tables {
     }
 }
 
-/// Every input is a scene with a pipeline of its own; tables are written in the order of the scenes.
+/// Every input is a scene with a pipeline of its own. Rows are written as they come, in the order of the scenes: nothing
+/// grows with a recording, which may go on for ever.
 pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let inputs = input::scenes(&args.inputs)?;
     let mut config = setup::config(args.mode, args.site.site.as_deref())?;
@@ -71,56 +79,48 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     if args.site.site.is_none() {
         config.site = input::recorded_site(&inputs)?.unwrap_or(config.site);
     }
+    let inputs = input::of_site(inputs, &config.site)?;
+    let numbered: Vec<(u32, &Input)> = inputs.iter().enumerate().map(number_of).collect();
+    if args.mcap {
+        refuse_twice(&numbered)?;
+    }
     let weights = setup::weights(args.weights.as_deref())?;
     let (mut health, mut lost) = (Health::default(), Vec::new());
     let empty = empty_frames(args, &inputs[0], &config, &mut health, &mut lost)?;
     setup::make_dir(&args.out)?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
+    let recordings = args.mcap.then_some((args.out.as_path(), args.points));
+    let method = Method { config: &config, weights: &weights, empty: &empty, recordings };
     let watch = Stopwatch::start();
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let mut tables = Tables::create(&args.out, &names, args.csv)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
-    let (mut step_s, mut frames) = (Vec::new(), Vec::new());
-    let run_all = || -> Result<(), Error> {
-        let mut take = |mut done: Done| {
-            health.add(&done.health);
-            lost.extend(done.lost.take());
-            step_s.append(&mut done.step_s);
-            frames.push(done.frames);
-            progress.inc(1);
-        };
-        if let [input] = &inputs[..] {
-            // A single input may go on for ever: its rows are written as they come.
-            take(run_scene(number_of(0, input), input, &config, &weights, &empty, |rows| {
-                tables.write(rows)?;
-                rows.detections.clear();
-                rows.said.tracks.clear();
-                rows.said.links.clear();
-                Ok(())
-            })?);
-            return Ok(());
-        }
-        let numbered: Vec<(usize, &Input)> = inputs.iter().enumerate().collect();
-        for some in numbered.chunks(rayon::current_num_threads()) {
-            let scene = |&(number, input): &(usize, &Input)| {
-                let mut all = Rows::default();
-                let done = run_scene(number_of(number, input), input, &config, &weights, &empty, |rows| {
-                    all.detections.append(&mut rows.detections);
-                    all.said.tracks.append(&mut rows.said.tracks);
-                    all.said.links.append(&mut rows.said.links);
-                    Ok(())
-                });
-                done.map(|done| (done, all))
-            };
-            for result in some.par_iter().map(scene).collect::<Vec<Result<(Done, Rows), Error>>>() {
-                let (done, rows) = result?;
-                tables.write(&rows)?;
-                take(done);
+    let (mut steps, mut frames) = (Latencies::default(), Vec::new());
+    let mut run_some = |some: &[(u32, &Input)]| {
+        std::thread::scope(|scope| -> Result<(), Error> {
+            let mut running = Vec::new();
+            for &(number, input) in some {
+                let (results, coming) = mpsc::sync_channel(AHEAD);
+                let method = &method;
+                running.push((scope.spawn(move || run_scene(number, input, method, &results)), coming));
             }
-        }
-        Ok(())
+            for (scene, coming) in running {
+                let mut numbers = Ranges::default();
+                for step in coming {
+                    steps.add(step.took);
+                    numbers.push(step.frame);
+                    tables.write(&step)?;
+                }
+                frames.push(numbers);
+                let (scene_health, told) = scene.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+                health.add(&scene_health);
+                lost.extend(told);
+                progress.inc(1);
+            }
+            Ok(())
+        })
     };
-    let result = setup::with_threads(common.threads, run_all)?;
+    let result = numbered.chunks(setup::threads(common.threads)).try_for_each(&mut run_some);
     // What is done stays, also when a later input fails.
     tables.finish()?;
     result?;
@@ -129,14 +129,12 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     lost.extend(empty_handed.map(|(input, _)| {
         format!("{input}: expected frames of the site's sensors, found none; `umbracast inspect` says what it holds")
     }));
-    step_s.sort_by(f64::total_cmp);
-    let at = |share: f64| step_s.get(((step_s.len() as f64 * share) as usize).min(step_s.len().max(1) - 1));
-    let ms = |share: f64| at(share).map_or(0.0, |s| s * 1e3);
+    let ms = |share: f64| steps.quantile(share).as_secs_f64() * 1e3;
     let summary = RunJson::new("run", &watch)
         .with("mode", args.mode)
         .with("scenes", inputs.len())
-        .with("frames", step_s.len())
-        .with("frame_numbers", frames.iter().map(|frames| ranges(frames)).collect::<Vec<_>>())
+        .with("frames", steps.count())
+        .with("frame_numbers", frames.iter().map(Ranges::to_string).collect::<Vec<_>>())
         .with("step_ms_median", ms(0.5))
         .with("step_ms_p99", ms(0.99))
         .with("health", health)
@@ -144,7 +142,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     summary.write(&args.out)?;
     let text = format!(
         "{} frames of {} scenes in {}: {:.2} ms a frame (median), {:.2} ms (99 %)",
-        step_s.len(),
+        steps.count(),
         inputs.len(),
         args.out.display(),
         ms(0.5),
@@ -169,37 +167,89 @@ fn counts(health: &Health) -> String {
 }
 
 /// A recording's own number, so that its rows meet its truth; else its place among the inputs.
-fn number_of(place: usize, input: &Input) -> u32 {
-    input::scene_number(input).unwrap_or(place as u32)
+fn number_of((place, input): (usize, &Input)) -> (u32, &Input) {
+    (input::scene_number(input).unwrap_or(place as u32), input)
 }
 
+/// Two scenes of one number would be recorded into one file.
+fn refuse_twice(numbered: &[(u32, &Input)]) -> Result<(), Error> {
+    let mut seen = BTreeMap::new();
+    for &(number, input) in numbered {
+        if let Some(first) = seen.insert(number, input) {
+            let story = format!("--mcap: expected one scene {number}, found another, {first}");
+            return Err(Error::new(story).within(input));
+        }
+    }
+    Ok(())
+}
+
+/// Gives what was skipped and lost.
 fn run_scene(
     scene: u32,
     input: &Input,
-    config: &Config,
-    weights: &Weights,
-    empty: &[Frame],
-    mut sink: impl FnMut(&mut Rows) -> Result<(), Error>,
-) -> Result<Done, Error> {
-    let mut rows = Rows::default();
+    method: &Method,
+    results: &SyncSender<Step>,
+) -> Result<(Health, Option<String>), Error> {
+    let Method { config, weights, empty, recordings } = method;
     let mut pipeline = Pipeline::new(config, Some(weights))?;
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
-    let mut done = Done::default();
-    let (mut input_health, mut stage_health) = (Health::default(), Health::default());
-    let lost = input.frames(&config.site, &mut input_health, |frame| {
+    let mut recording = recordings.map(|(folder, points)| Recording::new(folder, scene, config, points));
+    let (mut health, mut stage_health) = (Health::default(), Health::default());
+    let lost = input.frames(&config.site, &mut health, |frame| {
         let watch = Stopwatch::start();
         let outcome = pipeline.step(frame);
-        done.step_s.push(watch.seconds());
-        done.frames.push(frame.index);
-        rows.detections.extend(rows::detections(scene, outcome));
-        rows::of_outcome(scene, outcome, &mut rows.said.tracks, &mut rows.said.links);
+        let took = watch.elapsed();
+        let (mut tracks, mut links) = (Vec::new(), Vec::new());
+        rows::of_outcome(scene, outcome, &mut tracks, &mut links);
+        let detections = rows::detections(scene, outcome).collect();
+        let step = Step { frame: frame.index, took, detections, tracks, links };
         stage_health = outcome.health;
-        sink(&mut rows)
+        if let Some(recording) = &mut recording {
+            recording.write(&step, outcome)?;
+        }
+        results.send(step).map_err(|_| Error::new("the tables ended before their rows"))
     })?;
-    done.health = input_health;
-    done.health.add(&stage_health);
-    done.lost = lost;
-    Ok(done)
+    recording.map_or(Ok(()), Recording::finish)?;
+    health.add(&stage_health);
+    Ok((health, lost))
+}
+
+/// One scene's results as a recording, begun with the first frame.
+struct Recording<'a> {
+    path: PathBuf,
+    config: &'a Config,
+    points: bool,
+    open: Option<RecordingWriter>,
+}
+
+impl<'a> Recording<'a> {
+    fn new(folder: &Path, scene: u32, config: &'a Config, points: bool) -> Self {
+        Self { path: folder.join(format!("results-{scene:04}.mcap")), config, points, open: None }
+    }
+
+    fn write(&mut self, step: &Step, outcome: &Outcome) -> Result<(), Error> {
+        let time_ns = outcome.time_ns;
+        let writer = match &mut self.open {
+            Some(writer) => writer,
+            closed => {
+                let (toml, site) = (self.config.to_toml(), &self.config.site);
+                closed.insert(RecordingWriter::create_live(&self.path, &toml, site, time_ns)?)
+            }
+        };
+        writer.write_results(&Results {
+            frame: step.frame,
+            time_ns,
+            logged_ns: time_ns,
+            detections: &step.detections,
+            tracks: &step.tracks,
+            links: &step.links,
+            foreground: self.points.then_some(&outcome.foreground),
+        })
+    }
+
+    fn finish(self) -> Result<(), Error> {
+        self.open.map_or(Ok(()), RecordingWriter::finish)
+    }
 }
 
 /// The scene without people: as given, in any form that `run` reads, else `empty.mcap` beside the first recording.

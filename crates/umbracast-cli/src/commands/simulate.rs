@@ -1,28 +1,29 @@
-//! `simulate`: scenes to recordings, with their truth in tables.
+//! `simulate`: scenes to recordings, with their truth in tables, or as packets to whoever listens.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use indicatif::ProgressBar;
 use rayon::prelude::*;
-use umbracast::lidar::Assembler;
-use umbracast::{Config, Error, Health, Mode};
+use umbracast::{Config, Error, Mode};
 use umbracast_eval::run::chain::{self, EMPTY_FRAMES, SceneSpec};
 use umbracast_eval::score::scene::SceneTruth;
-use umbracast_io::recording::RecordingWriter;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables::TableWriter;
 use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
 
-use crate::args::{Common, Simulate};
+use crate::args::{Common, Packets, Simulate};
 use crate::ending::Ending;
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
 use crate::{crowds, input, say};
 
-/// Simulates every scene, several at a time; tables are written in the order of the scenes.
+mod recorder;
+mod send;
+
+use recorder::Recorder;
+
+/// Simulates every scene into files, over UDP, or both.
 pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     let config = setup::config(Mode::Default, args.site.site.as_deref())?;
     let seed = args.crowd.seed.unwrap_or(TEST_SEED);
@@ -33,25 +34,67 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     };
     let (scenes, mut told) = crowds::dressed(drawn, &args.bodies)?;
     told.extend(crowds::through_walls(&scenes, &config.site));
-    setup::make_dir(&args.out)?;
-    refuse_other_scenes(&args.out, scenes.len())?;
-    setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let watch = Stopwatch::start();
-    record_empty(&config, &args.out.join(input::EMPTY), args.clouds)?;
+    let mut summary = RunJson::new("simulate", &watch)
+        .with("arguments", std::env::args().skip(1).collect::<Vec<_>>())
+        .with("first_seed", seed)
+        .with("scenes", scenes.len())
+        .with("told", &told);
+    let mut text = Vec::new();
+    if let Some(out) = &args.out {
+        let frames = record(args, out, &config, &scenes, common)?;
+        let (count, wall_s) = (scenes.len(), watch.seconds());
+        summary = summary.with("wall_s", wall_s).with("frames", frames);
+        summary.write(out)?;
+        text.push(format!("{count} scenes, {frames} frames in {}: {wall_s:.1} s", out.display()));
+    }
+    match (&args.packets, &args.out) {
+        (Some(Packets::Udp(to)), _) => {
+            let sent = send::scenes(&scenes, &config, to)?;
+            summary = summary
+                .with("packets_sent", sent.packets)
+                .with("packets_failed", sent.failed)
+                .with("sent_late_ms_max", sent.latest_ns as f64 * 1e-6);
+            text.push(format!("{} packets sent in {:.1} s", sent.packets, watch.seconds()));
+        }
+        (Some(Packets::Pcap), None) => return Err(Error::new("--packets pcap: expected --out, found none")),
+        _ => {}
+    }
+    summary.print(common, &text.join("\n"));
+    if !common.json {
+        told.iter().for_each(say::line);
+    }
+    Ok(Ending::Done)
+}
+
+/// Several scenes at a time; tables are written in the order of the scenes. Gives how many frames there are.
+fn record(
+    args: &Simulate,
+    out: &Path,
+    config: &Config,
+    scenes: &[SceneSpec],
+    common: &Common,
+) -> Result<u64, Error> {
+    setup::make_dir(out)?;
+    refuse_other_scenes(out, scenes.len())?;
+    setup::write(&out.join("config.toml"), config.to_toml())?;
+    record_empty(config, &out.join(input::EMPTY), args)?;
     let sensors = Sensors::new(&config.site, TEST_SEED)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
-    let mut people = TableWriter::<PeopleRow>::create(&args.out, &names, args.csv)?;
-    let mut links = TableWriter::<PeopleLinkRow>::create(&args.out, &names, args.csv)?;
+    let mut people = TableWriter::<PeopleRow>::create(out, &names, args.csv)?;
+    let mut links = TableWriter::<PeopleLinkRow>::create(out, &names, args.csv)?;
     let progress = bar(scenes.len() as u64, "scenes simulated", common.quiet);
     let frames = setup::with_threads(common.threads, || -> Result<u64, Error> {
         let mut frames = 0;
         let numbered: Vec<(usize, &SceneSpec)> = scenes.iter().enumerate().collect();
         for some in numbered.chunks(rayon::current_num_threads()) {
-            let truths: Vec<SceneTruth> = some
-                .par_iter()
-                .map(|&(number, scene)| record_scene(&config, &sensors, args, number, scene, &progress))
-                .collect::<Result<_, _>>()?;
-            for truth in truths {
+            let record = |&(number, scene): &(usize, &SceneSpec)| {
+                let truth =
+                    record_scene(config, &sensors, args, &input::scene_file(out, number), number, scene);
+                progress.inc(1);
+                truth
+            };
+            for truth in some.par_iter().map(record).collect::<Result<Vec<SceneTruth>, _>>()? {
                 frames += truth.people.last().map_or(0, |row| row.frame + 1);
                 people.write(&truth.people)?;
                 links.write(&truth.links)?;
@@ -62,19 +105,7 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     people.finish()?;
     links.finish()?;
     progress.finish_and_clear();
-    let summary = RunJson::new("simulate", &watch)
-        .with("arguments", std::env::args().skip(1).collect::<Vec<_>>())
-        .with("first_seed", seed)
-        .with("scenes", scenes.len())
-        .with("frames", frames)
-        .with("told", &told);
-    summary.write(&args.out)?;
-    let (count, folder, wall_s) = (scenes.len(), args.out.display(), watch.seconds());
-    summary.print(common, &format!("{count} scenes, {frames} frames in {folder}: {wall_s:.1} s"));
-    if !common.json {
-        told.iter().for_each(say::line);
-    }
-    Ok(Ending::Done)
+    Ok(frames)
 }
 
 /// Recordings of an earlier simulation would be run and scored among the new ones, without truth.
@@ -89,8 +120,8 @@ fn refuse_other_scenes(folder: &Path, scenes: usize) -> Result<(), Error> {
 }
 
 /// The hall without people.
-fn record_empty(config: &Config, path: &Path, clouds: bool) -> Result<(), Error> {
-    let mut writer = Recorder::create(path, config, clouds)?;
+fn record_empty(config: &Config, path: &Path, args: &Simulate) -> Result<(), Error> {
+    let mut writer = Recorder::create(path, config, args)?;
     for (index, packets) in Scene::empty(&config.site, TEST_SEED, EMPTY_FRAMES)?.iter().enumerate() {
         writer.packets((index as i64 + 1) * umbracast::STEP_NS, packets)?;
     }
@@ -101,63 +132,21 @@ fn record_scene(
     config: &Config,
     sensors: &Sensors,
     args: &Simulate,
+    path: &Path,
     number: usize,
     spec: &SceneSpec,
-    progress: &ProgressBar,
 ) -> Result<SceneTruth, Error> {
-    let path = input::scene_file(&args.out, number);
     let mut scene = Scene::in_hall(spec.crowd(), &config.site, sensors, spec.seed).with_bodies(&spec.bodies);
-    let mut writer = Recorder::create(&path, config, args.clouds)?;
+    let mut writer = Recorder::create(path, config, args)?;
     let mut all = SceneTruth::default();
     while let Some(frame) = scene.next_frame() {
         let mut truth = SceneTruth::default();
         umbracast_eval::score::scene::note_truth(number as u32, &frame, &mut truth);
         writer.packets(frame.time_ns, &frame.packets)?;
-        writer.recording.write_truth(frame.time_ns, frame.index, &truth.people, &truth.links)?;
+        writer.truth(frame.time_ns, frame.index, &truth)?;
         all.people.append(&mut truth.people);
         all.links.append(&mut truth.links);
     }
     writer.finish()?;
-    progress.inc(1);
     Ok(all)
-}
-
-/// A recording that appears under its name only when it is whole, so a run that was stopped leaves none behind
-/// that looks finished.
-struct Recorder<'a> {
-    recording: RecordingWriter,
-    clouds: Option<Assembler>,
-    path: &'a Path,
-}
-
-impl<'a> Recorder<'a> {
-    fn create(path: &'a Path, config: &Config, clouds: bool) -> Result<Self, Error> {
-        let recording =
-            RecordingWriter::create(&path.with_extension("part"), &config.to_toml(), &config.site, clouds)?;
-        let clouds = clouds.then(|| Assembler::new(&config.site)).transpose()?;
-        Ok(Self { recording, clouds, path })
-    }
-
-    fn packets(&mut self, time_ns: i64, packets: &[Vec<umbracast::lidar::Packet>]) -> Result<(), Error> {
-        self.recording.write_packets(time_ns, packets)?;
-        if let Some(assembler) = &mut self.clouds {
-            chain::push(assembler, packets, &mut Health::default());
-            while let Some(frame) = assembler.pop() {
-                self.recording.write_clouds(&frame)?;
-            }
-        }
-        Ok(())
-    }
-
-    fn finish(mut self) -> Result<(), Error> {
-        if let Some(assembler) = &mut self.clouds {
-            assembler.finish();
-            while let Some(frame) = assembler.pop() {
-                self.recording.write_clouds(&frame)?;
-            }
-        }
-        self.recording.finish()?;
-        fs::rename(self.path.with_extension("part"), self.path)
-            .map_err(|e| Error::new(e.to_string()).within(self.path.display()))
-    }
 }

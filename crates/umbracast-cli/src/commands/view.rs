@@ -23,6 +23,7 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
     if args.site.site.is_none() {
         config.site = input::recorded_site(&inputs)?.unwrap_or(config.site);
     }
+    let inputs = input::of_site(inputs, &config.site)?;
     let weights = setup::weights(None)?;
     let asked = signal::asked_to_end()?;
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));

@@ -1,4 +1,5 @@
-//! Captures: one for each sensor of the site, or one of all sensors, told apart by port and address.
+//! Captures: one for each sensor of the site, or whole recordings with all sensors in one, told apart by port and
+//! address.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -11,22 +12,48 @@ use umbracast_io::pcap::{Datagram, PcapReader};
 
 use super::sink::PacketSink;
 
-/// Gives the packets of captures in the order of their times; says which one is cut.
+/// A capture of several sensors shows more than one of them within so many nanoseconds.
+const LOOK_NS: i64 = 2_000_000_000;
+
+/// Captures as scenes. Each is one where the site has one sensor, or where one of them holds packets of several sensors;
+/// else they are one for each sensor in the site's order, and one scene together.
+///
+/// # Errors
+/// Another number of captures of single sensors, or a file that is no capture.
+pub fn in_scenes(files: Vec<PathBuf>, site: &Site) -> Result<Vec<Vec<PathBuf>>, Error> {
+    let (expected, found) = (site.sensors.len(), files.len());
+    let apart = whole_site(site).is_ok();
+    let mut whole = expected == 1 || found == 1;
+    for file in files.iter().filter(|_| apart) {
+        whole = whole || shows_several(file, site)?;
+    }
+    match whole {
+        true => Ok(files.into_iter().map(|file| vec![file]).collect()),
+        false if found == expected => Ok(vec![files]),
+        false => Err(Error::new(format!(
+            "expected {expected} captures, one for each sensor of the site in its order, or captures that hold packets \
+             of all of them, found {found} of single sensors"
+        ))
+        .within(files[0].display())),
+    }
+}
+
+fn shows_several(file: &Path, site: &Site) -> Result<bool, Error> {
+    let mut capture = Capture::open(file, whole_site(site)?)?;
+    let Some((first, Packet { time_ns, .. })) = capture.next() else { return Ok(false) };
+    let others = std::iter::from_fn(|| capture.next());
+    Ok(others.take_while(|(_, packet)| packet.time_ns - time_ns < LOOK_NS).any(|(sensor, _)| sensor != first))
+}
+
+/// Gives the packets of one scene's captures, as [`in_scenes`] has them, in the order of their times; says which one is
+/// cut.
 pub fn packets(files: &[PathBuf], site: &Site, sink: PacketSink) -> Result<Option<String>, Error> {
     let mut captures = match files {
         [file] => vec![Capture::open(file, whole_site(site).map_err(|e| e.within(file.display()))?)?],
-        _ if files.len() == site.sensors.len() => (files.iter().zip(&site.sensors))
+        _ => (files.iter().zip(&site.sensors))
             .enumerate()
             .map(|(s, (file, sensor))| Capture::open(file, vec![Sender::of(s, sensor)]))
             .collect::<Result<_, _>>()?,
-        _ => {
-            let (expected, found) = (site.sensors.len(), files.len());
-            return Err(Error::new(format!(
-                "expected {expected} captures, one for each sensor of the site in its order, or one of all, \
-                 found {found}"
-            ))
-            .within(files[0].display()));
-        }
     };
     let mut next: Vec<Option<(usize, Packet)>> = captures.iter_mut().map(Capture::next).collect();
     let time_ns = |next: &Option<(usize, Packet)>| next.as_ref().map(|(_, packet)| packet.time_ns);
@@ -43,7 +70,7 @@ pub fn packets(files: &[PathBuf], site: &Site, sink: PacketSink) -> Result<Optio
 }
 
 /// A sensor as its datagrams show it.
-struct Sender {
+pub struct Sender {
     sensor: usize,
     port: Option<u16>,
     address: Option<[u8; 4]>,
@@ -63,7 +90,7 @@ impl Sender {
 ///
 /// # Errors
 /// Two of them whose datagrams cannot be told apart.
-fn whole_site(site: &Site) -> Result<Vec<Sender>, Error> {
+pub fn whole_site(site: &Site) -> Result<Vec<Sender>, Error> {
     let senders: Vec<Sender> =
         site.sensors.iter().enumerate().map(|(s, sensor)| Sender::of(s, sensor)).collect();
     for (i, one) in senders.iter().enumerate() {

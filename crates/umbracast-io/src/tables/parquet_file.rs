@@ -329,6 +329,7 @@ fn read_column(
         Cell::AccessPoint(_) => "names of access points",
     };
     let at = at.ok_or_else(|| Error::new(format!("expected {expected}, found no such column")))?;
+    refuse_codec(columns[at].compression())?;
     let broken = |e: ParquetError| Error::new(format!("expected {expected}, found: {e}"));
     let whole = |v: i64| Value::Whole(v);
     let values = match (group.get_column_reader(at).map_err(broken)?, cell) {
@@ -385,6 +386,22 @@ fn read_column(
         return Err(Error::new(format!("expected {count} values, found {}", values.len())));
     }
     Ok(values)
+}
+
+/// Who writes a table with another program may not know how it is compressed; polars does it with zstd.
+fn refuse_codec(codec: Compression) -> Result<(), Error> {
+    let with_zstd = cfg!(feature = "compression");
+    let found = match codec {
+        Compression::UNCOMPRESSED | Compression::SNAPPY => return Ok(()),
+        Compression::ZSTD(_) if with_zstd => return Ok(()),
+        Compression::ZSTD(_) => "zstd, which a build with `--features compression` reads".to_owned(),
+        other => format!("{other:?}"),
+    };
+    let known = if with_zstd { "snappy, zstd" } else { "snappy" };
+    Err(Error::new(format!(
+        "expected values compressed with {known} or not at all, found {found}; polars writes snappy with \
+         `write_parquet(file, compression=\"snappy\")`"
+    )))
 }
 
 /// All values of a flat column, `Null` where there is none.

@@ -1,0 +1,248 @@
+//! Writes recordings. A topic is made when something is first written to it.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use mcap::records::MessageHeader;
+use umbracast::detect::Point;
+use umbracast::lidar::{Frame, Model, Packet};
+use umbracast::{Error, Site};
+
+use super::CONFIG_TOPIC;
+use crate::messages::{self, Schema};
+use crate::rows::{DetectionRow, LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
+use crate::viewers;
+use crate::wire::{self, WireRow};
+
+/// A chunk of what goes on for hours, at most, bytes: a second of two HDL-32E. The index of the file, some 250 bytes a
+/// chunk, stays in memory until the file ends, so chunks should be few.
+const LIVE_CHUNK_BYTES: u64 = 4 << 20;
+
+/// Writes a recording, in chunks of a frame or two.
+pub struct RecordingWriter {
+    path: PathBuf,
+    mcap: mcap::Writer<BufWriter<File>>,
+    site: Site,
+    access_points: Vec<String>,
+    clouds: bool,
+    /// By sensor: the topic of its packets, and whether they are of a Velodyne's length.
+    packets: Vec<(String, bool)>,
+    channels: BTreeMap<String, u16>,
+    sequence: u32,
+    bytes: u64,
+}
+
+/// What a run made of one frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Results<'a> {
+    /// The frame's number.
+    pub frame: u64,
+    /// The frame's time; every position is given at it.
+    pub time_ns: i64,
+    /// When a live run published it, in the host's time; else the frame's time. Recordings are ordered by it.
+    pub logged_ns: i64,
+    /// Everybody seen.
+    pub detections: &'a [DetectionRow],
+    /// Everybody followed, with where they will be.
+    pub tracks: &'a [TrackRow],
+    /// Every link.
+    pub links: &'a [LinkRow],
+    /// Points that do not belong to the empty scene; none where nobody asked for them.
+    pub foreground: Option<&'a [Point]>,
+}
+
+impl RecordingWriter {
+    /// Starts a recording over whatever is there.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn create(path: &Path, config_toml: &str, site: &Site, clouds: bool) -> Result<Self, Error> {
+        let mut writer = Self::create_with(mcap::WriteOptions::new(), path, config_toml, site, 0)?;
+        writer.clouds = clouds;
+        Ok(writer)
+    }
+
+    /// The same for what goes on until it is stopped or killed, from this time on: a chunk is held in memory until it is
+    /// whole, so that the file never ends in half of one that says it is whole.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn create_live(path: &Path, config_toml: &str, site: &Site, start_ns: i64) -> Result<Self, Error> {
+        let options = mcap::WriteOptions::new().disable_seeking(true).chunk_size(Some(LIVE_CHUNK_BYTES));
+        Self::create_with(options, path, config_toml, site, start_ns)
+    }
+
+    fn create_with(
+        options: mcap::WriteOptions,
+        path: &Path,
+        config_toml: &str,
+        site: &Site,
+        start_ns: i64,
+    ) -> Result<Self, Error> {
+        let fail = |e: &dyn std::fmt::Display| Error::new(e.to_string()).within(path.display());
+        let file = BufWriter::new(File::create(path).map_err(|e| fail(&e))?);
+        // Packets hardly compress (a sixth), and a reader then needs no codec.
+        let mcap = options
+            .compression(None)
+            .profile("ros2")
+            .library(concat!("umbracast ", env!("CARGO_PKG_VERSION")))
+            .create(file)
+            .map_err(|e| fail(&e))?;
+        let packets = site.sensors.iter().map(|sensor| {
+            let other = Model::of_sensor(sensor).is_ok_and(|m| m.packet_bytes() != messages::PACKET_BYTES);
+            (format!("/{}/packets", sensor.name), !other)
+        });
+        let mut writer = Self {
+            path: path.to_owned(),
+            mcap,
+            packets: packets.collect(),
+            access_points: site.access_points.iter().map(|ap| ap.name.clone()).collect(),
+            site: site.clone(),
+            clouds: false,
+            channels: BTreeMap::new(),
+            sequence: 0,
+            bytes: 0,
+        };
+        writer.put(CONFIG_TOPIC, || messages::CONFIG, start_ns, &messages::text(config_toml))?;
+        let poses = messages::transforms(&writer.site, start_ns);
+        writer.put("/tf_static", || messages::TRANSFORMS, start_ns, &poses)?;
+        Ok(writer)
+    }
+
+    /// Bytes of all messages so far.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Packets that were sent up to `time_ns`, one list a sensor. Empty lists are written too: whoever reads tells by a
+    /// sensor's next list that these are over.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_packets(&mut self, time_ns: i64, packets: &[Vec<Packet>]) -> Result<(), Error> {
+        for (sensor, packets) in packets.iter().enumerate() {
+            let (topic, of_velodyne) = self.packets[sensor].clone();
+            let (message, schema) = match of_velodyne {
+                true => (messages::scan as fn(i64, &str, &[Packet]) -> Vec<u8>, messages::SCAN),
+                false => (messages::sensor_packets as _, messages::SENSOR_PACKETS),
+            };
+            let message = message(time_ns, &self.site.sensors[sensor].name, packets);
+            self.put(&topic, || schema, time_ns, &message)?;
+        }
+        Ok(())
+    }
+
+    /// The clouds of a frame, where [`Self::create`] was asked for them.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_clouds(&mut self, frame: &Frame) -> Result<(), Error> {
+        let asked_for = self.clouds;
+        for scan in frame.scans.iter().filter(|_| asked_for) {
+            let start_ns = frame.time_ns - umbracast::STEP_NS;
+            let name = &self.site.sensors[scan.sensor].name;
+            let (topic, message) = (format!("/{name}/points"), messages::cloud(start_ns, name, scan));
+            self.put(&topic, || messages::CLOUD, frame.time_ns, &message)?;
+        }
+        Ok(())
+    }
+
+    /// The truth of one frame.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_truth(
+        &mut self,
+        time_ns: i64,
+        frame: u64,
+        people: &[PeopleRow],
+        links: &[PeopleLinkRow],
+    ) -> Result<(), Error> {
+        let (people, links) =
+            (messages::people(time_ns, frame, people), messages::links(time_ns, frame, links, &self.site));
+        self.put("/truth/people", || messages::PEOPLE, time_ns, &people)?;
+        self.put("/truth/links", || messages::LINKS, time_ns, &links)
+    }
+
+    /// What a run made of one frame: its rows, and the same as viewers draw it.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_results(&mut self, results: &Results) -> Result<(), Error> {
+        let &Results { time_ns, logged_ns, tracks, links, foreground, .. } = results;
+        self.write_rows(results, results.detections)?;
+        self.write_rows(results, tracks)?;
+        self.write_rows(results, links)?;
+        // Who plays a recording with `ros2 bag` sends `/tf_static` once, to nobody who asks later.
+        let poses = messages::transforms(&self.site, time_ns);
+        self.put("/tf", || messages::TRANSFORMS, logged_ns, &poses)?;
+        let markers = viewers::markers(time_ns, &self.site, tracks, links);
+        self.put(viewers::MARKERS_TOPIC, viewers::markers_schema, logged_ns, &markers)?;
+        let people = viewers::people(time_ns, tracks);
+        self.put(viewers::PEOPLE_TOPIC, viewers::people_schema, logged_ns, &people)?;
+        let Some(points) = foreground else { return Ok(()) };
+        let points = viewers::foreground(time_ns, points);
+        self.put(viewers::FOREGROUND_TOPIC, || messages::CLOUD, logged_ns, &points)
+    }
+
+    fn write_rows<R: WireRow>(&mut self, results: &Results, rows: &[R]) -> Result<(), Error> {
+        let message = wire::encode(results.time_ns, results.frame, rows, &self.access_points);
+        self.put(R::TOPIC, wire::schema::<R>, results.logged_ns, &message)
+    }
+
+    /// A word, on a topic of its own.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn write_text(&mut self, topic: &str, time_ns: i64, text: &str) -> Result<(), Error> {
+        self.put(topic, || messages::CONFIG, time_ns, &messages::text(text))
+    }
+
+    /// Ends the chunk and hands it to the system: what stands before this survives the program.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn flush(&mut self) -> Result<(), Error> {
+        self.mcap.flush().map_err(|e| self.fail(&e))
+    }
+
+    /// Writes the index and the end of the file.
+    ///
+    /// # Errors
+    /// A disk that is full or gone.
+    pub fn finish(mut self) -> Result<(), Error> {
+        self.mcap.finish().map_err(|e| self.fail(&e)).map(|_| ())
+    }
+
+    fn put(
+        &mut self,
+        topic: &str,
+        schema: impl FnOnce() -> Schema,
+        time_ns: i64,
+        message: &[u8],
+    ) -> Result<(), Error> {
+        let channel_id = match self.channels.get(topic) {
+            Some(&channel) => channel,
+            None => {
+                let Schema { name, definition } = schema();
+                let channel = (self.mcap.add_schema(&name, "ros2msg", definition.as_bytes()))
+                    .and_then(|schema| self.mcap.add_channel(schema, topic, "cdr", &BTreeMap::new()))
+                    .map_err(|e| self.fail(&e))?;
+                self.channels.insert(topic.to_owned(), channel);
+                channel
+            }
+        };
+        let time = time_ns.max(0) as u64;
+        let header =
+            MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
+        self.sequence += 1;
+        self.bytes += message.len() as u64;
+        self.mcap.write_to_known_channel(&header, message).map_err(|e| self.fail(&e))
+    }
+
+    fn fail(&self, error: &mcap::McapError) -> Error {
+        Error::new(error.to_string()).within(self.path.display())
+    }
+}
