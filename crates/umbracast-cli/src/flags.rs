@@ -2,13 +2,22 @@
 
 use std::path::PathBuf;
 
-use clap::ArgMatches;
 use clap::parser::ValueSource;
+use clap::{ArgMatches, CommandFactory};
 use umbracast_sim::body::kind::Kind;
 
+use crate::args::Cli;
+
 /// A line for each flag of a command that was given in vain.
-pub fn without_effect(command: &ArgMatches) -> Vec<String> {
-    let takes = |flag: &str| command.try_contains_id(flag).is_ok();
+pub fn without_effect(name: &str, command: &ArgMatches) -> Vec<String> {
+    // The matches know which flags there are in debug builds alone.
+    let cli = Cli::command();
+    let flags: Vec<&str> = cli
+        .find_subcommand(name)
+        .into_iter()
+        .flat_map(|c| c.get_arguments().map(|flag| flag.get_id().as_str()))
+        .collect();
+    let takes = |flag: &str| flags.contains(&flag);
     let given = |flag: &str| takes(flag) && command.value_source(flag) == Some(ValueSource::CommandLine);
     let mut told = Vec::new();
     let mut idle = |flags: &[&str], why: &str| {
@@ -51,12 +60,11 @@ pub fn without_effect(command: &ArgMatches) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::args::Cli;
-    use clap::CommandFactory;
 
     fn told(arguments: &str) -> String {
         let given = Cli::command().get_matches_from(arguments.split(' '));
-        without_effect(given.subcommand().unwrap().1).join("; ")
+        let (name, given) = given.subcommand().unwrap();
+        without_effect(name, given).join("; ")
     }
 
     #[test]
@@ -64,6 +72,7 @@ mod tests {
         for (arguments, story) in [
             ("u simulate --fps 25 --out o", "--fps has no effect without --trajectories"),
             ("u simulate --trajectories a.csv --fps 25 --out o", ""),
+            ("u live --demo --seconds 5", ""),
             (
                 "u simulate --trajectories a.csv --preset mixed --people 3 --out o",
                 "--preset has no effect with --trajectories: recorded people walk; \

@@ -26,8 +26,8 @@ use ending::Ending;
 fn main() -> ExitCode {
     let given = Cli::command().get_matches();
     let cli = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
-    if let Some((_, given)) = given.subcommand() {
-        flags::without_effect(given).iter().for_each(|told| say::note(told));
+    if let Some((name, given)) = given.subcommand() {
+        flags::without_effect(name, given).iter().for_each(|told| say::note(told));
     }
     let result = match cli.command.unwrap_or_default() {
         Command::Demo(args) => commands::demo::run(&args, &cli.common),

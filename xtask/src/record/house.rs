@@ -35,6 +35,70 @@ pub fn faults(book: &mut Book) -> Result<()> {
     script(book, faults, faults)
 }
 
+/// Ten minutes of simulated sensors over loopback, recorded, the page open: what was lost, how late warnings came, and
+/// how much memory it took in the first minute and in the last.
+pub fn live(book: &mut Book) -> Result<()> {
+    let ouster = book.scratch("ouster.toml");
+    let site = "[[site.sensors]]\nname = \"lidar\"\nmodel = \"os0-128\"\nposition_m = [16.0, 0.0, 9.0]\n\
+                rotation_deg = { yaw = 180.0, pitch = 35.0, roll = 0.0 }\nrange_noise_m = 0.02\n";
+    std::fs::write(&ouster, site).map_err(|e| format!("{}: {e}", ouster.display()))?;
+    live_run(book, "10", None)?;
+    live_run(book, "40", None)?;
+    live_run(book, "10", Some(&ouster))?;
+    book.line(&format!("# ouster.toml:\n{site}"));
+    Ok(())
+}
+
+fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
+    const SECONDS: u64 = 600;
+    let folder = book.scratch("live");
+    let mut words: Vec<OsString> =
+        ["live", "--demo", "--people", people, "--seconds"].map(OsString::from).into();
+    words.push(SECONDS.to_string().into());
+    if let Some(site) = site {
+        words.extend(["--site".into(), argument(site)]);
+    }
+    words.extend(["--json".into(), "--quiet".into(), "--serve".into(), "127.0.0.1:8600".into()]);
+    words.extend(["--record".into(), argument(&folder)]);
+    let said: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
+    book.command(&format!("umbracast {}", said.join(" ")));
+    let mut live = Command::new(book.umbracast());
+    let live = live.args(&words).stdout(Stdio::piped()).stderr(Stdio::null());
+    let live = live.spawn().map_err(|e| format!("umbracast: {e}"))?;
+    sleep(Duration::from_secs(2));
+    let mut browser = Command::new("chromium");
+    browser.args(["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"]);
+    browser.arg("http://127.0.0.1:8600/").stdout(Stdio::null()).stderr(Stdio::null());
+    let page = browser.spawn();
+    let mut resident_kb = Vec::new();
+    while let Some(kb) = resident(live.id()) {
+        resident_kb.push(kb);
+        sleep(Duration::from_secs(1));
+    }
+    match page {
+        Ok(mut page) => page.kill().and_then(|()| page.wait().map(drop)).map_err(|e| e.to_string())?,
+        Err(_) => book.line("no chromium: nobody looked at the page"),
+    }
+    let output = live.wait_with_output().map_err(|e| e.to_string())?;
+    let said = String::from_utf8_lossy(&output.stdout);
+    book.line(said.trim_end());
+    let minute = resident_kb.len().min(60);
+    let mean = |kb: &[u64]| kb.iter().sum::<u64>() as f64 / kb.len().max(1) as f64 / 1024.0;
+    let (first, last) = (mean(&resident_kb[..minute]), mean(&resident_kb[resident_kb.len() - minute..]));
+    let grown = 100.0 * (last / first - 1.0);
+    book.line(&format!(
+        "resident, mean of the first minute and of the last: {first:.1} MiB, {last:.1} MiB ({grown:+.1} %)\n"
+    ));
+    std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))
+}
+
+/// KiB that a process holds; `None` once it has ended.
+fn resident(id: u32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{id}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.trim().trim_end_matches(" kB").trim().parse().ok()
+}
+
 /// The same seed twice, on one thread and on two.
 pub fn same_bytes(book: &mut Book) -> Result<()> {
     let of_threads = [("one", "1"), ("two", "2")];
