@@ -114,24 +114,34 @@ impl RangeModel {
     }
 
     /// The pixel of a row that looks at this azimuth, hundredths of a degree.
-    #[inline(always)]
     pub fn pixel(&self, row: usize, azimuth_cdeg: f32) -> usize {
-        // A turn more or less is common, more than one is not: no remainder in the hot loop. Nor a call of `floor`, which
-        // is one where the processor may be any.
-        let bins = azimuth_cdeg * self.bins_per_cdeg;
-        let mut bin = bins as i32;
-        bin -= i32::from(bins < bin as f32);
-        let bins = self.bins as i32;
-        bin -= if bin >= bins { bins } else { 0 };
-        bin += if bin < 0 { bins } else { 0 };
-        bin.clamp(0, bins - 1) as usize * self.rows + row
+        self.bin(azimuth_cdeg) as usize * self.rows + row
     }
 
     /// The same of a column: the first azimuth is that of row 0.
     pub fn pixels(&self, azimuths_cdeg: &[f32], pixels: &mut [u32]) {
-        for (row, (pixel, azimuth_cdeg)) in pixels.iter_mut().zip(azimuths_cdeg).enumerate() {
-            *pixel = self.pixel(row, *azimuth_cdeg) as u32;
+        for (row, (pixel, azimuth_cdeg)) in (0_u32..).zip(pixels.iter_mut().zip(azimuths_cdeg)) {
+            *pixel = self.bin(*azimuth_cdeg) * self.rows as u32 + row;
         }
+    }
+
+    /// A turn more or less is common, more than one is not: no remainder in the hot loop. Nor a call of `floor` or a
+    /// conversion that asks for NaN, which no vector register does where the processor may be any.
+    #[inline(always)]
+    fn bin(&self, azimuth_cdeg: f32) -> u32 {
+        // Numbers of this size are whole: adding it and taking it away rounds, and the bits of a sum end in those of
+        // the whole number. Bins are far fewer.
+        const WHOLE: f32 = 8_388_608.0;
+        const SIGNED: f32 = 1.5 * WHOLE;
+        let (bins, asked) = (self.bins as f32, azimuth_cdeg * self.bins_per_cdeg);
+        let rounded = (asked + SIGNED) - SIGNED;
+        let mut bin = rounded - if rounded > asked { 1.0 } else { 0.0 };
+        bin -= if bin >= bins { bins } else { 0.0 };
+        bin += if bin < 0.0 { bins } else { 0.0 };
+        // Where the azimuth is no number, neither comparison holds.
+        let below = if bin < bins { bin } else { bins - 1.0 };
+        let bin = if below > 0.0 { below } else { 0.0 };
+        (bin + WHOLE).to_bits() & 0x7f_ffff
     }
 
     /// Whether any return of a column is new, or is one that cannot be told, as NaN.
@@ -300,6 +310,27 @@ fn nearest_m(modes: &[Mode; MODES], least: f32) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_azimuth_lies_in_its_bin_whatever_it_is() {
+        let model = RangeModel::new(0.05, 0.2);
+        for (azimuth_cdeg, bin) in [
+            (0.0, 0),
+            (19.9, 0),
+            (20.0, 1),
+            (35_999.0, 1799),
+            (36_000.0, 0),
+            (-0.5, 1799),
+            (-35_999.0, 0),
+            (71_999.0, 1799),
+            (f32::NAN, 1799),
+            (f32::INFINITY, 1799),
+            (1e30, 1799),
+            (-1e30, 0),
+        ] {
+            assert_eq!(model.bin(azimuth_cdeg), bin, "{azimuth_cdeg}");
+        }
+    }
 
     const ROWS: usize = 4;
     const NEAR_M: f32 = 5.0;
