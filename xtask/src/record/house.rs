@@ -99,6 +99,44 @@ fn resident(id: u32) -> Option<u64> {
     line.trim().trim_end_matches(" kB").trim().parse().ok()
 }
 
+/// A recording run killed at twenty moments, drawn by chance: what each file still holds.
+pub fn kills(book: &mut Book) -> Result<()> {
+    const KILLS: u64 = 20;
+    book.command("umbracast live --demo --people 4 --no-serve --record /tmp/live, killed (SIGKILL) twenty times");
+    book.line("killed after, s   bytes      `umbracast inspect`  frames with results   seconds of them");
+    // A row of numbers that nobody chose, the same in every record.
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    for _ in 0..KILLS {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let after = Duration::from_millis(1500 + (state >> 33) % 5000);
+        let folder = book.scratch("live");
+        let mut live = Command::new(book.umbracast());
+        live.args(["live", "--demo", "--people", "4", "--no-serve", "--quiet", "--record"]).arg(&folder);
+        let live = live.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        let mut live = live.map_err(|e| format!("umbracast: {e}"))?;
+        sleep(after);
+        live.kill().and_then(|()| live.wait()).map_err(|e| e.to_string())?;
+        let files = files_below(&folder, ".mcap");
+        let [file] = &files[..] else { return Err(format!("expected one recording, found {}", files.len())) };
+        let bytes = std::fs::metadata(file).map_err(|e| e.to_string())?.len();
+        let looked = Command::new(book.umbracast()).arg("inspect").arg(file).output();
+        let looked = looked.map_err(|e| format!("umbracast: {e}"))?;
+        let said = String::from_utf8_lossy(&looked.stdout).into_owned();
+        let results = said.lines().find(|line| line.contains("/umbracast/blockages"));
+        let messages = results.and_then(|line| line.split_whitespace().rev().nth(1)).unwrap_or("0");
+        let frames: u32 = messages.parse().map_err(|_| format!("expected a number of messages, found {messages}"))?;
+        let opened = match looked.status.code() {
+            Some(0) => "opens whole".to_owned(),
+            Some(3) => "opens, end cut".to_owned(),
+            code => format!("fails: {code:?}"),
+        };
+        let lived = after.as_secs_f64();
+        book.line(&format!("{lived:15.3} {bytes:11}   {opened:20} {frames:18} {:17.1}", f64::from(frames) * 0.1));
+        std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    }
+    Ok(())
+}
+
 /// The same seed twice, on one thread and on two.
 pub fn same_bytes(book: &mut Book) -> Result<()> {
     let of_threads = [("one", "1"), ("two", "2")];
