@@ -24,8 +24,9 @@ use crate::{STEP_S, STEPS};
 /// Quantiles of times that are reported.
 const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 
-/// Most body-ray tests of a frame: everybody who may stand in the way of somebody at a step, times samples. An estimate
-/// of what a core does in a third of a frame's 100 ms, not measured yet; `bench/src/bin/growth.rs` will tell.
+/// Most body-ray tests of a frame: everybody who may stand in the way of somebody at a step, times samples. So many take
+/// some 10 ms of one core (`bench/src/bin/growth.rs`): a hundred people in 500 m^2 with two access points ask for more, forty
+/// only where they all meet.
 const TESTS_MAX: usize = 1 << 20;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
 const SAMPLES_MIN: usize = WORD;

@@ -122,3 +122,23 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
     }
     assert!(in_doubt > 10 && seen_late < 5, "{in_doubt} in doubt, {seen_late} in the second half alone");
 }
+
+#[test]
+fn processors_with_narrower_registers_give_the_same_bits() {
+    let config = Config::default();
+    let (numbers, ue) = (Numbers::new(&config.blockage), config.site.ue);
+    let mut random = Pcg64::seed_from_u64(4);
+    let tracks: Vec<Track> = (0..20).map(|id| somebody(id, &mut random)).collect();
+    let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
+    let people = || tracks.iter().zip(&forecasts);
+    let aps_m = [DVec3::new(9.0, 1.0, 2.0), DVec3::new(0.0, 0.0, 3.0)];
+    let (mut wide, mut narrow) = (Sampler::new(&numbers), Sampler::new(&numbers));
+    wide.draw(&numbers, &ue, &aps_m, people());
+    narrow.draw_portably(&numbers, &ue, &aps_m, people());
+    for (ap, &ap_m) in aps_m.iter().enumerate() {
+        for q in 0..tracks.len() {
+            let found = wide.chances(&ue, ap, ap_m, q, 0.5);
+            assert_eq!(found, narrow.chances_portably(&ue, ap, ap_m, q, 0.5), "{ap}, {q}");
+        }
+    }
+}

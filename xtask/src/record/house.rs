@@ -102,7 +102,9 @@ fn resident(id: u32) -> Option<u64> {
 /// A recording run killed at twenty moments, drawn by chance: what each file still holds.
 pub fn kills(book: &mut Book) -> Result<()> {
     const KILLS: u64 = 20;
-    book.command("umbracast live --demo --people 4 --no-serve --record /tmp/live, killed (SIGKILL) twenty times");
+    book.command(
+        "umbracast live --demo --people 4 --no-serve --record /tmp/live, killed (SIGKILL) twenty times",
+    );
     book.line("killed after, s   bytes      `umbracast inspect`  frames with results   seconds of them");
     // A row of numbers that nobody chose, the same in every record.
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
@@ -124,14 +126,18 @@ pub fn kills(book: &mut Book) -> Result<()> {
         let said = String::from_utf8_lossy(&looked.stdout).into_owned();
         let results = said.lines().find(|line| line.contains("/umbracast/blockages"));
         let messages = results.and_then(|line| line.split_whitespace().rev().nth(1)).unwrap_or("0");
-        let frames: u32 = messages.parse().map_err(|_| format!("expected a number of messages, found {messages}"))?;
+        let frames: u32 =
+            messages.parse().map_err(|_| format!("expected a number of messages, found {messages}"))?;
         let opened = match looked.status.code() {
             Some(0) => "opens whole".to_owned(),
             Some(3) => "opens, end cut".to_owned(),
             code => format!("fails: {code:?}"),
         };
         let lived = after.as_secs_f64();
-        book.line(&format!("{lived:15.3} {bytes:11}   {opened:20} {frames:18} {:17.1}", f64::from(frames) * 0.1));
+        book.line(&format!(
+            "{lived:15.3} {bytes:11}   {opened:20} {frames:18} {:17.1}",
+            f64::from(frames) * 0.1
+        ));
         std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     }
     Ok(())

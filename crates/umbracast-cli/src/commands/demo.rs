@@ -25,5 +25,10 @@ pub fn run(args: &Demo, common: &Common) -> Result<Ending, Error> {
         ));
     }
     let scenes = chain::drawn_scenes(&[args.crowd.preset], 1, args.crowd.people, seed);
-    evaluate::in_memory(configs, setup::weights(None)?, (scenes, Vec::new()), Some(&args.out), common)
+    let ending =
+        evaluate::in_memory(configs, setup::weights(None)?, (scenes, Vec::new()), Some(&args.out), common)?;
+    if !common.json && cfg!(feature = "serve") {
+        say::line("\nTo see people move and links break as they do: umbracast live --demo");
+    }
+    Ok(ending)
 }
