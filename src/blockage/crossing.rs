@@ -38,7 +38,7 @@ pub(super) struct Crossing {
 }
 
 /// What of a body is asked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) enum Part {
     Trunk,
     Arms,
@@ -59,8 +59,7 @@ impl Crossing {
         blocked: &mut [u32],
     ) {
         let step = meeting.step as usize;
-        let base = other.mean_m[step] - rays.start_m.truncate();
-        let base_m = [base.x as f32, base.y as f32];
+        let base_m = rays.to_mean_m(other, step);
         self.start_z = rays.start_m.z as f32;
         for word in words {
             let mut left = asked[word];

@@ -37,7 +37,7 @@ impl Rays {
         words: Range<usize>,
     ) {
         self.start_m = ap_m;
-        let [base_x, base_y] = (person.mean_m[step] - ap_m.truncate()).to_array().map(|m| m as f32);
+        let [base_x, base_y] = self.to_mean_m(person, step);
         let of_step = step * (person.samples / WORD);
         let height_share = ue.height_share as f32;
         let [end_x, end_y, end_z] = &mut self.end_m;
@@ -72,15 +72,20 @@ impl Rays {
         }
     }
 
+    /// From the access point to the mean round which a person's samples lie at a step.
+    #[inline(always)]
+    pub(super) fn to_mean_m(&self, person: &Trajectories, step: usize) -> [f32; 2] {
+        (person.mean_m[step] - self.start_m.truncate()).to_array().map(|m| m as f32)
+    }
+
     /// What of a word of samples is known of the body of `other`, whose gait is known, without asking height by height.
     #[inline(always)]
     pub(super) fn near(&self, figure: &Figure, meeting: &Meeting, other: &Trajectories, word: usize) -> Near {
         let step = meeting.step as usize;
         let of_step = step * (other.samples / WORD) + word;
-        let base = other.mean_m[step] - self.start_m.truncate();
         let gait = &other.gait;
         let from_above = FromAbove {
-            base_m: [base.x as f32, base.y as f32],
+            base_m: self.to_mean_m(other, step),
             reach_m: meeting.reach_m + ROOM_M,
             plan: &figure.plans[meeting.plan as usize],
             holds: meeting.holds,

@@ -12,6 +12,10 @@ use umbracast_io::tables;
 use umbracast_io::viewers;
 use umbracast_io::wire::{self, WireRow};
 
+mod common;
+
+use common::folder;
+
 fn umbracast(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_umbracast"));
     command.args(arguments);
@@ -21,13 +25,6 @@ fn umbracast(arguments: &[&str]) -> Command {
 fn done(arguments: &[&str]) {
     let output = umbracast(arguments).arg("--quiet").output().expect("starts");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-}
-
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder for the test");
-    folder
 }
 
 /// A live run that listens on free ports.

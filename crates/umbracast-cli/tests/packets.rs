@@ -8,6 +8,10 @@ use std::process::Command;
 use umbracast_io::pcap::PcapReader;
 use umbracast_io::recording::{Entry, RecordingReader};
 
+mod common;
+
+use common::folder;
+
 /// Runs and expects a code; gives what was said.
 fn ends_with(code: i32, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_umbracast"))
@@ -18,13 +22,6 @@ fn ends_with(code: i32, arguments: &[&str]) -> String {
     let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
     said.into_owned()
-}
-
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder for the test");
-    folder
 }
 
 fn text(path: &Path) -> &str {

@@ -224,13 +224,7 @@ pub fn cloud(stamp_ns: i64, sensor: &str, scan: &Scan) -> Vec<u8> {
     e.u32(beams as u32);
     e.u32(columns as u32);
     let fields = [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("intensity", 12, 7), ("ring", 16, 4), ("t", 18, 6)];
-    e.u32(fields.len() as u32);
-    for (name, offset, datatype) in fields {
-        e.string(name);
-        e.u32(offset);
-        e.u8(datatype);
-        e.u32(1);
-    }
+    point_fields(&fields, &mut e);
     e.bool(false);
     e.u32(POINT_STEP as u32);
     e.u32((POINT_STEP * columns) as u32);
@@ -238,6 +232,17 @@ pub fn cloud(stamp_ns: i64, sensor: &str, scan: &Scan) -> Vec<u8> {
     e.array(&data);
     e.bool(false);
     e.finish()
+}
+
+/// The fields of a `sensor_msgs/PointCloud2`, one value each: name, offset and datatype.
+pub(crate) fn point_fields(fields: &[(&str, u32, u8)], e: &mut Encoder) {
+    e.u32(fields.len() as u32);
+    for &(name, offset, datatype) in fields {
+        e.string(name);
+        e.u32(offset);
+        e.u8(datatype);
+        e.u32(1);
+    }
 }
 
 /// Truth of a frame: people.

@@ -14,7 +14,7 @@ use umbracast::detect::Point;
 use umbracast::{STEPS, Site};
 
 use crate::cdr::Encoder;
-use crate::messages::Schema;
+use crate::messages::{Schema, point_fields};
 use crate::rows::{LinkRow, TrackRow};
 
 /// Where [`markers`] are published and recorded.
@@ -103,13 +103,7 @@ pub fn foreground(time_ns: i64, points: &[Point]) -> Vec<u8> {
     e.u32(1);
     e.u32(points.len() as u32);
     let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("time", 12, F32), ("sensor", 16, U16)];
-    e.u32(fields.len() as u32);
-    for (name, offset, datatype) in fields {
-        e.string(name);
-        e.u32(offset);
-        e.u8(datatype);
-        e.u32(1);
-    }
+    point_fields(&fields, &mut e);
     e.bool(false);
     e.u32(POINT_STEP as u32);
     e.u32((POINT_STEP * points.len()) as u32);
