@@ -18,8 +18,10 @@ mod split_merge;
 pub mod axis;
 mod limbs;
 mod measure;
+mod doubled;
 
 pub use background::Background;
+pub use doubled::doubled;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
 #[doc(hidden)] // For the card of the model of the body axis.
