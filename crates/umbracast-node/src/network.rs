@@ -281,7 +281,8 @@ mod tests {
 
     #[test]
     fn a_table_is_read_with_paths_from_its_folder_and_without_one_all_is_loopback() {
-        let given = network("[network]\nwait_s = 0.2\nuser = \"edge\"\npassword_file = \"edge.txt\"").unwrap();
+        let given =
+            network("[network]\nwait_s = 0.2\nuser = \"edge\"\npassword_file = \"edge.txt\"").unwrap();
         assert_eq!(given.password_file.as_deref(), Some(Path::new("halls/edge.txt")));
         assert_eq!((given.wait(), network("").unwrap()), (Duration::from_millis(200), Network::default()));
         assert!(Network::default().listen.is_empty());

@@ -23,7 +23,7 @@ use crate::chain::Row;
 use crate::front::{Expected, Front};
 use crate::hall::{Hall, Outlet, Urgency};
 use crate::role::Role;
-use crate::share::{Shared, Sharing};
+use crate::share::{Shared, Sharing, keep_state};
 use crate::watch::Watch;
 
 /// Packets that wait for the front end: a second of four HDL-32E.
@@ -117,7 +117,7 @@ pub struct Node {
     started_ns: i64,
     clock: HostClock,
     health: Vec<Outlet>,
-    _sharing: Sharing,
+    _sharing: Vec<Sharing>,
     _tokens: Vec<LivelinessToken>,
     _subscribers: Vec<Subscriber<()>>,
 }
@@ -138,8 +138,19 @@ impl Node {
     /// # Errors
     /// A setting that cannot work, a port that is taken, a folder that cannot be made.
     pub fn start(hall: Hall, settings: Settings) -> Result<Self, Error> {
-        let Settings { stages, config, weights, sensors, source, empty, wait, record, listener, shared, clock } =
-            settings;
+        let Settings {
+            stages,
+            config,
+            weights,
+            sensors,
+            source,
+            empty,
+            wait,
+            record,
+            listener,
+            shared,
+            clock,
+        } = settings;
         let has = |role| stages.contains(&role);
         let record_status = Arc::<Mutex<RecordStatus>>::default();
         let points = record.as_ref().is_some_and(|record| record.points) || has(Role::Serve);
@@ -159,7 +170,7 @@ impl Node {
             started_ns: clock.now_ns(),
             clock,
             health: Vec::new(),
-            _sharing: shared.answer(&hall)?,
+            _sharing: vec![shared.answer(&hall)?],
             _tokens: Vec::new(),
             _subscribers: Vec::new(),
             stages,
@@ -167,6 +178,11 @@ impl Node {
         };
         for row in Row::of(&node.stages) {
             node.backs.push(Back::start(&node.hall, &config, weights.as_ref(), row, wait, clock)?);
+        }
+        // A tracker keeps its own; a front end may be a small machine.
+        let keeps = [Role::Forecast, Role::Cast, Role::Record, Role::Serve];
+        if !node.stages.contains(&Role::Track) && has_any(&node.stages, &keeps) {
+            node._sharing.push(keep_state(&node.hall)?);
         }
         if has_any(&node.stages, &[Role::Record, Role::Serve]) {
             node.look_on(&config, points, listener)?;
@@ -307,7 +323,10 @@ impl Node {
     pub fn is_well(&self) -> bool {
         let front = self.fed.is_some() || self.front.as_ref().is_none_or(|front| !front.is_finished());
         let recording = self.recorder.as_ref().is_none_or(|recorder| recorder.is_well());
-        front && recording && self.backs.iter().all(Back::is_well) && self.watch.as_ref().is_none_or(Watch::is_well)
+        front
+            && recording
+            && self.backs.iter().all(Back::is_well)
+            && self.watch.as_ref().is_none_or(Watch::is_well)
     }
 
     /// How it goes.
@@ -400,9 +419,12 @@ impl Node {
 /// Whether front ends of all sensors are there, and all stages behind them.
 fn all_there(hall: &Hall, sensors: &[String]) -> bool {
     let there = hall.nodes(Role::Sensor, LOOK);
-    let named = |name: &String| there.iter().any(|id| id.rsplit_once('.').is_some_and(|(own, _)| own == name));
+    let named =
+        |name: &String| there.iter().any(|id| id.rsplit_once('.').is_some_and(|(own, _)| own == name));
     sensors.iter().all(named)
-        && [Role::Track, Role::Forecast, Role::Cast].into_iter().all(|role| !hall.nodes(role, LOOK).is_empty())
+        && [Role::Track, Role::Forecast, Role::Cast]
+            .into_iter()
+            .all(|role| !hall.nodes(role, LOOK).is_empty())
 }
 
 fn has_any(stages: &[Role], any: &[Role]) -> bool {
