@@ -18,10 +18,12 @@ mod split_merge;
 pub mod axis;
 mod limbs;
 mod measure;
+mod doubled;
 
 pub use background::Background;
 #[doc(hidden)] // For who joins the foreground of several front ends.
 pub use background::POINTS_MAX;
+pub use doubled::doubled;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
 #[doc(hidden)] // For the card of the model of the body axis.

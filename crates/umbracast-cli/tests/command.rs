@@ -104,6 +104,27 @@ fn the_same_seed_gives_the_same_files_on_one_thread_and_two() {
 }
 
 #[test]
+fn sensors_that_hang_elsewhere_than_the_site_says_are_told() {
+    let folder = folder("sensors_that_hang_elsewhere_than_the_site_says_are_told");
+    let sim = simulate(&folder, "0");
+    let site = folder.join("site.toml");
+    let sensor = |name: &str, x_m: f64, yaw: f64| {
+        format!(
+            "[[site.sensors]]\nname = \"{name}\"\nposition_m = [{x_m}, 0.0, 9.0]\n\
+             rotation_deg = {{ yaw = {yaw}, pitch = 35.0, roll = 0.0 }}\n"
+        )
+    };
+    let run = |code: i32, yaw: f64| {
+        let sensors = [sensor("lidar_east", 16.0, yaw), sensor("lidar_west", -16.0, 0.0)].concat();
+        fs::write(&site, sensors).expect("writes");
+        let out = folder.join("run");
+        ends_with(code, &["run", text(&sim), "--site", text(&site), "--out", text(&out)])
+    };
+    run(0, 180.0);
+    assert!(run(3, 182.0).contains("the sensors disagree"));
+}
+
+#[test]
 fn simulate_run_evaluate_inspect() {
     let folder = folder("whole_way");
     let sim = simulate(&folder, "0");

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, SyncSender};
 use std::time::Duration;
 
+use umbracast::detect::doubled;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline};
 use umbracast_io::recording::{RecordingWriter, Results};
@@ -22,6 +23,9 @@ use crate::setup;
 
 /// Frames of a scene that runs ahead of an earlier one, whose rows wait for the tables.
 const AHEAD: usize = 512;
+/// So large a share of doubled detections tells that a sensor hangs elsewhere: next to none are where both hang right, a sixth
+/// and more where one is off by 2 degrees and 10 cm.
+const DOUBLED_SHARE_MAX: f64 = 0.02;
 
 /// What came out of one frame.
 struct Step {
@@ -30,6 +34,7 @@ struct Step {
     detections: Vec<DetectionRow>,
     tracks: Vec<TrackRow>,
     links: Vec<LinkRow>,
+    doubled: usize,
 }
 
 /// What every scene is run with.
@@ -96,6 +101,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let mut tables = Tables::create(&args.out, &names, args.csv)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
     let (mut steps, mut frames) = (Latencies::default(), Vec::new());
+    let (mut detected, mut doubled) = (0, 0);
     let mut run_some = |some: &[(u32, &Input)]| {
         std::thread::scope(|scope| -> Result<(), Error> {
             let mut running = Vec::new();
@@ -109,6 +115,8 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
                 for step in coming {
                     steps.add(step.took);
                     numbers.push(step.frame);
+                    detected += step.detections.len();
+                    doubled += step.doubled;
                     tables.write(&step)?;
                 }
                 frames.push(numbers);
@@ -137,6 +145,8 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         .with("frame_numbers", frames.iter().map(Ranges::to_string).collect::<Vec<_>>())
         .with("step_ms_median", ms(0.5))
         .with("step_ms_p99", ms(0.99))
+        .with("detections", detected)
+        .with("detections_doubled", doubled)
         .with("health", health)
         .with("lost", &lost);
     summary.write(&args.out)?;
@@ -149,6 +159,12 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         ms(0.99)
     );
     summary.print(common, &text);
+    if doubled as f64 > DOUBLED_SHARE_MAX * detected as f64 {
+        lost.push(format!(
+            "the sensors disagree: {doubled} of {detected} detections are of one sensor alone, beside one of another; \
+             expected `position_m` and `rotation_deg` of each sensor as it hangs"
+        ));
+    }
     if !lost.is_empty() {
         return Ok(Ending::DataLost(lost.join("; ")));
     }
@@ -202,7 +218,8 @@ fn run_scene(
         let (mut tracks, mut links) = (Vec::new(), Vec::new());
         rows::of_outcome(scene, outcome, &mut tracks, &mut links);
         let detections = rows::detections(scene, outcome).collect();
-        let step = Step { frame: frame.index, took, detections, tracks, links };
+        let doubled = doubled(&outcome.foreground, &outcome.clusters);
+        let step = Step { frame: frame.index, took, detections, tracks, links, doubled };
         stage_health = outcome.health;
         if let Some(recording) = &mut recording {
             recording.write(&step, outcome)?;
