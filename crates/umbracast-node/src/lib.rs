@@ -1,0 +1,1 @@
+//! Umbracast on many hosts: the stages as nodes over Zenoh.
