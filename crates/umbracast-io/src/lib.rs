@@ -10,6 +10,7 @@ pub mod point_cloud;
 pub mod tables;
 pub mod wire;
 pub mod viewers;
+pub mod results;
 pub mod recording;
 pub mod trajectories;
 pub mod bvh;

@@ -1,1 +1,3 @@
 //! Umbracast on many hosts: the stages as nodes over Zenoh.
+
+pub mod ros2;
