@@ -1,1 +1,5 @@
 //! Umbracast on many hosts: the stages as nodes over Zenoh.
+
+pub mod role;
+pub mod keys;
+pub mod network;
