@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer};
 use serde_json::{Value, json};
 use umbracast::Error;
 
-use crate::network::chunk;
+use crate::keys::chunk;
 use crate::role::Role;
 
 /// What somebody does, and for which hall.
@@ -107,7 +107,12 @@ fn rules_of(user: &str, rights: &Rights) -> Vec<Value> {
             rule(
                 "is told who listens",
                 "egress",
-                &["declare_subscriber", "declare_queryable", "liveliness_query", "declare_liveliness_subscriber"],
+                &[
+                    "declare_subscriber",
+                    "declare_queryable",
+                    "liveliness_query",
+                    "declare_liveliness_subscriber",
+                ],
                 &everywhere,
             ),
         ),
@@ -130,7 +135,8 @@ impl Rights {
 impl Work {
     fn rights(&self) -> Rights {
         let hall = self.hall.as_deref().unwrap_or("*");
-        let keys = |ends: &[&str]| ends.iter().map(|end| format!("umbracast/{hall}/{end}")).collect::<Vec<_>>();
+        let keys =
+            |ends: &[&str]| ends.iter().map(|end| format!("umbracast/{hall}/{end}")).collect::<Vec<_>>();
         let all = || vec!["**".to_owned(), "@ros2_lv/**".to_owned()];
         let settings: &[&str] = &["config/**"];
         let rights = Rights { sees: keys(&["node/**"]), ..Rights::default() };
@@ -144,7 +150,14 @@ impl Work {
                 let speaks = role != Role::Display;
                 writes.extend(keys(&[&health]).into_iter().filter(|_| speaks));
                 let asks = [settings, asks].concat();
-                Rights { writes, reads: keys(reads), asks: keys(&asks), answers: keys(answers), tokens: keys(&[&token]), ..rights }
+                Rights {
+                    writes,
+                    reads: keys(reads),
+                    asks: keys(&asks),
+                    answers: keys(answers),
+                    tokens: keys(&[&token]),
+                    ..rights
+                }
             }
             Kind::Objects => Rights { writes: keys(&["objects/*"]), asks: keys(&["config/site"]), ..rights },
             Kind::Ros2(domain) => Rights {
@@ -155,9 +168,14 @@ impl Work {
                 tokens: vec![format!("@ros2_lv/{domain}/**")],
                 sees: [rights.sees, vec![format!("@ros2_lv/{domain}/**")]].concat(),
             },
-            Kind::Router => {
-                Rights { writes: all(), reads: all(), asks: all(), answers: all(), tokens: all(), sees: all() }
-            }
+            Kind::Router => Rights {
+                writes: all(),
+                reads: all(),
+                asks: all(),
+                answers: all(),
+                tokens: all(),
+                sees: all(),
+            },
         }
     }
 }
@@ -198,7 +216,9 @@ impl std::str::FromStr for Work {
                 Error::new(format!("expected a number of a domain behind ros2:, found {domain:?}"))
             })?),
             _ => Kind::Node(word.parse().map_err(|error: Error| {
-                Error::new(format!("{error}; or objects, ros2:DOMAIN, router; with a hall before it as HALL/..."))
+                Error::new(format!(
+                    "{error}; or objects, ros2:DOMAIN, router; with a hall before it as HALL/..."
+                ))
             })?),
         };
         Ok(Self { hall, kind })
@@ -217,7 +237,8 @@ impl<'de> Deserialize<'de> for Works {
             Words::One(word) => vec![word],
             Words::Many(words) => words,
         };
-        let works = words.iter().map(|word| word.parse().map_err(D::Error::custom)).collect::<Result<_, _>>()?;
+        let works =
+            words.iter().map(|word| word.parse().map_err(D::Error::custom)).collect::<Result<_, _>>()?;
         Ok(Self(works))
     }
 }
@@ -246,11 +267,14 @@ mod tests {
 
     #[test]
     fn a_role_does_its_own_work_and_no_others() {
-        let users = users("edge = \"sensor\"\nscreen = \"display\"\nradio = \"lab/controller\"\nserver = [\"track\", \"cast\"]");
+        let users = users(
+            "edge = \"sensor\"\nscreen = \"display\"\nradio = \"lab/controller\"\nserver = [\"track\", \"cast\"]",
+        );
         let rules = access_control(&users);
         let put = |user, key| passes(&rules, user, "ingress", "put", key);
         let gets = |user, key| {
-            passes(&rules, user, "ingress", "declare_subscriber", key) && passes(&rules, user, "egress", "put", key)
+            passes(&rules, user, "ingress", "declare_subscriber", key)
+                && passes(&rules, user, "egress", "put", key)
         };
         assert!(put("edge", "umbracast/lab/sensor/east/foreground") && gets("edge", "umbracast/lab/priors"));
         assert!(!put("edge", "umbracast/lab/tracks") && !gets("edge", "umbracast/lab/warnings/door"));
@@ -277,12 +301,16 @@ mod tests {
         let rules = access_control(&users("edge = \"sensor\""));
         assert_eq!(rules["default_permission"], "deny");
         let subjects = rules["subjects"].as_array().unwrap();
-        assert!(subjects.iter().all(|s| s.get("usernames").is_some() || s.get("cert_common_names").is_some()));
+        assert!(
+            subjects.iter().all(|s| s.get("usernames").is_some() || s.get("cert_common_names").is_some())
+        );
     }
 
     #[test]
     fn every_rule_is_one_that_zenoh_takes() {
-        let users = users("a = [\"sensor\", \"router\"]\nb = [\"lab/objects\", \"ros2:3\", \"record\", \"serve\", \"forecast\"]");
+        let users = users(
+            "a = [\"sensor\", \"router\"]\nb = [\"lab/objects\", \"ros2:3\", \"record\", \"serve\", \"forecast\"]",
+        );
         let mut config = zenoh::Config::default();
         config.insert_json5("access_control", &access_control(&users).to_string()).unwrap();
     }
