@@ -1,8 +1,9 @@
 //! The page: one line a stage.
 
 use crate::blockage::{Blockage, Caster};
-use crate::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point};
+use crate::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point, Prior};
 use crate::forecast::{Forecast, Forecaster, Weights};
+use crate::lidar::Views;
 use crate::track::{Track, Tracker};
 use crate::{Config, Error, Frame, Health};
 
@@ -82,6 +83,8 @@ pub struct Pipeline {
     background: Background,
     clusterer: Clusterer,
     measurer: Measurer,
+    views: Views,
+    priors: Vec<Prior>,
     tracker: Tracker,
     forecaster: Forecaster,
     caster: Caster,
@@ -105,6 +108,8 @@ impl Pipeline {
             background: Background::new(&config.detect, &config.site),
             clusterer: Clusterer::new(&config.detect, &config.site),
             measurer: Measurer::new(&config.detect, &config.site),
+            views: Views::default(),
+            priors: Vec::new(),
             tracker: Tracker::new(&config.track, &config.site),
             forecaster: Forecaster::new(&config.forecast, weights)?,
             caster: Caster::new(&config.blockage, &config.site),
@@ -148,11 +153,12 @@ impl Pipeline {
         if !o.begin(frame) {
             return o;
         }
-        let priors = self.tracker.priors(frame.time_ns);
-        self.background.foreground(frame, &priors, &mut o.health, &mut o.foreground);
-        self.clusterer.clusters(&o.foreground, &priors, &mut o.clusters);
-        self.measurer.detections(&o.foreground, &o.clusters, &priors, &mut o.detections);
-        self.tracker.update(frame, &o.detections, &mut o.tracks);
+        self.tracker.priors(frame.time_ns, &mut self.priors);
+        self.background.foreground(frame, &self.priors, &mut o.health, &mut o.foreground);
+        self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);
+        self.measurer.detections(&o.foreground, &o.clusters, &self.priors, &mut o.detections);
+        self.views.take(frame);
+        self.tracker.update(&self.views, &o.detections, &mut o.tracks);
         self.forecaster.forecast(&o.tracks, &mut o.forecasts);
         self.caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
         o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());

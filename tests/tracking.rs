@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use umbracast::config::TrackConfig;
 use umbracast::detect::Detection;
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb, Pose};
-use umbracast::lidar::{Cloud, Frame, Scan};
+use umbracast::lidar::{Cloud, Frame, Scan, Views};
 use umbracast::track::numbers::MotionModel;
 use umbracast::track::{MixtureTracker, Numbers, Track, Tracker};
 use umbracast::{Config, Mode, Site};
@@ -93,11 +93,15 @@ fn world(walkers: &Walkers, seed: u64) -> World<'_> {
 /// Confirmed tracks of every frame.
 fn follow(config: &TrackConfig, mut world: World, frames: u64) -> Vec<Vec<Track>> {
     let mut tracker = Tracker::new(config, &open_site());
-    each_frame(&mut world, frames, |frame, detections, tracks| tracker.update(frame, detections, tracks))
+    each_frame(&mut world, frames, |frame, detections, tracks| {
+        tracker.update(&Views::of(frame), detections, tracks)
+    })
 }
 
 fn follow_with(mut tracker: MixtureTracker, mut world: World, frames: u64) -> Vec<Vec<Track>> {
-    each_frame(&mut world, frames, |frame, detections, tracks| tracker.update(frame, detections, tracks))
+    each_frame(&mut world, frames, |frame, detections, tracks| {
+        tracker.update(&Views::of(frame), detections, tracks)
+    })
 }
 
 fn each_frame(
@@ -196,7 +200,11 @@ fn who_is_out_of_sight_for_long_is_not_told_but_known_again() {
         if hidden {
             frame.scans.clear(); // the sensor is silent, so nobody can be seen
         }
-        tracker.update(&frame, if hidden { &[] } else { std::slice::from_ref(&seen) }, &mut tracks);
+        tracker.update(
+            &Views::of(&frame),
+            if hidden { &[] } else { std::slice::from_ref(&seen) },
+            &mut tracks,
+        );
         told.push(tracks[..].iter().map(|track| (track.id, track.confirmed)).collect::<Vec<_>>());
     }
     assert_eq!(told[22], [(0, true)]);
@@ -214,7 +222,7 @@ fn pieces_of_a_person_keep_a_track_and_start_none() {
             let frame = frame(index);
             let seen = detection(DVec2::new(0.1 * index as f64, 0.0), frame.time_ns);
             let piece = Detection { full_body: index < first_piece, ..seen };
-            tracker.update(&frame, &[piece], &mut tracks);
+            tracker.update(&Views::of(&frame), &[piece], &mut tracks);
         }
         tracks.into_iter().filter(|track| track.confirmed).collect::<Vec<_>>()
     };
@@ -230,11 +238,11 @@ fn somebody_who_leaves_is_forgotten_within_half_a_second() {
     let mut tracks = Vec::new();
     for index in 0..20 {
         let frame = frame(index);
-        tracker.update(&frame, &[detection(DVec2::X, frame.time_ns)], &mut tracks);
+        tracker.update(&Views::of(&frame), &[detection(DVec2::X, frame.time_ns)], &mut tracks);
     }
     assert_eq!(tracks.len(), 1);
     for index in 20..25 {
-        tracker.update(&frame(index), &[], &mut tracks);
+        tracker.update(&Views::of(&frame(index)), &[], &mut tracks);
     }
     assert!(tracks.is_empty(), "{tracks:?}");
 }
@@ -246,15 +254,15 @@ fn somebody_whom_no_sensor_sees_is_kept_for_three_seconds() {
     let mut tracks = Vec::new();
     for index in 0..20 {
         let frame = frame(index);
-        tracker.update(&frame, &[detection(DVec2::X, frame.time_ns)], &mut tracks);
+        tracker.update(&Views::of(&frame), &[detection(DVec2::X, frame.time_ns)], &mut tracks);
     }
     let blind = |index| Frame { scans: Vec::new(), ..frame(index) };
     for index in 20..50 {
-        tracker.update(&blind(index), &[], &mut tracks);
+        tracker.update(&Views::of(&blind(index)), &[], &mut tracks);
         assert_eq!(tracks.len(), 1, "frame {index}");
     }
     for index in 50..52 {
-        tracker.update(&blind(index), &[], &mut tracks);
+        tracker.update(&Views::of(&blind(index)), &[], &mut tracks);
     }
     assert!(tracks.is_empty());
 }
@@ -266,12 +274,12 @@ fn frames_repeated_or_late_change_nothing() {
     let mut tracks = Vec::new();
     for index in 0..10 {
         let frame = frame(index);
-        tracker.update(&frame, &[detection(DVec2::X, frame.time_ns)], &mut tracks);
+        tracker.update(&Views::of(&frame), &[detection(DVec2::X, frame.time_ns)], &mut tracks);
     }
     let before = tracks.clone();
     for index in [9, 3] {
         let frame = frame(index);
-        tracker.update(&frame, &[detection(DVec2::Y, frame.time_ns)], &mut tracks);
+        tracker.update(&Views::of(&frame), &[detection(DVec2::Y, frame.time_ns)], &mut tracks);
         assert_eq!(tracks, before);
     }
 }
@@ -288,10 +296,10 @@ fn the_order_of_detections_does_not_matter() {
         for index in 0..80 {
             let frame = frame(index);
             let mut detections = world.detections(&frame);
-            one.update(&frame, &detections, &mut tracks);
+            one.update(&Views::of(&frame), &detections, &mut tracks);
             detections.reverse();
             detections.rotate_left(index as usize % 5);
-            other.update(&frame, &detections, &mut others);
+            other.update(&Views::of(&frame), &detections, &mut others);
             assert_eq!(tracks, others, "{} frame {index}", mode.name());
         }
     }
@@ -339,7 +347,7 @@ fn the_sway_of_a_walking_body_is_not_taken_for_turns() {
             let t_s = frame.time_ns as f64 * 1e-9;
             let sway_m = 0.02 * (std::f64::consts::TAU * 0.92 * t_s).sin();
             let at_m = DVec2::new(1.4 * t_s - 6.0, sway_m);
-            tracker.update(&frame, &[detection(at_m, frame.time_ns)], &mut tracks);
+            tracker.update(&Views::of(&frame), &[detection(at_m, frame.time_ns)], &mut tracks);
             if index > 40 {
                 worst_mps = worst_mps.max(tracks[0].velocity_mps.y.abs());
             }
@@ -358,7 +366,11 @@ fn the_heading_is_open_until_somebody_walks_and_again_with_the_time_one_stands()
     for index in 0..90 {
         let frame = frame(index);
         let walked_m = 0.12 * index.clamp(20, 60) as f64;
-        tracker.update(&frame, &[detection(DVec2::new(walked_m - 4.0, 0.0), frame.time_ns)], &mut tracks);
+        tracker.update(
+            &Views::of(&frame),
+            &[detection(DVec2::new(walked_m - 4.0, 0.0), frame.time_ns)],
+            &mut tracks,
+        );
         sigmas_rad.push(tracks[0].heading_sigma_rad);
     }
     assert!(sigmas_rad[15] > 1.0, "standing from the start: {}", sigmas_rad[15]);

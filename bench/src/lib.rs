@@ -3,6 +3,7 @@
 use umbracast::blockage::{Blockage, Caster};
 use umbracast::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point, Prior};
 use umbracast::forecast::{Forecast, Forecaster};
+use umbracast::lidar::Views;
 use umbracast::track::{Track, Tracker};
 use umbracast::{Config, Error, Frame, Health, Pipeline};
 
@@ -27,6 +28,8 @@ pub struct Stages {
     pub caster: Caster,
     /// Where people are expected in the frame.
     pub priors: Vec<Prior>,
+    /// What the sensors could see.
+    pub views: Views,
     /// What was skipped.
     pub health: Health,
     /// Of the background.
@@ -59,6 +62,7 @@ impl Stages {
             forecaster: Forecaster::new(&config.forecast, None)?,
             caster: Caster::new(&config.blockage, &config.site),
             priors: Vec::new(),
+            views: Views::default(),
             health: Health::default(),
             foreground: Vec::new(),
             clusters: Vec::new(),
@@ -71,7 +75,7 @@ impl Stages {
 
     /// Where people are expected.
     pub fn expect(&mut self, frame: &Frame) {
-        self.priors = self.tracker.priors(frame.time_ns);
+        self.tracker.priors(frame.time_ns, &mut self.priors);
     }
 
     /// The first stage.
@@ -91,7 +95,8 @@ impl Stages {
 
     /// The fourth.
     pub fn update(&mut self, frame: &Frame) {
-        self.tracker.update(frame, &self.detections, &mut self.tracks);
+        self.views.take(frame);
+        self.tracker.update(&self.views, &self.detections, &mut self.tracks);
     }
 
     /// The fifth.

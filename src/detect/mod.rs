@@ -52,7 +52,9 @@ pub struct Point {
 ///
 /// // The tracker says whom it expects where: nobody, before the first frame.
 /// let config = Config::default();
-/// assert!(Tracker::new(&config.track, &config.site).priors(100_000_000).is_empty());
+/// let mut priors = Vec::new();
+/// Tracker::new(&config.track, &config.site).priors(100_000_000, &mut priors);
+/// assert!(priors.is_empty());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {

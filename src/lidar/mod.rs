@@ -6,6 +6,7 @@
 
 mod beam;
 mod scan;
+mod views;
 mod model;
 mod velodyne;
 mod ouster;
@@ -24,3 +25,5 @@ pub use packet::Packet;
 pub use scan::Azimuths;
 pub use scan::{Cloud, Column, Frame, RangeImage, Scan, SensorPoint};
 pub use table::{sensor_model, sensor_models, udp_port};
+pub(crate) use views::sector;
+pub use views::{Fan, SECTORS, View, Views};

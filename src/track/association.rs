@@ -14,66 +14,102 @@ pub const FORBIDDEN: f64 = f64::INFINITY;
 /// Shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016), one column of cost zero
 /// for each row beside the real ones. Of equal sums the one with the earlier rows and columns is taken.
 pub fn optimal(rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
-    let width = columns + rows;
-    let cost = |r: usize, c: usize| if c < columns { cost(r, c) } else { 0.0 };
-    let mut row_price = vec![0.0; rows];
-    let mut column_price = vec![0.0; width];
-    let mut row_of: Vec<Option<usize>> = vec![None; width];
-    let mut column_of: Vec<Option<usize>> = vec![None; rows];
-    for start in 0..rows {
-        // Dijkstra from `start` over reduced costs to the nearest free column.
-        let mut distance = vec![f64::INFINITY; width];
-        let mut came_from = vec![start; width];
-        let mut done = vec![false; width];
-        let (mut row, mut so_far) = (start, 0.0);
-        let free = loop {
-            let mut nearest = None;
-            for c in (0..width).filter(|&c| !done[c]) {
-                let through = so_far + cost(row, c) - row_price[row] - column_price[c];
-                if through < distance[c] {
-                    (distance[c], came_from[c]) = (through, row);
-                }
-                if nearest.is_none_or(|n: usize| distance[c] < distance[n]) {
-                    nearest = Some(c);
-                }
-            }
-            // A column of cost zero is always free for every row.
-            let Some(column) = nearest else { return column_of };
-            (done[column], so_far) = (true, distance[column]);
-            match row_of[column] {
-                Some(owner) => row = owner,
-                None => break column,
-            }
-        };
-        row_price[start] += so_far;
-        for c in (0..width).filter(|&c| done[c] && c != free) {
-            if let Some(owner) = row_of[c] {
-                row_price[owner] += so_far - distance[c];
-                column_price[c] -= so_far - distance[c];
-            }
-        }
-        let mut column = free;
-        loop {
-            let row = came_from[column];
-            row_of[column] = Some(row);
-            let before = column_of[row].replace(column);
-            match before {
-                Some(before) => column = before,
-                None => break,
-            }
-        }
-    }
-    column_of.into_iter().map(|c| c.filter(|&c| c < columns)).collect()
+    let mut assignment = Assignment::default();
+    assignment.optimal(rows, columns, cost);
+    assignment.column_of
 }
 
-/// The detections that are numbers, in an order that does not depend on the one they came in.
-pub(super) fn in_order(detections: &[Detection]) -> Vec<&Detection> {
-    let mut sorted: Vec<&Detection> = detections.iter().filter(|d| d.position_m.is_finite()).collect();
-    sorted.sort_by(|a, b| {
-        let (p, q) = (a.position_m, b.position_m);
-        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(a.time_ns.cmp(&b.time_ns))
+/// The memory of [`optimal`], for who asks again and again.
+#[derive(Debug, Clone, Default)]
+pub struct Assignment {
+    /// Each row's column.
+    pub column_of: Vec<Option<usize>>,
+    row_of: Vec<Option<usize>>,
+    costs: Vec<f64>,
+    row_price: Vec<f64>,
+    column_price: Vec<f64>,
+    distance: Vec<f64>,
+    came_from: Vec<usize>,
+    done: Vec<bool>,
+}
+
+impl Assignment {
+    /// [`optimal`], into `column_of`. Every cost is asked once.
+    pub fn optimal(&mut self, rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) {
+        let width = columns + rows;
+        let Self { column_of, row_of, costs, row_price, column_price, distance, came_from, done } = self;
+        refill(costs, rows * columns, 0.0);
+        for (r, costs) in costs.chunks_exact_mut(columns.max(1)).enumerate() {
+            costs.iter_mut().enumerate().for_each(|(c, place)| *place = cost(r, c));
+        }
+        refill(row_price, rows, 0.0);
+        refill(column_price, width, 0.0);
+        refill(row_of, width, None);
+        refill(column_of, rows, None);
+        for start in 0..rows {
+            // Dijkstra from `start` over reduced costs to the nearest free column.
+            refill(distance, width, f64::INFINITY);
+            refill(came_from, width, start);
+            refill(done, width, false);
+            let (mut row, mut so_far) = (start, 0.0);
+            let free = loop {
+                let mut nearest = None;
+                let costs = &costs[row * columns..(row + 1) * columns];
+                for c in (0..width).filter(|&c| !done[c]) {
+                    let cost = costs.get(c).copied().unwrap_or(0.0);
+                    let through = so_far + cost - row_price[row] - column_price[c];
+                    if through < distance[c] {
+                        (distance[c], came_from[c]) = (through, row);
+                    }
+                    if nearest.is_none_or(|n: usize| distance[c] < distance[n]) {
+                        nearest = Some(c);
+                    }
+                }
+                // A column of cost zero is always free for every row.
+                let Some(column) = nearest else { return };
+                (done[column], so_far) = (true, distance[column]);
+                match row_of[column] {
+                    Some(owner) => row = owner,
+                    None => break column,
+                }
+            };
+            row_price[start] += so_far;
+            for c in (0..width).filter(|&c| done[c] && c != free) {
+                if let Some(owner) = row_of[c] {
+                    row_price[owner] += so_far - distance[c];
+                    column_price[c] -= so_far - distance[c];
+                }
+            }
+            let mut column = free;
+            loop {
+                let row = came_from[column];
+                row_of[column] = Some(row);
+                let before = column_of[row].replace(column);
+                match before {
+                    Some(before) => column = before,
+                    None => break,
+                }
+            }
+        }
+        column_of.iter_mut().for_each(|column| *column = column.filter(|&c| c < columns));
+    }
+}
+
+fn refill<T: Clone>(memory: &mut Vec<T>, n: usize, value: T) {
+    memory.clear();
+    memory.resize(n, value);
+}
+
+/// Indices of the detections that are numbers, in an order that does not depend on the one they came in.
+pub(super) fn in_order(detections: &[Detection], order: &mut Vec<usize>) {
+    order.clear();
+    order.extend((0..detections.len()).filter(|&d| detections[d].position_m.is_finite()));
+    order.sort_unstable_by(|&a, &b| {
+        let (p, q) = (&detections[a], &detections[b]);
+        let by_place =
+            p.position_m.x.total_cmp(&q.position_m.x).then(p.position_m.y.total_cmp(&q.position_m.y));
+        by_place.then(p.time_ns.cmp(&q.time_ns)).then(a.cmp(&b))
     });
-    sorted
 }
 
 /// The cheapest allowed pair first, then the cheapest of what is left. Returns each row's column.

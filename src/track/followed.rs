@@ -25,7 +25,7 @@ pub const WIDTH_SCALE_SIGMA: f64 = width::PRIOR_SIGMA;
 /// # use people::*;
 /// # let config = umbracast::Config::default();
 /// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
-/// # tracker.update(&frame(0), &[detection(1.0, frame(0).time_ns)], &mut tracks);
+/// # tracker.update(&views(0), &[detection(1.0, views(0).time_ns)], &mut tracks);
 /// for track in tracks.iter().filter(|track| !track.confirmed) {
 ///     let sigma_m = track.covariance[0][0].sqrt();
 ///     assert!(track.id == 0 && track.position_m.x == 1.0 && sigma_m < 0.1);
@@ -76,7 +76,7 @@ pub struct Track {
 /// # use people::*;
 /// # let config = umbracast::Config::default();
 /// # let (mut tracker, mut tracks) = (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
-/// # tracker.update(&frame(0), &[detection(1.0, frame(0).time_ns)], &mut tracks);
+/// # tracker.update(&views(0), &[detection(1.0, views(0).time_ns)], &mut tracks);
 /// let now = tracks[0].observed.back().expect("a track was seen at least once");
 /// assert_eq!((now.time_ns, now.position_m), (100_000_000, tracks[0].position_m));
 /// ```

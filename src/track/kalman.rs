@@ -19,12 +19,15 @@ const BIRTH_SPEED_MPS: f64 = 1.2;
 /// Numbers of a hypothesis' state.
 const N: usize = 8;
 
-/// A Gaussian over position, velocity and sway.
+/// A Gaussian over the first `M` numbers of a state: four without the sway.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Full {
-    x: [f64; N],
-    P: [[f64; N]; N],
+struct Gaussian<const M: usize> {
+    x: [f64; M],
+    P: [[f64; M]; M],
 }
+
+/// A Gaussian over position, velocity and sway.
+type Full = Gaussian<N>;
 
 /// One person's filter: a constant velocity under one or several process noises at once (interacting multiple
 /// models: Blom and Bar-Shalom 1988), so that it is calm while a person walks on and quick when one turns.
@@ -63,23 +66,23 @@ impl Filter {
 
     /// The one Gaussian with the mean and the covariance of all hypotheses together.
     pub fn state(&self) -> State {
-        self.full().kinematic()
+        let Gaussian { x, P } = mixture(self.weighted());
+        State { x, P }
     }
 
-    fn full(&self) -> Full {
-        let parts: Vec<(f64, &Full)> = self.hypotheses.iter().map(|h| (h.weight, &h.state)).collect();
-        mixture(&parts)
+    fn weighted(&self) -> impl Iterator<Item = (f64, &Full)> + Clone {
+        self.hypotheses.iter().map(|h| (h.weight, &h.state))
     }
 
     /// [`Filter::state`] as it will be `dt_s` later, without changing the filter.
     pub fn state_after(&self, numbers: &Numbers, dt_s: f64) -> State {
-        let mut later = self.full();
+        let mut later: Gaussian<4> = mixture(self.weighted());
         if dt_s > 0.0 {
             let weighted = self.hypotheses.iter().zip(&numbers.motion_models);
             let psd_m2ps3 = weighted.map(|(h, model)| h.weight * model.acceleration_psd_m2ps3).sum();
             later.walk(dt_s, &process_noise(psd_m2ps3, dt_s));
         }
-        later.kinematic()
+        State { x: later.x, P: later.P }
     }
 
     /// Moves the filter of a person `height_m` tall `dt_s` on; not at all where no time has passed.
@@ -89,13 +92,14 @@ impl Filter {
         }
         // The chance to stay in a model is exp(-dt / mean sojourn), else one is drawn by its share; so two steps do the
         // same as one that is as long as both.
-        let all = self.full();
-        let sway = Sway::after(numbers.sway_m, all.kinematic().velocity_mps().length(), height_m, dt_s);
+        let all: Full = mixture(self.weighted());
+        let speed_mps = DVec2::new(all.x[2], all.x[3]).length();
+        let sway = Sway::after(numbers.sway_m, speed_mps, height_m, dt_s);
         let stay = (-dt_s / MEAN_SOJOURN_S).exp();
         for (h, model) in self.hypotheses.iter_mut().zip(&numbers.motion_models) {
             let stayed = stay * h.weight;
             h.weight = stayed + (1.0 - stay) * model.share;
-            h.state = mixture(&[(stayed, &h.state), (h.weight - stayed, &all)]);
+            h.state = mixture([(stayed, &h.state), (h.weight - stayed, &all)].into_iter());
             if let Some(speed_mps) = model.standing_mps {
                 h.state.stand(speed_mps);
             }
@@ -107,35 +111,19 @@ impl Filter {
     /// Takes a measured position whose error has covariance `R`.
     pub fn correct(&mut self, position_m: DVec2, R: Mat2) {
         let axes = Axes::along(self.state().velocity_mps());
-        let mut logs = Vec::with_capacity(self.hypotheses.len());
+        // A weight is a logarithm until all are known.
         for h in &mut self.hypotheses {
-            logs.push(h.weight.ln() + h.state.correct(position_m, R, &axes));
+            h.weight = h.weight.ln() + h.state.correct(position_m, R, &axes);
         }
-        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = logs.iter().map(|log| (log - most).exp()).sum();
-        for (h, log) in self.hypotheses.iter_mut().zip(logs) {
-            h.weight = (log - most).exp() / total;
+        let most = self.hypotheses.iter().map(|h| h.weight).fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = self.hypotheses.iter().map(|h| (h.weight - most).exp()).sum();
+        for h in &mut self.hypotheses {
+            h.weight = (h.weight - most).exp() / total;
         }
     }
 }
 
-impl Full {
-    fn kinematic(&self) -> State {
-        let first = |row: &[f64; N]| [row[0], row[1], row[2], row[3]];
-        State { x: first(&self.x), P: std::array::from_fn(|i| first(&self.P[i])) }
-    }
-
-    /// The state of somebody who stands, but for a velocity of `speed_mps` (one sigma of an axis).
-    fn stand(&mut self, speed_mps: f64) {
-        for i in 2..4 {
-            self.x[i] = 0.0;
-            for j in 0..N {
-                (self.P[i][j], self.P[j][i]) = (0.0, 0.0);
-            }
-            self.P[i][i] = speed_mps * speed_mps;
-        }
-    }
-
+impl<const M: usize> Gaussian<M> {
     /// x = F x, P = F P F' + Q, with F the motion over `dt_s`.
     fn walk(&mut self, dt_s: f64, q: &Q) {
         let (dt, P) = (dt_s, self.P);
@@ -146,7 +134,7 @@ impl Full {
                 self.P[i][j + 2] = P[i][j + 2] + dt * P[i + 2][j + 2];
                 self.P[j + 2][i] = self.P[i][j + 2];
             }
-            for j in LEFT..N {
+            for j in LEFT..M {
                 self.P[i][j] += dt * P[i + 2][j];
                 self.P[j][i] = self.P[i][j];
             }
@@ -156,6 +144,19 @@ impl Full {
             self.P[i][i + 2] += q.cross;
             self.P[i + 2][i] += q.cross;
             self.P[i + 2][i + 2] += q.velocity;
+        }
+    }
+}
+
+impl Full {
+    /// The state of somebody who stands, but for a velocity of `speed_mps` (one sigma of an axis).
+    fn stand(&mut self, speed_mps: f64) {
+        for i in 2..4 {
+            self.x[i] = 0.0;
+            for j in 0..N {
+                (self.P[i][j], self.P[j][i]) = (0.0, 0.0);
+            }
+            self.P[i][i] = speed_mps * speed_mps;
         }
     }
 
@@ -219,19 +220,19 @@ fn process_noise(psd_m2ps3: f64, dt_s: f64) -> Q {
     }
 }
 
-/// One Gaussian with the mean and covariance of a weighted mixture.
-fn mixture(parts: &[(f64, &Full)]) -> Full {
-    let total: f64 = parts.iter().map(|part| part.0).sum();
-    let mut mean = Full { x: [0.0; N], P: [[0.0; N]; N] };
-    for (weight, part) in parts {
-        for i in 0..N {
+/// One Gaussian with the mean and covariance of a weighted mixture, of the state's first `M` numbers.
+fn mixture<'a, const M: usize>(parts: impl Iterator<Item = (f64, &'a Full)> + Clone) -> Gaussian<M> {
+    let total: f64 = parts.clone().map(|part| part.0).sum();
+    let mut mean = Gaussian { x: [0.0; M], P: [[0.0; M]; M] };
+    for (weight, part) in parts.clone() {
+        for i in 0..M {
             mean.x[i] += weight / total * part.x[i];
         }
     }
     for (weight, part) in parts {
-        let d: [f64; N] = std::array::from_fn(|i| part.x[i] - mean.x[i]);
-        for i in 0..N {
-            for j in 0..N {
+        let d: [f64; M] = std::array::from_fn(|i| part.x[i] - mean.x[i]);
+        for i in 0..M {
+            for j in 0..M {
                 mean.P[i][j] += weight / total * (part.P[i][j] + d[i] * d[j]);
             }
         }

@@ -1,16 +1,19 @@
 //! Our tracker: predict, associate, correct, birth, death, with a mixture of motion models for each person and what
 //! sensors can see of everybody.
 
-use super::association::{FORBIDDEN, in_order, optimal};
+use std::cmp::Reverse;
+
+use super::association::{Assignment, FORBIDDEN, in_order};
 use super::followed::{Track, seconds};
-use super::gaussian::{State, inverted, plus, quadratic, round};
+use super::gaussian::{inverted, plus, quadratic, round};
 use super::numbers::Numbers;
 use super::person::{Person, noise, sway};
 use super::visibility::{Body, BodyView, Visibility, detection_probability};
+use crate::Site;
 use crate::config::TrackConfig;
 use crate::detect::{Detection, Prior};
 use crate::geometry::DVec2;
-use crate::{Frame, Site};
+use crate::lidar::Views;
 
 /// Chance to detect a person where nothing is known of what sensors see.
 const DETECTION_PROBABILITY: f64 = 0.9;
@@ -38,9 +41,28 @@ pub struct MixtureTracker {
     people: Vec<Person>,
     next_id: u64,
     time_ns: Option<i64>,
+    memory: Memory,
 }
 
+/// Kept from frame to frame, so that nothing is allocated once it is large enough.
+#[derive(Debug, Clone, Default)]
+struct Memory {
+    /// The frame's detections in the order that everything goes by.
+    order: Vec<usize>,
+    bodies: Vec<Body>,
+    expected: Vec<Expected>,
+    /// Of people, then also of who is born.
+    places_m: Vec<DVec2>,
+    assignment: Assignment,
+    taken: Vec<bool>,
+    ranks: Vec<Rank>,
+}
+
+/// Fewest first: the confirmed, those of more matches, the older.
+type Rank = (Reverse<bool>, Reverse<u32>, u64);
+
 /// What is known of a person before the frame's detections are looked at.
+#[derive(Debug, Clone)]
 struct Expected {
     view: BodyView,
     /// Chance of a detection of one's own, given that somebody is there.
@@ -55,95 +77,85 @@ impl MixtureTracker {
 
     /// The same with numbers of one's own.
     pub fn with_numbers(numbers: Numbers, site: &Site) -> Self {
-        Self { numbers, visibility: Visibility::new(site), people: Vec::new(), next_id: 0, time_ns: None }
+        let visibility = Visibility::new(site);
+        Self { numbers, visibility, people: Vec::new(), next_id: 0, time_ns: None, memory: Memory::default() }
     }
 
     /// Last step's tracks predicted to `time_ns`.
-    pub fn priors(&self, time_ns: i64) -> Vec<Prior> {
+    pub fn priors(&self, time_ns: i64, priors: &mut Vec<Prior>) {
         let after_s = self.time_ns.map_or(0.0, |last_ns| seconds(last_ns, time_ns));
-        self.people.iter().map(|person| person.prior(&self.numbers, after_s)).collect()
+        priors.clear();
+        priors.extend(self.people.iter().map(|person| person.prior(&self.numbers, after_s)));
     }
 
     /// Takes a frame's detections; `tracks` is every track alive at the frame's time, in order of `id`. A frame
     /// that is not later than the last one changes nothing.
-    pub fn update(&mut self, frame: &Frame, detections: &[Detection], tracks: &mut Vec<Track>) {
-        if self.time_ns.is_some_and(|last_ns| frame.time_ns <= last_ns) {
+    pub fn update(&mut self, views: &Views, detections: &[Detection], tracks: &mut Vec<Track>) {
+        let time_ns = views.time_ns;
+        if self.time_ns.is_some_and(|last_ns| time_ns <= last_ns) {
             return;
         }
-        let last_ns = self.time_ns.replace(frame.time_ns).unwrap_or(frame.time_ns);
-        let step_s = seconds(last_ns, frame.time_ns);
-        let detections = in_order(detections);
-        let expected = self.expect(frame, step_s);
-        let given = self.associate(frame.time_ns, last_ns, &expected, &detections);
-        self.correct(frame.time_ns, last_ns, &expected, &given, &detections);
+        let last_ns = self.time_ns.replace(time_ns).unwrap_or(time_ns);
+        let step_s = seconds(last_ns, time_ns);
+        in_order(detections, &mut self.memory.order);
+        self.expect(views, step_s);
+        self.associate(time_ns, last_ns, detections);
+        self.correct(time_ns, last_ns, detections);
         self.mark_duplicates(step_s);
-        self.people.retain(|person| !person.is_dead(&self.numbers, frame.time_ns));
-        self.give_birth(frame.time_ns, &given, &detections);
-        tracks.clear();
-        tracks.extend(self.people.iter_mut().map(|person| person.track(frame.time_ns, step_s)));
+        self.people.retain(|person| !person.is_dead(&self.numbers, time_ns));
+        self.give_birth(time_ns, detections);
+        self.tell(time_ns, step_s, tracks);
     }
 
     /// Who can be seen, how well, and with what chance of a detection of one's own.
-    fn expect(&self, frame: &Frame, step_s: f64) -> Vec<Expected> {
-        let numbers = &self.numbers;
-        let eyes = self.visibility.eyes(frame);
-        let bodies: Vec<Body> = self
-            .people
-            .iter()
-            .map(|person| person.body(person.filter.state_after(numbers, step_s).position_m()))
-            .collect();
-        bodies
-            .iter()
-            .map(|body| {
-                let view = self.visibility.view(&eyes, body, &bodies);
-                let detection_probability = match numbers.visibility {
-                    true => detection_probability(DETECTION_PROBABILITY, &view),
-                    false => DETECTION_PROBABILITY,
-                };
-                Expected { view, detection_probability }
-            })
-            .collect()
+    fn expect(&mut self, views: &Views, step_s: f64) {
+        let Self { numbers, visibility, people, memory, .. } = self;
+        let Memory { bodies, expected, .. } = memory;
+        visibility.look(views);
+        bodies.clear();
+        bodies.extend(people.iter().map(|p| p.body(p.filter.state_after(numbers, step_s).position_m())));
+        expected.clear();
+        expected.extend(bodies.iter().map(|body| {
+            let view = visibility.view(body, bodies);
+            let detection_probability = match numbers.visibility {
+                true => detection_probability(DETECTION_PROBABILITY, &view),
+                false => DETECTION_PROBABILITY,
+            };
+            Expected { view, detection_probability }
+        }));
     }
 
     /// Each person's detection.
-    fn associate(
-        &self,
-        time_ns: i64,
-        last_ns: i64,
-        expected: &[Expected],
-        detections: &[&Detection],
-    ) -> Vec<Option<usize>> {
-        let now: Vec<State> = self.people.iter().map(|p| p.filter.state()).collect();
+    fn associate(&mut self, time_ns: i64, last_ns: i64, detections: &[Detection]) {
+        let Self { numbers, people, memory, .. } = self;
+        let Memory { order, expected, places_m, assignment, .. } = memory;
+        places_m.clear();
+        places_m.extend(people.iter().map(|p| p.filter.state().position_m()));
+        let reach_m = GATE_M + FASTEST_MPS * seconds(last_ns, time_ns);
         let cost = |p: usize, d: usize| {
-            let (person, detection) = (&self.people[p], detections[d]);
+            let (person, detection) = (&people[p], &detections[order[d]]);
             if !detection.full_body && !person.confirmed {
                 return FORBIDDEN;
             }
-            let reach_m = GATE_M + FASTEST_MPS * seconds(last_ns, time_ns);
-            if now[p].position_m().distance(detection.position_m) > reach_m {
+            if places_m[p].distance(detection.position_m) > reach_m {
                 return FORBIDDEN;
             }
             let after_s = seconds(last_ns, measured_ns(detection, last_ns, time_ns));
-            pair_cost(&self.numbers, person, &expected[p], after_s, detection)
+            pair_cost(numbers, person, &expected[p], after_s, detection)
         };
-        optimal(self.people.len(), detections.len(), cost)
+        assignment.optimal(people.len(), order.len(), cost);
     }
 
-    fn correct(
-        &mut self,
-        time_ns: i64,
-        last_ns: i64,
-        expected: &[Expected],
-        given: &[Option<usize>],
-        detections: &[&Detection],
-    ) {
+    fn correct(&mut self, time_ns: i64, last_ns: i64, detections: &[Detection]) {
+        let Self { numbers, people, memory, .. } = self;
+        let Memory { order, expected, assignment, .. } = memory;
         let step_s = seconds(last_ns, time_ns);
-        for (p, (given, expected)) in given.iter().zip(expected).enumerate() {
-            let at_ns = given.map_or(time_ns, |d| measured_ns(detections[d], last_ns, time_ns));
-            let (numbers, person) = (&self.numbers, &mut self.people[p]);
+        for ((person, given), expected) in people.iter_mut().zip(&assignment.column_of).zip(expected) {
+            let detection = given.map(|d| &detections[order[d]]);
+            let at_ns = detection.map_or(time_ns, |detection| measured_ns(detection, last_ns, time_ns));
             person.predict(numbers, seconds(last_ns, at_ns));
-            match given {
-                Some(d) => person.matched(numbers, detections[*d], &expected.view, time_ns, step_s),
+            match detection {
+                Some(detection) => person.matched(numbers, detection, &expected.view, time_ns, step_s),
                 None => person.missed(expected.detection_probability, step_s),
             }
             person.predict(numbers, seconds(at_ns, time_ns));
@@ -153,29 +165,54 @@ impl MixtureTracker {
     /// Counts how long each track has stood where a track of more matches stands. All are judged on the same places,
     /// so the order does not matter.
     fn mark_duplicates(&mut self, step_s: f64) {
-        let rank = |p: &Person| (std::cmp::Reverse(p.confirmed), std::cmp::Reverse(p.matches), p.id);
-        let at: Vec<_> = self.people.iter().map(|p| (rank(p), p.filter.state().position_m())).collect();
+        let Memory { ranks, places_m, .. } = &mut self.memory;
+        ranks.clear();
+        ranks.extend(self.people.iter().map(|p| (Reverse(p.confirmed), Reverse(p.matches), p.id)));
+        places_m.clear();
+        places_m.extend(self.people.iter().map(|p| p.filter.state().position_m()));
         for (i, person) in self.people.iter_mut().enumerate() {
-            let doubled = at.iter().any(|other| other.0 < at[i].0 && other.1.distance(at[i].1) < DUPLICATE_M);
+            let place_m = places_m[i];
+            let doubles =
+                |(k, at_m): (usize, &DVec2)| at_m.distance(place_m) < DUPLICATE_M && ranks[k] < ranks[i];
+            let doubled = places_m.iter().enumerate().any(doubles);
             person.doubled_s = if doubled { person.doubled_s + step_s } else { 0.0 };
         }
     }
 
     /// A track for each detection that is nobody's and far enough from everybody.
-    fn give_birth(&mut self, time_ns: i64, given: &[Option<usize>], detections: &[&Detection]) {
-        let mut places: Vec<DVec2> = self.people.iter().map(|p| p.filter.state().position_m()).collect();
-        for (d, detection) in detections.iter().enumerate() {
-            let taken = given.contains(&Some(d));
+    fn give_birth(&mut self, time_ns: i64, detections: &[Detection]) {
+        let Self { numbers, people, next_id, memory, .. } = self;
+        let Memory { order, assignment, places_m, taken, .. } = memory;
+        taken.clear();
+        taken.resize(order.len(), false);
+        assignment.column_of.iter().flatten().for_each(|&d| taken[d] = true);
+        places_m.clear();
+        places_m.extend(people.iter().map(|p| p.filter.state().position_m()));
+        for (&d, _) in order.iter().zip(taken).filter(|(_, taken)| !**taken) {
+            let detection = &detections[d];
             let near = |place: &DVec2| place.distance(detection.position_m) <= BIRTH_RADIUS_M;
-            if taken || !detection.full_body || places.iter().any(near) {
+            if !detection.full_body || places_m.iter().any(near) {
                 continue;
             }
-            let mut person = Person::born(&self.numbers, self.next_id, detection, time_ns);
+            let mut person = Person::born(numbers, *next_id, detection, time_ns);
             let measured_ns = measured_ns(detection, i64::MIN, time_ns);
-            person.predict(&self.numbers, seconds(measured_ns, time_ns));
-            places.push(detection.position_m);
-            self.people.push(person);
-            self.next_id += 1;
+            person.predict(numbers, seconds(measured_ns, time_ns));
+            places_m.push(detection.position_m);
+            people.push(person);
+            *next_id += 1;
+        }
+    }
+
+    /// Everybody's track, in the memory of the last frame's.
+    fn tell(&mut self, time_ns: i64, step_s: f64, tracks: &mut Vec<Track>) {
+        tracks.truncate(self.people.len());
+        for (i, person) in self.people.iter_mut().enumerate() {
+            let observed = tracks.get_mut(i).map(|old| std::mem::take(&mut old.observed)).unwrap_or_default();
+            let track = person.track(time_ns, step_s, observed);
+            match tracks.get_mut(i) {
+                Some(old) => *old = track,
+                None => tracks.push(track),
+            }
         }
     }
 }

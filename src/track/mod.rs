@@ -28,9 +28,10 @@ pub use mixture::MixtureTracker;
 pub use numbers::Numbers;
 use paper::{PaperTracker, Variant};
 
+use crate::Site;
 use crate::config::{TrackConfig, TrackMethod};
 use crate::detect::{Detection, Prior};
-use crate::{Frame, Site};
+use crate::lidar::Views;
 
 /// Follows people by the method of the config.
 ///
@@ -43,8 +44,8 @@ use crate::{Frame, Site};
 /// // Somebody walks along x, 0.12 m a frame.
 /// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
 /// for k in 0..20 {
-///     let frame = frame(k);
-///     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
+///     let views = views(k);
+///     tracker.update(&views, &[detection(0.12 * k as f64, views.time_ns)], &mut tracks);
 /// }
 /// assert_eq!(tracks.len(), 1);
 /// assert!(tracks[0].confirmed && (tracks[0].velocity_mps.x - 1.2).abs() < 0.1);
@@ -65,7 +66,9 @@ impl Tracker {
     /// use umbracast::{Config, Mode, track::Tracker};
     ///
     /// let paper = Config::for_mode(Mode::Paper);
-    /// assert!(Tracker::new(&paper.track, &paper.site).priors(0).is_empty());
+    /// let mut priors = Vec::new();
+    /// Tracker::new(&paper.track, &paper.site).priors(0, &mut priors);
+    /// assert!(priors.is_empty());
     /// ```
     pub fn new(config: &TrackConfig, site: &Site) -> Self {
         Self(match config.method {
@@ -85,16 +88,18 @@ impl Tracker {
     ///
     /// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
     /// for k in 0..20 {
-    ///     let frame = frame(k);
-    ///     tracker.update(&frame, &[detection(0.12 * k as f64, frame.time_ns)], &mut tracks);
+    ///     let views = views(k);
+    ///     tracker.update(&views, &[detection(0.12 * k as f64, views.time_ns)], &mut tracks);
     /// }
-    /// let expected = &tracker.priors(frame(20).time_ns)[0];
+    /// let mut priors = Vec::new();
+    /// tracker.priors(views(20).time_ns, &mut priors);
+    /// let expected = &priors[0];
     /// assert!((expected.position_m.x - 0.12 * 20.0).abs() < 0.05 && expected.confirmed);
     /// ```
-    pub fn priors(&self, time_ns: i64) -> Vec<Prior> {
+    pub fn priors(&self, time_ns: i64, priors: &mut Vec<Prior>) {
         match &self.0 {
-            Method::Mixture(tracker) => tracker.priors(time_ns),
-            Method::Paper(_) => Vec::new(),
+            Method::Mixture(tracker) => tracker.priors(time_ns, priors),
+            Method::Paper(_) => priors.clear(),
         }
     }
 
@@ -108,15 +113,15 @@ impl Tracker {
     /// use umbracast::track::Tracker;
     ///
     /// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
-    /// tracker.update(&frame(0), &[detection(1.0, frame(0).time_ns)], &mut tracks);
+    /// tracker.update(&views(0), &[detection(1.0, views(0).time_ns)], &mut tracks);
     /// assert!(!tracks[0].confirmed, "one sighting is not enough");
-    /// tracker.update(&frame(1), &[detection(1.0, frame(1).time_ns)], &mut tracks);
+    /// tracker.update(&views(1), &[detection(1.0, views(1).time_ns)], &mut tracks);
     /// assert!(tracks[0].confirmed);
     /// ```
-    pub fn update(&mut self, frame: &Frame, detections: &[Detection], tracks: &mut Vec<Track>) {
+    pub fn update(&mut self, views: &Views, detections: &[Detection], tracks: &mut Vec<Track>) {
         match &mut self.0 {
-            Method::Mixture(tracker) => tracker.update(frame, detections, tracks),
-            Method::Paper(tracker) => tracker.update(frame, detections, tracks),
+            Method::Mixture(tracker) => tracker.update(views, detections, tracks),
+            Method::Paper(tracker) => tracker.update(views.time_ns, detections, tracks),
         }
     }
 }

@@ -8,7 +8,6 @@
 use super::association::{FORBIDDEN, greedy, in_order, optimal};
 use super::followed::{Heading, Observations, Track, WIDTH_SCALE_SIGMA, seconds};
 use super::gaussian::State;
-use crate::Frame;
 use crate::detect::Detection;
 use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
@@ -74,13 +73,15 @@ impl PaperTracker {
     }
 
     /// Takes a frame's detections, all taken to be of its end; `tracks` is every track alive then, in order of `id`.
-    pub fn update(&mut self, frame: &Frame, detections: &[Detection], tracks: &mut Vec<Track>) {
-        if self.time_ns.is_some_and(|last_ns| frame.time_ns <= last_ns) {
+    pub fn update(&mut self, time_ns: i64, detections: &[Detection], tracks: &mut Vec<Track>) {
+        if self.time_ns.is_some_and(|last_ns| time_ns <= last_ns) {
             return;
         }
-        let last_ns = self.time_ns.replace(frame.time_ns).unwrap_or(frame.time_ns);
-        let step_s = seconds(last_ns, frame.time_ns);
-        let detections = in_order(detections);
+        let last_ns = self.time_ns.replace(time_ns).unwrap_or(time_ns);
+        let step_s = seconds(last_ns, time_ns);
+        let mut order = Vec::new();
+        in_order(detections, &mut order);
+        let detections: Vec<&Detection> = order.iter().map(|&d| &detections[d]).collect();
         self.people.iter_mut().for_each(|person| person.predict(step_s));
         let given = self.associate(&detections);
         for (person, given) in self.people.iter_mut().zip(&given) {
@@ -93,7 +94,7 @@ impl PaperTracker {
         self.people.retain(|person| axes * person.P[0][0] < VARIANCE_MAX_M2);
         self.give_birth(&given, &detections);
         tracks.clear();
-        tracks.extend(self.people.iter_mut().map(|person| person.track(frame.time_ns, step_s)));
+        tracks.extend(self.people.iter_mut().map(|person| person.track(time_ns, step_s)));
     }
 
     fn associate(&self, detections: &[&Detection]) -> Vec<Option<usize>> {

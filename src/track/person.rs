@@ -1,6 +1,8 @@
 //! One person followed: filter, height, heading, boxes, and how sure it is that somebody is there.
 
-use super::followed::{Heading, Observations, Track, seconds};
+use std::collections::VecDeque;
+
+use super::followed::{Heading, Observations, Observed, Track, seconds};
 use super::gaussian::{Mat2, largest_sigma, plus, round};
 use super::height::Height;
 use super::kalman::Filter;
@@ -150,12 +152,13 @@ impl Person {
         }
     }
 
-    /// The track at the frame's time, `step_s` after the last frame; the filter stands there.
-    pub(super) fn track(&mut self, time_ns: i64, step_s: f64) -> Track {
+    /// The track at the frame's time, `step_s` after the last frame; the filter stands there. `observed` gives its memory.
+    pub(super) fn track(&mut self, time_ns: i64, step_s: f64, mut observed: VecDeque<Observed>) -> Track {
         let state = self.filter.state();
         let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
         self.heading.follow(&state, step_s);
         self.observed.push(time_ns, position_m, velocity_mps);
+        observed.clone_from(&self.observed.0);
         let (aabb, obb) = self.boxes(position_m);
         let (width_scale, width_scale_sigma) = self.width.scale();
         Track {
@@ -174,7 +177,7 @@ impl Person {
             confirmed: self.confirmed && largest_sigma(state.position_covariance()) < REPORTED_SIGMA_MAX_M,
             aabb,
             obb,
-            observed: self.observed.0.clone(),
+            observed,
         }
     }
 

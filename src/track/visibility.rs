@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use crate::geometry::slab::hit_obb;
 use crate::geometry::{DMat3, DVec2, DVec3, Obb, Pose};
-use crate::lidar::{Cloud, Frame, RangeImage};
+use crate::lidar::{Fan, SECTORS, Views, sector};
 use crate::site::Site;
 
 /// Radius of the upright cylinder that stands for a body, both as what is seen and as what hides: the trunk,
@@ -13,8 +13,6 @@ use crate::site::Site;
 const BODY_RADIUS_M: f64 = 0.155;
 /// A body is looked at in so many slices from the feet to the top.
 const SLICES: usize = 8;
-/// Directions round a sensor, counted apart, so that a lost packet hides a sector only.
-const SECTORS: usize = 90;
 /// Expected returns at which the chance of a detection has fallen to half, measured; a cluster has at least 5 points.
 const RETURNS_AT_HALF: f64 = 6.0;
 /// A body that sensors meet only below this height is not detected: legs alone are not taken for a person.
@@ -31,31 +29,32 @@ pub struct Body {
     pub height_m: f64,
 }
 
-/// What stands still between sensors and people.
+/// Sensors of the last frame, and what stands still between them and people.
 #[derive(Debug, Clone)]
 pub struct Visibility {
     pillars: Vec<(DVec2, f64)>,
     furniture: Vec<Obb>,
     /// Shortest and longest range of each sensor of the site.
     ranges_m: Vec<(f64, f64)>,
+    eyes: Vec<Eye>,
+    /// Of all that could hide a body from an eye, what is near the line between them.
+    between: Between,
 }
 
 /// One scan's view.
 #[derive(Debug, Clone)]
-pub struct Eye {
+struct Eye {
     origin_m: DVec3,
     sensor_from_site: Pose,
     range_m: (f64, f64),
     fan: Option<Fan>,
 }
 
-/// Where the beams of a scan go.
-#[derive(Debug, Clone)]
-struct Fan {
-    /// Ascending.
-    elevations_rad: Vec<f64>,
-    /// Columns fired into each sector.
-    columns: [f64; SECTORS],
+#[derive(Debug, Clone, Default)]
+struct Between {
+    others: Vec<Body>,
+    pillars: Vec<(DVec2, f64)>,
+    furniture: Vec<Obb>,
 }
 
 /// What a body gives.
@@ -88,121 +87,141 @@ impl Visibility {
             pillars: site.pillars.iter().map(|p| (DVec2::from_array(p.position_m), p.radius_m)).collect(),
             furniture: furniture.collect(),
             ranges_m: site.sensors.iter().map(|s| (s.range_min_m, s.range_max_m)).collect(),
+            eyes: Vec::new(),
+            between: Between::default(),
         }
     }
 
-    /// The views that a frame holds. A sensor that sent nothing sees nobody.
-    pub fn eyes(&self, frame: &Frame) -> Vec<Eye> {
-        frame
-            .scans
-            .iter()
-            .map(|scan| Eye {
-                origin_m: scan.site_from_sensor.translation_m,
-                sensor_from_site: scan.site_from_sensor.inverse(),
-                range_m: self.ranges_m.get(scan.sensor).copied().unwrap_or((0.0, f64::INFINITY)),
-                fan: match &scan.cloud {
-                    Cloud::Organised(image) => Some(Fan::of(image)),
-                    Cloud::Unorganised(_) => None,
-                },
-            })
-            .collect()
+    /// From here on as the sensors of this frame. One that sent nothing sees nobody.
+    pub fn look(&mut self, views: &Views) {
+        self.eyes.truncate(views.of_scans.len());
+        for (i, view) in views.of_scans.iter().enumerate() {
+            let eye = Eye {
+                origin_m: view.site_from_sensor.translation_m,
+                sensor_from_site: view.site_from_sensor.inverse(),
+                range_m: self.ranges_m.get(view.sensor).copied().unwrap_or((0.0, f64::INFINITY)),
+                fan: None,
+            };
+            match self.eyes.get_mut(i) {
+                // The fan's memory stays.
+                Some(old) => *old = Eye { fan: old.fan.take(), ..eye },
+                None => self.eyes.push(eye),
+            }
+            self.eyes[i].fan.clone_from(&view.fan);
+        }
     }
 
-    /// What `body` gives to all `eyes` while `others` stand round it.
-    pub fn view(&self, eyes: &[Eye], body: &Body, others: &[Body]) -> BodyView {
+    /// What `body` gives to all sensors while `others` stand round it.
+    pub fn view(&mut self, body: &Body, others: &[Body]) -> BodyView {
+        let Self { pillars, furniture, eyes, between, .. } = self;
         let mut view =
             BodyView { beams_known: eyes.iter().all(|eye| eye.fan.is_some()), ..BodyView::default() };
         for eye in eyes {
             let near = |point: DVec2, radius: f64| {
                 distance_to_segment(point, eye.origin_m.truncate(), body.position_m) < radius + BODY_RADIUS_M
             };
-            let hiding: Vec<&Body> =
-                others.iter().filter(|o| *o != body && near(o.position_m, BODY_RADIUS_M)).collect();
-            let pillars: Vec<&(DVec2, f64)> = self.pillars.iter().filter(|p| near(p.0, p.1)).collect();
-            let free = |target: DVec3| {
-                !pillars.iter().any(|p| cylinder_hides(p.0, p.1, f64::INFINITY, eye.origin_m, target))
-                    && !hiding.iter().any(|o| {
-                        cylinder_hides(o.position_m, BODY_RADIUS_M, o.height_m, eye.origin_m, target)
-                    })
-                    && !self.furniture.iter().any(|f| hit_obb(f, eye.origin_m, target).is_some())
-            };
-            let across = (body.position_m - eye.origin_m.truncate()).perp().normalize_or_zero();
-            for slice in 0..SLICES {
-                let z = |edge: usize| body.height_m * edge as f64 / SLICES as f64;
-                let (low, high) = (z(slice), z(slice + 1));
-                for side in [-0.5, 0.5] {
-                    let foot = body.position_m + across * (side * BODY_RADIUS_M);
-                    let beams = eye.beams_between(foot.extend(low), foot.extend(high));
-                    let returns = beams * eye.columns_on(foot.extend(low)) * 0.5;
-                    view.returns_alone += returns;
-                    if free(foot.extend(0.5 * (low + high))) {
-                        if beams > 0.0 {
-                            view.top_m = view.top_m.max(high);
-                        }
-                        view.returns += returns;
-                        if slice + 1 == SLICES {
-                            view.beams_per_m_at_top += 0.5 * beams / (high - low);
-                        }
-                    }
-                }
-            }
+            between.others.clear();
+            between.others.extend(others.iter().filter(|o| *o != body && near(o.position_m, BODY_RADIUS_M)));
+            between.pillars.clear();
+            between.pillars.extend(pillars.iter().filter(|p| near(p.0, p.1)));
+            between.furniture.clear();
+            let around = |f: &&Obb| near(f.center_m.truncate(), f.half_m.length());
+            between.furniture.extend(furniture.iter().filter(around));
+            eye.view(body, between, &mut view);
         }
         view
     }
 }
 
 impl Eye {
+    /// Adds what a body gives to this sensor.
+    fn view(&self, body: &Body, between: &Between, view: &mut BodyView) {
+        let across = (body.position_m - self.origin_m.truncate()).perp().normalize_or_zero();
+        let feet_m = [-0.5, 0.5].map(|side| body.position_m + across * (side * BODY_RADIUS_M));
+        let z_m = |edge: usize| body.height_m * edge as f64 / SLICES as f64;
+        let edges: [[Edge; SLICES + 1]; 2] =
+            feet_m.map(|foot_m| std::array::from_fn(|edge| self.edge(foot_m.extend(z_m(edge)))));
+        for slice in 0..SLICES {
+            let (low_m, high_m) = (z_m(slice), z_m(slice + 1));
+            for (foot_m, edges) in feet_m.iter().zip(&edges) {
+                let beams = self.beams_between(&edges[slice], &edges[slice + 1]);
+                if beams == 0.0 {
+                    continue;
+                }
+                let returns = beams * self.columns_on(&edges[slice]) * 0.5;
+                view.returns_alone += returns;
+                if between.hide(self.origin_m, foot_m.extend(0.5 * (low_m + high_m))) {
+                    continue;
+                }
+                view.top_m = view.top_m.max(high_m);
+                view.returns += returns;
+                if slice + 1 == SLICES {
+                    view.beams_per_m_at_top += 0.5 * beams / (high_m - low_m);
+                }
+            }
+        }
+    }
+
+    fn edge(&self, point_m: DVec3) -> Edge {
+        let at_m = self.sensor_from_site.point(point_m);
+        let away_m = at_m.x.hypot(at_m.y);
+        let beam = self.fan.as_ref().map_or(0.0, |fan| beam_at(fan, at_m.z.atan2(away_m)));
+        Edge { at_m, away_m, beam }
+    }
+
     /// Beams that pass between two points of a vertical line.
-    fn beams_between(&self, low_m: DVec3, high_m: DVec3) -> f64 {
-        let (low, high) = (self.sensor_from_site.point(low_m), self.sensor_from_site.point(high_m));
-        let range = low.length();
-        if range < self.range_m.0 || range > self.range_m.1 {
+    fn beams_between(&self, low: &Edge, high: &Edge) -> f64 {
+        let range_m = low.at_m.length();
+        if range_m < self.range_m.0 || range_m > self.range_m.1 {
             return 0.0;
         }
-        let elevation = |p: DVec3| p.z.atan2(p.x.hypot(p.y));
-        match &self.fan {
-            Some(fan) => (fan.beam_at(elevation(high)) - fan.beam_at(elevation(low))).abs(),
+        match self.fan {
+            Some(_) => (high.beam - low.beam).abs(),
             None => RETURNS_OF_UNKNOWN_BEAMS / SLICES as f64,
         }
     }
 
     /// Columns that meet a body at a point.
-    fn columns_on(&self, point_m: DVec3) -> f64 {
+    fn columns_on(&self, at: &Edge) -> f64 {
         let Some(fan) = &self.fan else { return 1.0 };
-        let p = self.sensor_from_site.point(point_m);
-        let width_rad = 2.0 * BODY_RADIUS_M / p.x.hypot(p.y).max(BODY_RADIUS_M);
-        fan.columns[sector((-p.y).atan2(p.x))] * width_rad * SECTORS as f64 / TAU
+        let width_rad = 2.0 * BODY_RADIUS_M / at.away_m.max(BODY_RADIUS_M);
+        let columns = fan.columns[sector((-at.at_m.y).atan2(at.at_m.x))];
+        f64::from(columns) * width_rad * SECTORS as f64 / TAU
     }
 }
 
-impl Fan {
-    fn of(image: &RangeImage) -> Self {
-        let mut elevations_rad: Vec<f64> = image.beams.iter().map(|b| b.elevation_rad).collect();
-        elevations_rad.sort_by(f64::total_cmp);
-        let mut columns = [0.0; SECTORS];
-        for column in &image.columns {
-            columns[sector((f64::from(column.azimuth_cdeg) * 0.01).to_radians())] += 1.0;
-        }
-        Self { elevations_rad, columns }
-    }
+/// A point of a body's side as a sensor sees it.
+#[derive(Clone, Copy)]
+struct Edge {
+    /// In the sensor's frame.
+    at_m: DVec3,
+    /// Horizontally from the sensor's axis.
+    away_m: f64,
+    /// Beams below it; 0 where they are not known.
+    beam: f64,
+}
 
-    /// How many beams lie below an elevation, counted smoothly: half a beam at the lowest one.
-    fn beam_at(&self, elevation_rad: f64) -> f64 {
-        let all = &self.elevations_rad;
-        let n = all.partition_point(|&e| e < elevation_rad);
-        let (low, high) = match n {
-            0 => return 0.0,
-            n if n == all.len() => return n as f64,
-            n => (all[n - 1], all[n]),
-        };
-        n as f64 - 0.5 + (elevation_rad - low) / (high - low)
+impl Between {
+    /// Does anything stand on the line from the eye to the target?
+    fn hide(&self, eye_m: DVec3, target_m: DVec3) -> bool {
+        let pillar = |p: &(DVec2, f64)| cylinder_hides(p.0, p.1, f64::INFINITY, eye_m, target_m);
+        let body = |o: &Body| cylinder_hides(o.position_m, BODY_RADIUS_M, o.height_m, eye_m, target_m);
+        self.pillars.iter().any(pillar)
+            || self.others.iter().any(body)
+            || self.furniture.iter().any(|f| hit_obb(f, eye_m, target_m).is_some())
     }
 }
 
-/// The sector of an azimuth, clockwise from above.
-fn sector(azimuth_rad: f64) -> usize {
-    let turn = (azimuth_rad / TAU).rem_euclid(1.0);
-    ((turn * SECTORS as f64) as usize).min(SECTORS - 1)
+/// How many beams lie below an elevation, counted smoothly: half a beam at the lowest one.
+fn beam_at(fan: &Fan, elevation_rad: f64) -> f64 {
+    let all = &fan.elevations_rad;
+    let n = all.partition_point(|&e| e < elevation_rad);
+    let (low, high) = match n {
+        0 => return 0.0,
+        n if n == all.len() => return n as f64,
+        n => (all[n - 1], all[n]),
+    };
+    n as f64 - 0.5 + (elevation_rad - low) / (high - low)
 }
 
 fn distance_to_segment(point: DVec2, start: DVec2, end: DVec2) -> f64 {
@@ -246,7 +265,7 @@ pub fn detection_probability(in_full_view: f64, view: &BodyView) -> f64 {
 mod tests {
     use super::*;
     use crate::Config;
-    use crate::lidar::{Column, Model, Scan};
+    use crate::lidar::{Cloud, Column, Frame, Model, RangeImage, Scan};
 
     /// One HDL-32E in the west of the default site, whose columns lie evenly over `turn_cdeg` from ahead on.
     fn frame(turn_cdeg: f32) -> Frame {
@@ -271,8 +290,9 @@ mod tests {
     }
 
     fn view(frame: &Frame, seen: Body, others: &[Body]) -> BodyView {
-        let visibility = Visibility::new(&Config::default().site);
-        visibility.view(&visibility.eyes(frame), &seen, others)
+        let mut visibility = Visibility::new(&Config::default().site);
+        visibility.look(&Views::of(frame));
+        visibility.view(&seen, others)
     }
 
     #[test]

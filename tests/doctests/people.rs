@@ -42,9 +42,9 @@ pub fn detection(x_m: f64, time_ns: i64) -> umbracast::detect::Detection {
     }
 }
 
-/// A frame without scans: what the tracker asks of it is its time.
-pub fn frame(k: i64) -> umbracast::Frame {
-    umbracast::Frame { index: k as u64, time_ns: (k + 1) * umbracast::STEP_NS, scans: Vec::new() }
+/// A frame without scans, as a tracker sees it.
+pub fn views(k: i64) -> umbracast::lidar::Views {
+    umbracast::lidar::Views { time_ns: (k + 1) * umbracast::STEP_NS, of_scans: Vec::new() }
 }
 
 /// Tracks of people after two seconds, each by its place along x in frame k.
@@ -53,8 +53,8 @@ pub fn tracks_of(places_m: &[fn(f64) -> f64]) -> Vec<umbracast::track::Track> {
     let (mut tracker, mut tracks) =
         (umbracast::track::Tracker::new(&config.track, &config.site), Vec::new());
     for k in 0..20 {
-        let seen: Vec<_> = places_m.iter().map(|x_m| detection(x_m(k as f64), frame(k).time_ns)).collect();
-        tracker.update(&frame(k), &seen, &mut tracks);
+        let seen: Vec<_> = places_m.iter().map(|x_m| detection(x_m(k as f64), views(k).time_ns)).collect();
+        tracker.update(&views(k), &seen, &mut tracks);
     }
     tracks
 }

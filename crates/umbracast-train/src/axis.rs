@@ -17,7 +17,7 @@ use umbracast::detect::axis::{AxisModel, OUTPUTS, UNIT_M};
 use umbracast::detect::features::{AxisFeatures, EVEN, ODD};
 use umbracast::detect::{Background, Clusterer, Measurer, Prior, SHIFT_M};
 use umbracast::geometry::DVec2;
-use umbracast::lidar::Assembler;
+use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Tracker;
 use umbracast::{Error, Health};
 use umbracast_eval::run::chain::{empty_frames, push};
@@ -184,15 +184,16 @@ fn watch(crowd: Crowd, seed: u64, config: &Config) -> Result<Vec<Sample>, Error>
     let mut scene = Scene::new(crowd, &config.site, seed)?;
     let walkers = scene.walkers().to_vec();
     let mut assembler = Assembler::new(&config.site)?;
-    let (mut points, mut clusters, mut detections, mut tracks) = (vec![], vec![], vec![], vec![]);
+    let (mut priors, mut points, mut clusters, mut detections, mut tracks) =
+        (vec![], vec![], vec![], vec![], vec![]);
     while let Some(now) = scene.next_frame() {
         push(&mut assembler, &now.packets, &mut health);
         while let Some(frame) = assembler.pop() {
-            let priors = tracker.priors(frame.time_ns);
+            tracker.priors(frame.time_ns, &mut priors);
             background.foreground(&frame, &priors, &mut health, &mut points);
             clusterer.clusters(&points, &priors, &mut clusters);
             measurer.detections(&points, &clusters, &priors, &mut detections);
-            tracker.update(&frame, &detections, &mut tracks);
+            tracker.update(&Views::of(&frame), &detections, &mut tracks);
             for cluster in &clusters {
                 let known = !samples.len().is_multiple_of(UNKNOWN_EVERY);
                 let priors: &[Prior] = if known { &priors } else { &[] };

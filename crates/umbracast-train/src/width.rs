@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use umbracast::config::Config;
 use umbracast::geometry::{DVec2, DVec3};
-use umbracast::lidar::Assembler;
+use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Track;
 use umbracast::track::visibility::{Body, Visibility};
 use umbracast::track::width::share;
@@ -79,7 +79,7 @@ fn watch(scene: u64) -> Result<Vec<Person>, Error> {
     let preset = [Preset::Orca03, Preset::Mixed][scene as usize % 2];
     let mut scene = Scene::new(circle_crossing(preset, 10, 12.5, seed), &config.site, seed)?;
     let walkers = scene.walkers().to_vec();
-    let visibility = Visibility::new(&config.site);
+    let mut visibility = Visibility::new(&config.site);
     let mut pipeline = Pipeline::new(&config, None)?;
     empty_frames(&config.site, seed)?.iter().for_each(|frame| pipeline.learn_empty(frame));
     let (mut assembler, mut health) = (Assembler::new(&config.site)?, Health::default());
@@ -88,11 +88,11 @@ fn watch(scene: u64) -> Result<Vec<Person>, Error> {
         push(&mut assembler, &now.packets, &mut health);
         while let Some(frame) = assembler.pop() {
             let outcome = pipeline.step(&frame);
-            let eyes = visibility.eyes(&frame);
+            visibility.look(&Views::of(&frame));
             let body = |t: &Track| Body { position_m: t.position_m, height_m: t.height_m };
             let bodies: Vec<Body> = outcome.tracks.iter().map(body).collect();
             for (track, body) in outcome.tracks.iter().zip(&bodies).filter(|(track, _)| track.points > 0) {
-                let view = visibility.view(&eyes, body, &bodies);
+                let view = visibility.view(body, &bodies);
                 let speed_mps = track.velocity_mps.length();
                 let nearest = outcome
                     .detections
