@@ -11,6 +11,7 @@ pub mod tables;
 pub mod wire;
 pub mod viewers;
 pub mod results;
+pub mod objects;
 pub mod recording;
 pub mod trajectories;
 pub mod bvh;
