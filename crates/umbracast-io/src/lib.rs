@@ -9,6 +9,8 @@ pub mod messages;
 pub mod point_cloud;
 pub mod tables;
 pub mod wire;
+pub mod fields;
+pub mod nodes;
 pub mod viewers;
 pub mod results;
 pub mod objects;

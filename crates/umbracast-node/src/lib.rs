@@ -4,4 +4,18 @@ pub mod role;
 pub mod keys;
 pub mod access;
 pub mod network;
+pub mod hall;
+pub mod front;
+pub mod join;
+pub mod lead;
+pub mod chain;
+pub mod back;
+pub mod watch;
+pub mod share;
+pub mod node;
 pub mod ros2;
+pub mod mqtt;
+pub mod outward;
+pub mod fleet;
+
+pub use node::{Node, Settings, Source};

@@ -1,7 +1,7 @@
 //! Warnings as JSON over MQTT, for those who have no Zenoh: sent to a broker that is there already.
 //!
-//! A client of our own and not Zenoh's bridge, as the bridge passes on bytes: warnings are CDR, and who listens to MQTT
-//! expects JSON. `rumqttc` is kept, small, and brings no runtime that Zenoh has not brought.
+//! A client of our own and not Zenoh's bridge, as the bridge passes on bytes: warnings on Zenoh are CDR, and who listens
+//! to MQTT expects JSON. `rumqttc` is kept, small, and brings no runtime that Zenoh has not brought.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,9 +11,8 @@ use std::time::Duration;
 
 use rumqttc::{Client, Connection, LastWill, MqttOptions, QoS, TlsConfiguration, Transport};
 use serde::Deserialize;
-use serde_json::{Value, json};
 use umbracast::Error;
-use umbracast_io::nodes::Warning;
+use umbracast_live::warnings::Event;
 
 /// Warnings that wait for the broker; more are lost, and counted.
 const WAITING: usize = 4096;
@@ -75,12 +74,13 @@ impl Sender {
         Ok(Self { client, hall: hall.to_owned(), lost: AtomicU64::new(0), stop, thread: Some(thread) })
     }
 
-    /// Sends a warning to `umbracast/HALL/warnings/AP`, at least once. Waits for nobody.
-    pub fn send(&self, warning: &Warning) {
+    /// Sends what a link has come to, as the page's events say it, to `umbracast/HALL/warnings/AP`, at least once. Waits for
+    /// nobody.
+    pub fn send(&self, event: &Event) {
         // What separates levels and patterns of MQTT is in no name that can be subscribed to.
-        let access_point = warning.access_point.replace(['/', '+', '#'], "_");
+        let access_point = event.access_point.replace(['/', '+', '#'], "_");
         let topic = format!("umbracast/{}/warnings/{access_point}", self.hall);
-        let text = json(warning).to_string();
+        let text = event.json().to_string();
         if self.client.try_publish(topic, QoS::AtLeastOnce, false, text).is_err() {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
@@ -107,23 +107,6 @@ impl Drop for Sender {
             let _ = thread.join(); // It does not panic; if it did, there is nothing left to end.
         }
     }
-}
-
-/// A warning as the page's events are: names are those of the tables.
-pub fn json(warning: &Warning) -> Value {
-    let or_null = |seconds: f64| if seconds.is_nan() { Value::Null } else { seconds.into() };
-    json!({
-        "event": warning.state,
-        "access_point": warning.access_point,
-        "track": warning.track,
-        "frame": warning.frame,
-        "time_ns": warning.time_ns,
-        "p_now": warning.p_now,
-        "p_w9": warning.p_w9,
-        "onset_p10_s": or_null(warning.onset_s[0]),
-        "onset_p50_s": or_null(warning.onset_s[1]),
-        "onset_p90_s": or_null(warning.onset_s[2]),
-    })
 }
 
 /// Sends and receives until the client has said good-bye, or nobody is there to say it to.
@@ -160,15 +143,14 @@ mod tests {
     use std::io::{Read, Write};
     use std::net::{TcpListener, TcpStream};
 
-    fn warning() -> Warning {
-        Warning {
-            access_point: "door/a".to_owned(),
-            state: "warning".to_owned(),
-            track: 7,
-            p_w9: 0.75,
-            onset_s: [0.2, 0.4, f64::NAN],
-            ..Warning::default()
-        }
+    use serde_json::Value;
+    use umbracast_io::rows::LinkRow;
+    use umbracast_live::warnings::State;
+
+    fn event() -> Event {
+        let mut link = LinkRow { track: 7, onset_s: [Some(0.2), Some(0.4), None], ..LinkRow::default() };
+        link.p[umbracast::STEPS - 1] = 0.75;
+        Event { access_point: "door/a".to_owned(), link, state: State::Warned }
     }
 
     /// The next packet of MQTT 3.1.1: its first byte, and what follows its length.
@@ -211,7 +193,7 @@ mod tests {
         let address = broker.local_addr().unwrap().to_string();
         let settings = Mqtt { broker: address, user: None, password_file: None, ca: None };
         let sender = Sender::start(&settings, "lab").unwrap();
-        sender.send(&warning()); // Waits until the broker is there.
+        sender.send(&event()); // Waits until the broker is there.
         let (mut stream, _) = broker.accept().unwrap();
         let (kind, hello) = packet(&mut stream);
         assert_eq!((kind >> 4, &hello[2..6]), (1, &b"MQTT"[..]));
@@ -235,7 +217,7 @@ mod tests {
     fn a_broker_that_is_never_there_stops_nobody() {
         let settings = Mqtt { broker: "127.0.0.1:1".to_owned(), user: None, password_file: None, ca: None };
         let sender = Sender::start(&settings, "lab").unwrap();
-        (0..WAITING + 10).for_each(|_| sender.send(&warning()));
+        (0..WAITING + 10).for_each(|_| sender.send(&event()));
         assert!(sender.lost() >= 10);
         drop(sender);
         assert!(Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab").is_err());

@@ -15,6 +15,8 @@ use zenoh::Wait;
 
 use crate::access::{self, Works};
 pub use crate::keys::chunk;
+use crate::mqtt::Mqtt;
+use crate::outward::Ros2;
 
 /// Where nodes of one host meet without settings: Zenoh's own port.
 const MEETING_POINT: &str = "127.0.0.1:7447";
@@ -50,6 +52,10 @@ pub struct Network {
     pub roles: BTreeMap<String, Works>,
     /// True where anybody who reaches an endpoint beyond loopback may connect: a network of one's own.
     pub anyone: bool,
+    /// Where a node that serves tells the hall to ROS 2.
+    pub ros2: Option<Ros2>,
+    /// Where it sends warnings over MQTT.
+    pub mqtt: Option<Mqtt>,
 }
 
 /// How a session stands among others.
@@ -94,6 +100,8 @@ impl Default for Network {
             tls: None,
             roles: BTreeMap::new(),
             anyone: false,
+            ros2: None,
+            mqtt: None,
         }
     }
 }
@@ -120,7 +128,8 @@ impl Network {
         let tls = network.tls.iter_mut().flat_map(|tls| {
             [Some(&mut tls.ca), tls.certificate.as_mut(), tls.key.as_mut()].into_iter().flatten()
         });
-        files.chain(tls).for_each(|path| *path = folder.join(&*path));
+        let mqtt = network.mqtt.iter_mut().flat_map(|mqtt| [mqtt.password_file.as_mut(), mqtt.ca.as_mut()].into_iter().flatten());
+        files.chain(tls).chain(mqtt).for_each(|path| *path = folder.join(&*path));
         network.check().map_err(|e| e.within(file.display()))?;
         Ok(network)
     }

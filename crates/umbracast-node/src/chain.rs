@@ -1,0 +1,247 @@
+//! The stages behind the foreground, as many of them in a row as a process runs: the calls of
+//! [`umbracast::Pipeline::step`], with a wire where the row ends.
+
+use umbracast::blockage::Caster;
+use umbracast::detect::{Clusterer, Measurer, POINTS_MAX, Prior};
+use umbracast::forecast::{Forecaster, Weights};
+use umbracast::track::Tracker;
+use umbracast::{Config, Error, Outcome, STEP_NS};
+use umbracast_io::nodes::{Followed, Priors, Warning};
+use umbracast_io::rows;
+use umbracast_io::rows::{DetectionRow, LinkRow};
+use umbracast_live::warnings::{Event, Warnings};
+
+use crate::join::Joined;
+use crate::role::Role;
+
+/// Which stages stand in a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Row {
+    /// From foreground to tracks.
+    pub track: bool,
+    /// From tracks to forecasts.
+    pub forecast: bool,
+    /// From forecasts to links.
+    pub cast: bool,
+}
+
+impl Row {
+    /// The rows of so many stages: stages that follow each other need no wire between.
+    pub fn of(stages: &[Role]) -> Vec<Self> {
+        let has = |role| stages.contains(&role);
+        let (track, forecast, cast) = (has(Role::Track), has(Role::Forecast), has(Role::Cast));
+        let rows = match (track, forecast, cast) {
+            (true, false, true) => {
+                [Self { track, forecast, cast: false }, Self { track: false, forecast, cast }].to_vec()
+            }
+            _ => vec![Self { track, forecast, cast }],
+        };
+        rows.into_iter().filter(|row| row.track || row.forecast || row.cast).collect()
+    }
+}
+
+/// Stages in a row, with what each remembers.
+#[derive(Debug)]
+pub struct Chain {
+    config: Config,
+    clusterer: Clusterer,
+    measurer: Measurer,
+    tracker: Option<Tracker>,
+    forecaster: Option<Forecaster>,
+    caster: Option<Caster>,
+    access_points: Vec<String>,
+    warnings: Warnings,
+    priors: Vec<Prior>,
+    outcome: Outcome,
+    /// The end of frame 0.
+    first_ns: Option<i64>,
+    last_ns: Option<i64>,
+    fewer_samples: u64,
+    out_of_order: u64,
+}
+
+/// What the stages made of one frame; what a stage makes that is not in the row is not there.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Made {
+    /// The frame's.
+    pub time_ns: i64,
+    /// The frame's.
+    pub frame: u64,
+    /// Where people are expected in the next frame.
+    pub priors: Option<Priors>,
+    /// Everybody seen.
+    pub detections: Option<Vec<DetectionRow>>,
+    /// Everybody followed, with forecasts if stage 2 is in the row.
+    pub followed: Option<Followed>,
+    /// Every link.
+    pub links: Option<Vec<LinkRow>>,
+    /// What changed of the links.
+    pub warnings: Vec<Warning>,
+    /// When the last front end closed the frame, time of its host.
+    pub closed_ns: i64,
+    /// How long the stages took until here.
+    pub took_ns: i64,
+}
+
+impl Chain {
+    /// # Errors
+    /// A setting that cannot work.
+    pub fn new(config: &Config, weights: Option<&Weights>, row: Row) -> Result<Self, Error> {
+        Ok(Self {
+            clusterer: Clusterer::new(&config.detect, &config.site),
+            measurer: Measurer::new(&config.detect, &config.site),
+            tracker: row.track.then(|| Tracker::new(&config.track, &config.site)),
+            forecaster: row.forecast.then(|| Forecaster::new(&config.forecast, weights)).transpose()?,
+            caster: row.cast.then(|| Caster::new(&config.blockage, &config.site)),
+            access_points: config.site.access_points.iter().map(|ap| ap.name.clone()).collect(),
+            warnings: Warnings::default(),
+            priors: Vec::new(),
+            outcome: Outcome::default(),
+            first_ns: None,
+            last_ns: None,
+            fewer_samples: 0,
+            out_of_order: 0,
+            config: config.clone(),
+        })
+    }
+
+    /// A frame of all front ends. Nothing comes of one that does not lie after the last.
+    pub fn joined(&mut self, joined: Joined, now_ns: impl Fn() -> i64) -> Option<Made> {
+        let time_ns = joined.views.time_ns;
+        if joined.anew && !self.is_later(time_ns) {
+            // Somebody's clock was set back: who was followed is followed no more.
+            self.tracker = self.tracker.as_ref().map(|_| Tracker::new(&self.config.track, &self.config.site));
+            (self.first_ns, self.last_ns) = (None, None);
+        }
+        if !self.is_later(time_ns) {
+            self.out_of_order += 1;
+            return None;
+        }
+        let begun_ns = now_ns();
+        let tracker = self.tracker.as_mut()?;
+        self.last_ns = Some(time_ns);
+        let first_ns = *self.first_ns.get_or_insert(time_ns);
+        let o = &mut self.outcome;
+        (o.time_ns, o.frame) = (time_ns, frames_between(first_ns, time_ns));
+        o.health = joined.health;
+        o.foreground = joined.foreground;
+        o.health.points_over_limit += o.foreground.len().saturating_sub(POINTS_MAX) as u64;
+        o.foreground.truncate(POINTS_MAX);
+        tracker.priors(time_ns, &mut self.priors);
+        self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);
+        self.measurer.detections(&o.foreground, &o.clusters, &self.priors, &mut o.detections);
+        tracker.update(&joined.views, &o.detections, &mut o.tracks);
+        tracker.priors(time_ns + STEP_NS, &mut self.priors);
+        o.health.frames_out_of_order += self.out_of_order;
+        let made = Made {
+            priors: Some(Priors {
+                time_ns: time_ns + STEP_NS,
+                priors: self.priors.clone(),
+                ..Priors::default()
+            }),
+            detections: Some(rows::detections(0, o).collect()),
+            closed_ns: joined.closed_ns,
+            ..Made::default()
+        };
+        let sensors = joined.views.of_scans.iter().map(|view| view.sensor as u32).collect();
+        let forecast_here = self.forecaster.is_some();
+        self.later_stages(made, sensors, joined.took_ns, begun_ns, now_ns, !forecast_here)
+    }
+
+    /// A frame that a tracker or a forecast in another process has done. Nothing comes of one that this row cannot go on
+    /// with.
+    pub fn followed(&mut self, followed: Followed, now_ns: impl Fn() -> i64) -> Option<Made> {
+        let begun_ns = now_ns();
+        let foreseen = followed.forecasts.len() == followed.tracks.len()
+            && followed.forecasts.iter().zip(&followed.tracks).all(|(f, t)| f.track == t.id);
+        if !self.is_later(followed.time_ns) || self.forecaster.is_none() && !foreseen {
+            self.out_of_order += 1;
+            return None;
+        }
+        self.last_ns = Some(followed.time_ns);
+        let o = &mut self.outcome;
+        (o.time_ns, o.frame, o.health) = (followed.time_ns, followed.frame, followed.health);
+        (o.tracks, o.forecasts) = (followed.tracks, followed.forecasts);
+        let made = Made { closed_ns: followed.closed_ns, ..Made::default() };
+        self.later_stages(made, followed.sensors, followed.took_ns, begun_ns, now_ns, false)
+    }
+
+    /// Time begins anew: the next frame is taken whatever its time.
+    pub fn forget_time(&mut self) {
+        if self.tracker.is_none() {
+            self.last_ns = None;
+        }
+    }
+
+    /// Frames that were of no use since the start.
+    pub fn out_of_order(&self) -> u64 {
+        self.out_of_order
+    }
+
+    /// Stages 2 and 3, where they are in the row.
+    fn later_stages(
+        &mut self,
+        mut made: Made,
+        sensors: Vec<u32>,
+        took_ns: i64,
+        begun_ns: i64,
+        now_ns: impl Fn() -> i64,
+        publish_tracks: bool,
+    ) -> Option<Made> {
+        let o = &mut self.outcome;
+        (made.time_ns, made.frame) = (o.time_ns, o.frame);
+        if let Some(forecaster) = &mut self.forecaster {
+            forecaster.forecast(&o.tracks, &mut o.forecasts);
+        }
+        if let Some(caster) = &mut self.caster {
+            caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
+            self.fewer_samples += u64::from(caster.took_fewer_samples());
+            o.health.frames_with_fewer_samples += self.fewer_samples;
+            let (mut tracks, mut links) = (Vec::new(), Vec::new());
+            rows::of_outcome(0, o, &mut tracks, &mut links);
+            let events = self.warnings.changes(&links, &self.access_points);
+            let warning = |event: &Event| warning(event, o.time_ns, o.frame, made.closed_ns);
+            made.warnings = events.iter().map(warning).collect();
+            made.links = Some(links);
+        }
+        made.took_ns = took_ns + now_ns() - begun_ns;
+        if publish_tracks || self.forecaster.is_some() {
+            made.followed = Some(Followed {
+                time_ns: o.time_ns,
+                frame: o.frame,
+                tracks: o.tracks.clone(),
+                forecasts: if self.forecaster.is_some() { o.forecasts.clone() } else { Vec::new() },
+                sensors,
+                health: o.health,
+                closed_ns: made.closed_ns,
+                took_ns: made.took_ns,
+            });
+        }
+        Some(made)
+    }
+
+    fn is_later(&self, time_ns: i64) -> bool {
+        self.last_ns.is_none_or(|last_ns| time_ns > last_ns)
+    }
+}
+
+/// A change of a link, as controllers get it.
+fn warning(event: &Event, time_ns: i64, frame: u64, closed_ns: i64) -> Warning {
+    let link = &event.link;
+    Warning {
+        time_ns,
+        frame,
+        access_point: event.access_point.clone(),
+        track: link.track,
+        state: event.state.name().to_owned(),
+        p_now: link.p_now,
+        p_w9: link.p[link.p.len() - 1],
+        onset_s: link.onset_s.map(|onset_s| onset_s.unwrap_or(f64::NAN)),
+        closed_ns,
+    }
+}
+
+/// The number of the frame that ends at `time_ns`.
+fn frames_between(first_ns: i64, time_ns: i64) -> u64 {
+    ((time_ns - first_ns + STEP_NS / 2) / STEP_NS) as u64
+}

@@ -1,0 +1,166 @@
+//! The front end, beside the sensors: packets to foreground, which is what leaves the host in place of clouds.
+
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+use umbracast::config::BackgroundMethod;
+use umbracast::detect::{Background, Prior};
+use umbracast::lidar::{Assembler, Views};
+use umbracast::{Config, Error, Frame, Health, Site};
+use umbracast_io::nodes::{Foreground, Priors};
+use umbracast_live::HostClock;
+use umbracast_live::receive::Arrived;
+
+/// Without an empty scan, a front end waits so long for the priors of its frame while a tracker is there.
+const PRIORS_WAIT: Duration = Duration::from_millis(50);
+/// A tracker that has been silent for so long is not waited for.
+const TRACKER_SILENT_NS: i64 = 1_000_000_000;
+
+/// Packets in, foreground out.
+#[derive(Debug)]
+pub struct Front {
+    assembler: Assembler,
+    background: Background,
+    /// Place in the site of each sensor that the assembler knows.
+    own: Vec<usize>,
+    names: Vec<String>,
+    /// Whether the empty hall is known: then nobody need say where people are expected.
+    knows_empty: bool,
+    expected: Arc<Expected>,
+    health: Health,
+    /// Frames for which the priors did not come in time.
+    priors_late: u64,
+    clock: HostClock,
+}
+
+/// Where the tracker expects people: the newest that was heard.
+#[derive(Debug, Default)]
+pub struct Expected {
+    newest: Mutex<Option<(Priors, i64)>>,
+    heard: Condvar,
+}
+
+impl Front {
+    /// For those sensors of the site that `own` names by place. `empty` are frames of the whole site without people.
+    ///
+    /// # Errors
+    /// A sensor that the site has not, or a method that takes the points of all sensors together where some are
+    /// another front end's.
+    pub fn new(
+        config: &Config,
+        own: &[usize],
+        empty: &[Frame],
+        expected: Arc<Expected>,
+        clock: HostClock,
+    ) -> Result<Self, Error> {
+        let all = config.site.sensors.len();
+        if own.is_empty() || own.iter().any(|&s| s >= all) {
+            return Err(Error::new(format!("sensors of the front end: expected some of {all}, found {own:?}")));
+        }
+        if config.detect.background == BackgroundMethod::Voxels && own.len() < all {
+            return Err(Error::new(format!(
+                "mode {}: voxels are counted over the points of all sensors: expected one front end with all {all}, \
+                 found {} of them in this one",
+                config.mode.name(),
+                own.len()
+            )));
+        }
+        let sensors = own.iter().map(|&s| config.site.sensors[s].clone()).collect();
+        let mut background = Background::new(&config.detect, &config.site);
+        empty.iter().for_each(|frame| background.learn_empty(frame));
+        Ok(Self {
+            assembler: Assembler::new(&Site { sensors, ..config.site.clone() })?,
+            background,
+            own: own.to_vec(),
+            names: config.site.sensors.iter().map(|sensor| sensor.name.clone()).collect(),
+            knows_empty: !empty.is_empty() || config.detect.background == BackgroundMethod::Voxels,
+            expected,
+            health: Health::default(),
+            priors_late: 0,
+            clock,
+        })
+    }
+
+    /// Takes a packet, whose sensor is a place in the site, and gives what it closes to `sink`.
+    pub fn push(&mut self, arrived: &Arrived, sink: impl FnMut(Foreground)) {
+        let Some(sensor) = self.own.iter().position(|&s| s == arrived.sensor) else { return };
+        self.assembler.push(sensor, &arrived.packet, &mut self.health);
+        self.drain(sink);
+    }
+
+    /// At the end of the packets: what is open.
+    pub fn finish(&mut self, sink: impl FnMut(Foreground)) {
+        self.assembler.finish();
+        self.drain(sink);
+    }
+
+    /// Frames for which the priors did not come in time.
+    pub fn priors_late(&self) -> u64 {
+        self.priors_late
+    }
+
+    /// What was skipped since the start.
+    pub fn health(&self) -> Health {
+        self.health
+    }
+
+    fn drain(&mut self, mut sink: impl FnMut(Foreground)) {
+        while let Some(mut frame) = self.assembler.pop() {
+            for scan in &mut frame.scans {
+                scan.sensor = self.own[scan.sensor];
+            }
+            sink(self.foreground(&frame));
+        }
+    }
+
+    fn foreground(&mut self, frame: &Frame) -> Foreground {
+        let closed_ns = self.clock.now_ns();
+        let priors = if self.knows_empty { Vec::new() } else { self.priors(frame.time_ns) };
+        let begun_ns = self.clock.now_ns();
+        let mut points = Vec::new();
+        self.background.foreground(frame, &priors, &mut self.health, &mut points);
+        Foreground {
+            time_ns: frame.time_ns,
+            sensors: self.names.clone(),
+            covers: self.own.iter().map(|&s| s as u32).collect(),
+            views: Views::of(frame).of_scans,
+            points,
+            health: self.health,
+            closed_ns,
+            took_ns: self.clock.now_ns() - begun_ns,
+        }
+    }
+
+    /// Those for the frame, or the newest that there are; then that is counted.
+    fn priors(&mut self, time_ns: i64) -> Vec<Prior> {
+        let (priors, in_time) = self.expected.at(time_ns, self.clock);
+        self.priors_late += u64::from(!in_time);
+        priors
+    }
+}
+
+impl Expected {
+    /// Takes what was heard.
+    pub fn hear(&self, priors: Priors, now_ns: i64) {
+        let mut newest = self.newest.lock().unwrap_or_else(PoisonError::into_inner);
+        *newest = Some((priors, now_ns));
+        drop(newest);
+        self.heard.notify_all();
+    }
+
+    /// Waits for the priors of a frame while a tracker is there; whether they came in time, or nobody was there.
+    fn at(&self, time_ns: i64, clock: HostClock) -> (Vec<Prior>, bool) {
+        let newest = self.newest.lock().unwrap_or_else(PoisonError::into_inner);
+        let early = |newest: &mut Option<(Priors, i64)>| {
+            newest.as_ref().is_some_and(|(priors, heard_ns)| {
+                priors.time_ns < time_ns && clock.now_ns() - heard_ns < TRACKER_SILENT_NS
+            })
+        };
+        let waited = self.heard.wait_timeout_while(newest, PRIORS_WAIT, early);
+        let (newest, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        match &*newest {
+            Some((priors, _)) => (priors.priors.clone(), priors.time_ns == time_ns),
+            None => (Vec::new(), true),
+        }
+    }
+}

@@ -1,0 +1,427 @@
+//! One process of a hall: whichever stages it runs, from its start to its end.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use umbracast::forecast::Weights;
+use umbracast::{Config, Error, Frame, Health};
+use umbracast_io::fields;
+use umbracast_io::nodes::{NodeHealth, Priors};
+use umbracast_live::latency::Latencies;
+use umbracast_live::queue::{Queue, WhenFull};
+use umbracast_live::receive::{Arrived, Door, Receivers};
+use umbracast_live::record::{RecordSettings, RecordStatus, Recorder};
+use umbracast_live::run::Listener;
+use umbracast_live::{HostClock, Published};
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Subscriber;
+
+use crate::back::{Back, Counted};
+use crate::chain::Row;
+use crate::front::{Expected, Front};
+use crate::hall::{Hall, Outlet, Urgency};
+use crate::role::Role;
+use crate::share::{Shared, Sharing};
+use crate::watch::Watch;
+
+/// Packets that wait for the front end: a second of four HDL-32E.
+const PACKETS_WAITING: usize = 8192;
+/// How often those are looked for whom a replay waits for.
+const LOOK: Duration = Duration::from_millis(50);
+/// What is there is known to all others so much later.
+const SETTLED: Duration = Duration::from_millis(500);
+
+/// What a node is made of.
+pub struct Settings {
+    /// What it does.
+    pub stages: Vec<Role>,
+    /// Site and method.
+    pub config: Config,
+    /// The network's, for modes that forecast with it.
+    pub weights: Option<Weights>,
+    /// A front end's: places of its sensors in the site,
+    pub sensors: Vec<usize>,
+    /// where their packets come from,
+    pub source: Source,
+    /// and the hall without people; learned on the way where there is none.
+    pub empty: Vec<Frame>,
+    /// A frame waits so long for a front end.
+    pub wait: Duration,
+    /// Where a front end records packets, and who looks on results.
+    pub record: Option<RecordSettings>,
+    /// Who is told of every frame, where the node serves.
+    pub listener: Option<Listener>,
+    /// What it answers when it is asked.
+    pub shared: Shared,
+    /// The host's.
+    pub clock: HostClock,
+}
+
+/// Where packets come from.
+pub enum Source {
+    /// Sockets.
+    Doors(Vec<Door>),
+    /// A recording, so many times as fast as it was, once front ends of all sensors and all stages are there.
+    Replay(Box<dyn Iterator<Item = Arrived> + Send>, f64),
+}
+
+/// A node's account.
+#[derive(Debug, Clone, Default)]
+pub struct Summary {
+    /// Packets that came.
+    pub packets: u64,
+    /// Packets that were given up because the front end was busy.
+    pub packets_lost: u64,
+    /// Frames of the front end, of the stages, or told to those who look on.
+    pub frames: u64,
+    /// Messages that were given up because the stages were busy.
+    pub skipped: u64,
+    /// Frames that waited in vain for a front end, or of which a part did not come.
+    pub incomplete: u64,
+    /// Messages that came too late.
+    pub late: u64,
+    /// Messages that were not understood.
+    pub broken: u64,
+    /// Frames for which the priors did not come in time.
+    pub priors_late: u64,
+    /// Messages published, and their bytes.
+    pub published: (u64, u64),
+    /// From the close of a frame to the results of the last stage.
+    pub latency: Latencies,
+    /// Of that what was not spent in a stage.
+    pub wire: Latencies,
+    /// Whether it leads.
+    pub leads: bool,
+    /// What was skipped since the start.
+    pub health: Health,
+    /// The recorder's.
+    pub recorded: RecordStatus,
+}
+
+/// A running node.
+pub struct Node {
+    hall: Hall,
+    stop: Arc<AtomicBool>,
+    receivers: Option<Receivers>,
+    packets: Option<Arc<Queue<Arrived>>>,
+    front: Option<JoinHandle<()>>,
+    fed: Option<JoinHandle<()>>,
+    front_counted: Arc<FrontCounted>,
+    backs: Vec<Back>,
+    watch: Option<Watch>,
+    recorder: Option<Arc<Recorder>>,
+    record_status: Arc<Mutex<RecordStatus>>,
+    stages: Vec<Role>,
+    started_ns: i64,
+    clock: HostClock,
+    health: Vec<Outlet>,
+    _sharing: Sharing,
+    _tokens: Vec<LivelinessToken>,
+    _subscribers: Vec<Subscriber<()>>,
+}
+
+/// What the front end counts.
+#[derive(Debug, Default)]
+struct FrontCounted {
+    packets: AtomicU64,
+    frames: AtomicU64,
+    priors_late: AtomicU64,
+    health: Mutex<Health>,
+    latency: Mutex<Latencies>,
+}
+
+impl Node {
+    /// Opens what it needs and begins.
+    ///
+    /// # Errors
+    /// A setting that cannot work, a port that is taken, a folder that cannot be made.
+    pub fn start(hall: Hall, settings: Settings) -> Result<Self, Error> {
+        let Settings { stages, config, weights, sensors, source, empty, wait, record, listener, shared, clock } =
+            settings;
+        let has = |role| stages.contains(&role);
+        let record_status = Arc::<Mutex<RecordStatus>>::default();
+        let points = record.as_ref().is_some_and(|record| record.points) || has(Role::Serve);
+        let start = |record| Recorder::start(record, &config, record_status.clone());
+        let recorder = record.map(start).transpose()?.map(Arc::new);
+        let mut node = Self {
+            stop: Arc::default(),
+            receivers: None,
+            packets: None,
+            front: None,
+            fed: None,
+            front_counted: Arc::default(),
+            backs: Vec::new(),
+            watch: None,
+            recorder,
+            record_status,
+            started_ns: clock.now_ns(),
+            clock,
+            health: Vec::new(),
+            _sharing: shared.answer(&hall)?,
+            _tokens: Vec::new(),
+            _subscribers: Vec::new(),
+            stages,
+            hall,
+        };
+        for row in Row::of(&node.stages) {
+            node.backs.push(Back::start(&node.hall, &config, weights.as_ref(), row, wait, clock)?);
+        }
+        if has_any(&node.stages, &[Role::Record, Role::Serve]) {
+            node.look_on(&config, points, listener)?;
+        }
+        if node.stages.contains(&Role::Sensor) {
+            node.open_front(&config, &sensors, &empty, source)?;
+        }
+        for &role in &node.stages {
+            let names: Vec<&str> = match role {
+                Role::Sensor => sensors.iter().map(|&s| config.site.sensors[s].name.as_str()).collect(),
+                _ => Vec::new(),
+            };
+            match &names[..] {
+                [] => node._tokens.push(node.hall.show(role, None)?),
+                names => {
+                    for name in names {
+                        node._tokens.push(node.hall.show(role, Some(name))?);
+                    }
+                }
+            }
+            let key = node.hall.keys().health(role, &node.hall.id());
+            node.health.push(node.hall.outlet(&key, Urgency::Rest)?);
+        }
+        Ok(node)
+    }
+
+    /// The page and the recorder.
+    fn look_on(&mut self, config: &Config, points: bool, listener: Option<Listener>) -> Result<(), Error> {
+        let recorder = self.recorder.clone().filter(|_| self.stages.contains(&Role::Record));
+        let told: Listener = Box::new(move |published: &Arc<Published>| {
+            if let Some(listener) = &listener {
+                listener(published);
+            }
+            if let Some(recorder) = &recorder {
+                recorder.result(published.clone());
+            }
+        });
+        self.watch = Some(Watch::start(&self.hall, config, self.clock, points, told)?);
+        Ok(())
+    }
+
+    fn open_front(
+        &mut self,
+        config: &Config,
+        own: &[usize],
+        empty: &[Frame],
+        source: Source,
+    ) -> Result<(), Error> {
+        let clock = self.clock;
+        let expected = Arc::<Expected>::default();
+        let mut front = Front::new(config, own, empty, expected.clone(), clock)?;
+        self._subscribers.push(self.hall.hear(&self.hall.keys().of("priors"), move |_, bytes| {
+            if let Some(priors) = fields::decode::<Priors>(&bytes.to_bytes()) {
+                expected.hear(priors, clock.now_ns());
+            }
+        })?);
+        let name = crate::network::chunk(&config.site.sensors[own[0]].name)
+            .map_err(|e| e.within("site.sensors: name"))?;
+        let outlet = self.hall.outlet(&self.hall.keys().foreground(&name), Urgency::Points)?;
+        let packets = Arc::new(Queue::new(PACKETS_WAITING, WhenFull::DropNewest));
+        let (queue, counted) = (packets.clone(), self.front_counted.clone());
+        let recorder = self.recorder.clone();
+        self.front = Some(std::thread::spawn(move || {
+            let publish = |mut foreground: umbracast_io::nodes::Foreground| {
+                outlet.put(&mut foreground);
+                counted.frames.fetch_add(1, Ordering::Relaxed);
+                let took = Duration::from_nanos((clock.now_ns() - foreground.closed_ns).max(0) as u64);
+                lock(&counted.latency).add(took);
+                *lock(&counted.health) = foreground.health;
+            };
+            while let Some(arrived) = queue.pop() {
+                counted.packets.fetch_add(1, Ordering::Relaxed);
+                front.push(&arrived, &publish);
+                counted.priors_late.store(front.priors_late(), Ordering::Relaxed);
+                if let Some(recorder) = &recorder {
+                    recorder.packet(arrived);
+                }
+            }
+            front.finish(&publish);
+        }));
+        match source {
+            Source::Doors(doors) => self.receivers = Some(Receivers::start(&doors, clock, &packets)?),
+            Source::Replay(recorded, rate) => {
+                let names = config.site.sensors.iter().map(|sensor| sensor.name.clone()).collect();
+                self.fed = Some(self.replay(recorded, rate, own.to_vec(), names, packets.clone()));
+            }
+        }
+        self.packets = Some(packets);
+        Ok(())
+    }
+
+    fn replay(
+        &self,
+        recorded: Box<dyn Iterator<Item = Arrived> + Send>,
+        rate: f64,
+        own: Vec<usize>,
+        sensors: Vec<String>,
+        packets: Arc<Queue<Arrived>>,
+    ) -> JoinHandle<()> {
+        let (hall, clock, stop) = (self.hall.clone(), self.clock, self.stop.clone());
+        std::thread::spawn(move || {
+            while !stop.load(Ordering::Relaxed) && !all_there(&hall, &sensors) {
+                std::thread::sleep(LOOK);
+            }
+            std::thread::sleep(SETTLED);
+            let mut begun = None;
+            for arrived in recorded {
+                if stop.load(Ordering::Relaxed) {
+                    break;
+                }
+                let time_ns = arrived.packet.time_ns;
+                let (host_ns, first_ns) = *begun.get_or_insert((clock.now_ns(), time_ns));
+                clock.sleep_until(host_ns + ((time_ns - first_ns) as f64 / rate) as i64);
+                if own.contains(&arrived.sensor) {
+                    packets.push(arrived);
+                }
+            }
+            packets.close();
+        })
+    }
+
+    /// The session with the others.
+    pub fn hall(&self) -> &Hall {
+        &self.hall
+    }
+
+    /// Where each sensor's packets come in; none of a replay.
+    pub fn receivers(&self) -> Option<&Receivers> {
+        self.receivers.as_ref()
+    }
+
+    /// True once a replay has ended and all of it is published.
+    pub fn is_done(&self) -> bool {
+        self.fed.is_some() && self.front.as_ref().is_some_and(JoinHandle::is_finished)
+    }
+
+    /// True while every thread works.
+    pub fn is_well(&self) -> bool {
+        let front = self.fed.is_some() || self.front.as_ref().is_none_or(|front| !front.is_finished());
+        let recording = self.recorder.as_ref().is_none_or(|recorder| recorder.is_well());
+        front && recording && self.backs.iter().all(Back::is_well) && self.watch.as_ref().is_none_or(Watch::is_well)
+    }
+
+    /// How it goes.
+    pub fn summary(&self) -> Summary {
+        let front = &self.front_counted;
+        let mut summary = Summary {
+            packets: front.packets.load(Ordering::Relaxed),
+            packets_lost: self.packets.as_ref().map_or(0, |packets| packets.lost()),
+            frames: front.frames.load(Ordering::Relaxed),
+            priors_late: front.priors_late.load(Ordering::Relaxed),
+            published: self.hall.published(),
+            latency: lock(&front.latency).clone(),
+            health: *lock(&front.health),
+            recorded: lock(&self.record_status).clone(),
+            ..Summary::default()
+        };
+        if let Some(watch) = &self.watch {
+            summary.frames = watch.frames.load(Ordering::Relaxed);
+            summary.incomplete = watch.incomplete.load(Ordering::Relaxed);
+        }
+        for back in &self.backs {
+            let counted: &Counted = &back.counted;
+            let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
+            summary.frames = count(&counted.frames);
+            summary.skipped += count(&counted.skipped);
+            summary.incomplete += count(&counted.incomplete);
+            summary.late += count(&counted.late);
+            summary.broken += count(&counted.broken);
+            summary.leads |= counted.leads.load(Ordering::Relaxed);
+            summary.latency = lock(&counted.latency).clone();
+            summary.wire = lock(&counted.wire).clone();
+            summary.health = *lock(&counted.health);
+        }
+        summary
+    }
+
+    /// Tells the others how it goes; whoever runs the node calls it once a second.
+    pub fn tell_health(&self, host: &str) {
+        let summary = self.summary();
+        let ms = |of: &Latencies| [0.5, 0.99].map(|share| of.quantile(share).as_secs_f64() * 1e3);
+        let (cpu_s, resident_bytes) = load().unwrap_or_default();
+        let mut health = NodeHealth {
+            time_ns: self.clock.now_ns(),
+            node: self.hall.id(),
+            host: host.to_owned(),
+            stages: self.stages.iter().map(|role| role.name().to_owned()).collect(),
+            up_s: (self.clock.now_ns() - self.started_ns) as f64 * 1e-9,
+            cpu_s,
+            resident_bytes,
+            frames: summary.frames,
+            frames_skipped: summary.skipped + summary.packets_lost,
+            frames_incomplete: summary.incomplete,
+            messages_late: summary.late,
+            messages_broken: summary.broken,
+            bytes_out: summary.published.1,
+            messages_out: summary.published.0,
+            latency_ms: ms(&summary.latency),
+            wire_ms: ms(&summary.wire),
+            leads: summary.leads,
+            health: summary.health,
+        };
+        self.health.iter().for_each(|outlet| outlet.put(&mut health));
+    }
+
+    /// Ends in the order of the data, so that what has come is finished, published and recorded.
+    pub fn stop(mut self) -> Summary {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(receivers) = &mut self.receivers {
+            receivers.stop();
+        }
+        if let Some(packets) = &self.packets {
+            packets.close();
+        }
+        for thread in [self.front.take(), self.fed.take()].into_iter().flatten() {
+            let _ = thread.join(); // One that panicked is a bug; the others end all the same.
+        }
+        self.backs.iter_mut().for_each(Back::stop);
+        if let Some(watch) = &mut self.watch {
+            watch.stop();
+        }
+        let mut summary = self.summary();
+        self.watch = None; // It holds the recorder.
+        if let Some(recorder) = self.recorder.take().and_then(Arc::into_inner) {
+            summary.recorded = recorder.stop();
+        }
+        summary
+    }
+}
+
+/// Whether front ends of all sensors are there, and all stages behind them.
+fn all_there(hall: &Hall, sensors: &[String]) -> bool {
+    let there = hall.nodes(Role::Sensor, LOOK);
+    let named = |name: &String| there.iter().any(|id| id.rsplit_once('.').is_some_and(|(own, _)| own == name));
+    sensors.iter().all(named)
+        && [Role::Track, Role::Forecast, Role::Cast].into_iter().all(|role| !hall.nodes(role, LOOK).is_empty())
+}
+
+fn has_any(stages: &[Role], any: &[Role]) -> bool {
+    stages.iter().any(|stage| any.contains(stage))
+}
+
+/// Seconds of processor time and bytes held, where the system says so (Linux does).
+fn load() -> Option<(f64, u64)> {
+    /// Ticks a second and bytes a page of every Linux that Rust runs on.
+    const TICKS_PER_S: f64 = 100.0;
+    const PAGE_BYTES: u64 = 4096;
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks: f64 = fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;
+    let pages: u64 = fields.get(21)?.parse().ok()?;
+    Some((ticks / TICKS_PER_S, pages * PAGE_BYTES))
+}
+
+/// What a thread that panicked left is whole: every change is one assignment.
+fn lock<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,121 @@
+//! What a node that comes asks for, and whoever has it answers: the site, the empty hall, the network's weights.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use umbracast::lidar::{Assembler, Packet};
+use umbracast::{Config, Error, Frame, Health, Site};
+use umbracast_io::messages;
+use zenoh::Wait;
+use zenoh::key_expr::KeyExpr;
+use zenoh::pubsub::Subscriber;
+use zenoh::query::Queryable;
+
+use crate::hall::Hall;
+
+/// How long an answer may take: the packets of an empty hall are some megabytes.
+const WAIT: Duration = Duration::from_secs(3);
+
+/// What a node has to give, by the key it is asked for with.
+#[derive(Debug, Clone, Default)]
+pub struct Shared(BTreeMap<String, Vec<u8>>);
+
+/// Answers as long as it lives.
+#[derive(Debug)]
+pub struct Sharing {
+    _queryable: Queryable<()>,
+    _subscriber: Option<Subscriber<()>>,
+}
+
+impl Shared {
+    /// The configuration as TOML. It holds nothing of the network: no name, no password.
+    #[must_use]
+    pub fn with_config(mut self, hall: &Hall, config: &Config) -> Self {
+        self.0.insert(hall.keys().of("config/site"), config.to_toml().into_bytes());
+        self
+    }
+
+    /// The packets of the empty hall, a list for each sensor of the site.
+    #[must_use]
+    pub fn with_empty(mut self, hall: &Hall, site: &Site, packets: &[Vec<Packet>]) -> Self {
+        for (sensor, packets) in site.sensors.iter().zip(packets).filter(|(_, packets)| !packets.is_empty()) {
+            let time_ns = packets[0].time_ns;
+            let message = messages::sensor_packets(time_ns, &sensor.name, packets);
+            self.0.insert(hall.keys().background(&sensor.name), message);
+        }
+        self
+    }
+
+    /// Weights of the network, as their file holds them.
+    #[must_use]
+    pub fn with_weights(mut self, hall: &Hall, file: Vec<u8>) -> Self {
+        self.0.insert(hall.keys().of("config/weights"), file);
+        self
+    }
+
+    /// Answers from now on.
+    ///
+    /// # Errors
+    /// A key that is none.
+    pub fn answer(self, hall: &Hall) -> Result<Sharing, Error> {
+        let queryable = hall.answer(&hall.keys().of("config/**"), move |query| {
+            for (key, bytes) in &self.0 {
+                let Ok(key) = KeyExpr::try_from(key.as_str()) else { continue };
+                if query.key_expr().intersects(&key) {
+                    // Who asked and is gone needs no answer.
+                    let _ = query.reply(key, bytes.as_slice()).wait();
+                }
+            }
+        })?;
+        Ok(Sharing { _queryable: queryable, _subscriber: None })
+    }
+}
+
+/// The configuration that somebody of the hall has; `None` where nobody answers.
+///
+/// # Errors
+/// One that is not understood.
+pub fn ask_config(hall: &Hall) -> Result<Option<Config>, Error> {
+    let key = hall.keys().of("config/site");
+    let Some((_, bytes)) = hall.ask(&key, WAIT).into_iter().next() else { return Ok(None) };
+    let text = String::from_utf8(bytes).map_err(|e| Error::new(e.to_string()).within(&key))?;
+    Config::of_run(&text, &key).map(Some)
+}
+
+/// The weights that somebody of the hall was given.
+pub fn ask_weights(hall: &Hall) -> Option<Vec<u8>> {
+    hall.ask(&hall.keys().of("config/weights"), WAIT).into_iter().next().map(|(_, bytes)| bytes)
+}
+
+/// The packets of the empty hall for these sensors of the site, by place in the site; `None` where they are not all known.
+pub fn ask_empty(hall: &Hall, site: &Site, own: &[usize]) -> Option<Vec<Vec<Packet>>> {
+    let mut packets = vec![Vec::new(); site.sensors.len()];
+    for &sensor in own {
+        let key = hall.keys().background(&site.sensors.get(sensor)?.name);
+        let (_, bytes) = hall.ask(&key, WAIT).into_iter().next()?;
+        packets[sensor] = messages::read_sensor_packets(&bytes).filter(|packets| !packets.is_empty())?;
+    }
+    Some(packets)
+}
+
+/// The frames of such packets, with each sensor's place in the site.
+///
+/// # Errors
+/// A sensor model that is not known.
+pub fn empty_frames(site: &Site, packets: &[Vec<Packet>]) -> Result<Vec<Frame>, Error> {
+    let own: Vec<usize> = (0..packets.len()).filter(|&s| !packets[s].is_empty()).collect();
+    let sensors = own.iter().filter_map(|&s| site.sensors.get(s).cloned()).collect();
+    let mut assembler = Assembler::new(&Site { sensors, ..site.clone() })?;
+    let mut all: Vec<(usize, &Packet)> =
+        own.iter().enumerate().flat_map(|(k, &s)| packets[s].iter().map(move |p| (k, p))).collect();
+    all.sort_by_key(|(_, packet)| packet.time_ns);
+    let (mut frames, mut health) = (Vec::new(), Health::default());
+    for (sensor, packet) in all {
+        assembler.push(sensor, packet, &mut health);
+        frames.extend(std::iter::from_fn(|| assembler.pop()));
+    }
+    assembler.finish();
+    frames.extend(std::iter::from_fn(|| assembler.pop()));
+    frames.iter_mut().flat_map(|frame| &mut frame.scans).for_each(|scan| scan.sensor = own[scan.sensor]);
+    Ok(frames)
+}

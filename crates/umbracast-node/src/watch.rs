@@ -1,0 +1,253 @@
+//! Those who look on: frames put together again from what the stages publish, for the page and the recorder.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use umbracast::detect::Point;
+use umbracast::{Config, Error, Outcome};
+use umbracast_io::nodes::{Followed, Foreground};
+use umbracast_io::rows::{self, DetectionRow, LinkRow};
+use umbracast_io::{fields, wire};
+use umbracast_live::queue::{Popped, Queue, WhenFull};
+use umbracast_live::run::Listener;
+use umbracast_live::warnings::Warnings;
+use umbracast_live::{HostClock, Published, published};
+use zenoh::bytes::ZBytes;
+use zenoh::pubsub::Subscriber;
+
+use crate::hall::Hall;
+
+/// Messages that wait to be put together.
+const WAITING: usize = 256;
+/// The parts of a frame are waited for so long from its links on.
+const PATIENCE_NS: i64 = 200_000_000;
+/// Frames that wait for parts.
+const OPEN_MAX: usize = 32;
+const REST: Duration = Duration::from_millis(50);
+/// Points beyond this are drawn by nobody.
+const POINTS_DRAWN: usize = 4000;
+
+/// One that looks on.
+pub struct Watch {
+    queue: Arc<Queue<Part>>,
+    thread: Option<JoinHandle<()>>,
+    /// Frames that were told.
+    pub frames: Arc<AtomicU64>,
+    /// Frames of which a part did not come.
+    pub incomplete: Arc<AtomicU64>,
+    _subscribers: Vec<Subscriber<()>>,
+}
+
+enum Part {
+    Links(ZBytes),
+    Tracks(ZBytes),
+    Detections(ZBytes),
+    Foreground(ZBytes),
+}
+
+/// A frame's parts.
+#[derive(Default)]
+struct Parts {
+    /// When the links came.
+    since_ns: Option<i64>,
+    frame: u64,
+    links: Option<Vec<LinkRow>>,
+    tracks: Option<Followed>,
+    detections: Option<Vec<DetectionRow>>,
+    foreground: Vec<Foreground>,
+}
+
+impl Watch {
+    /// Tells `listener` every frame of the hall, in order of time.
+    ///
+    /// # Errors
+    /// A key that is none.
+    pub fn start(
+        hall: &Hall,
+        config: &Config,
+        clock: HostClock,
+        points: bool,
+        listener: Listener,
+    ) -> Result<Self, Error> {
+        let queue = Arc::new(Queue::new(WAITING, WhenFull::DropOldest));
+        let hear = |key: &str, kind: fn(ZBytes) -> Part| {
+            let queue = queue.clone();
+            hall.hear(&hall.keys().of(key), move |_, bytes| queue.push(kind(bytes.clone())))
+        };
+        let mut subscribers = vec![
+            hear("links", Part::Links)?,
+            hear("tracks", Part::Tracks)?,
+            hear("detections", Part::Detections)?,
+        ];
+        if points {
+            subscribers.push(hear("sensor/*/foreground", Part::Foreground)?);
+        }
+        let (frames, incomplete) = (Arc::<AtomicU64>::default(), Arc::<AtomicU64>::default());
+        let mut gather = Gather {
+            names: published::access_points(&config.site),
+            sensors: config.site.sensors.len(),
+            points,
+            warnings: Warnings::default(),
+            open: BTreeMap::new(),
+            clock,
+            listener,
+            frames: frames.clone(),
+            incomplete: incomplete.clone(),
+        };
+        let parts = queue.clone();
+        let thread = std::thread::spawn(move || gather.run(&parts));
+        Ok(Self { queue, thread: Some(thread), frames, incomplete, _subscribers: subscribers })
+    }
+
+    /// True while its thread works.
+    pub fn is_well(&self) -> bool {
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
+    }
+
+    /// Tells what has come, and ends.
+    pub fn stop(&mut self) {
+        self.queue.close();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Gather {
+    names: Arc<[String]>,
+    sensors: usize,
+    points: bool,
+    warnings: Warnings,
+    open: BTreeMap<i64, Parts>,
+    clock: HostClock,
+    listener: Listener,
+    frames: Arc<AtomicU64>,
+    incomplete: Arc<AtomicU64>,
+}
+
+impl Gather {
+    fn run(&mut self, queue: &Queue<Part>) {
+        loop {
+            let ended = match queue.pop_within(REST) {
+                Popped::Item(part) => {
+                    self.take(part);
+                    false
+                }
+                Popped::Nothing => false,
+                Popped::Closed => true,
+            };
+            self.tell(ended);
+            if ended {
+                return;
+            }
+        }
+    }
+
+    /// What is not understood is left.
+    fn take(&mut self, part: Part) {
+        let names = self.names.clone();
+        match part {
+            Part::Links(bytes) => {
+                let Some((frame, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
+                let now_ns = self.clock.now_ns();
+                let parts = self.parts(time_ns);
+                (parts.frame, parts.since_ns, parts.links) = (frame, Some(now_ns), Some(rows));
+            }
+            Part::Detections(bytes) => {
+                let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
+                self.parts(time_ns).detections = Some(rows);
+            }
+            Part::Tracks(bytes) => {
+                let Some(tracks) = fields::decode::<Followed>(&bytes.to_bytes()) else { return };
+                if tracks.forecasts.len() == tracks.tracks.len() {
+                    let time_ns = tracks.time_ns;
+                    self.parts(time_ns).tracks = Some(tracks);
+                }
+            }
+            Part::Foreground(bytes) => {
+                let Some(part) = fields::decode::<Foreground>(&bytes.to_bytes()) else { return };
+                let known = &mut self.parts(part.time_ns).foreground;
+                if known.iter().all(|other| other.covers != part.covers) {
+                    known.push(part);
+                }
+            }
+        }
+    }
+
+    fn parts(&mut self, time_ns: i64) -> &mut Parts {
+        if self.open.len() >= OPEN_MAX && !self.open.contains_key(&time_ns) {
+            self.open.pop_first();
+        }
+        self.open.entry(time_ns).or_default()
+    }
+
+    /// Every frame whose parts are all there, or have been waited for; with what never came, the frames before.
+    fn tell(&mut self, ended: bool) {
+        let (now_ns, points_wanted) = (self.clock.now_ns(), self.points);
+        let whole = |parts: &Parts| {
+            let seen = parts.tracks.as_ref().map_or(0, |tracks| tracks.sensors.len());
+            let points: usize = parts.foreground.iter().map(|part| part.views.len()).sum();
+            parts.links.is_some()
+                && parts.tracks.is_some()
+                && parts.detections.is_some()
+                && (!points_wanted || points >= seen)
+        };
+        let waited = |parts: &Parts| parts.since_ns.is_some_and(|since_ns| now_ns - since_ns >= PATIENCE_NS);
+        loop {
+            let first_open = self.open.values().position(|parts| whole(parts) || waited(parts) || ended);
+            match first_open {
+                // A frame waits for those before it, whose links may still come.
+                Some(0) => {}
+                Some(n) if self.open.values().nth(n).is_some_and(waited) => {}
+                _ => return,
+            }
+            let Some((time_ns, parts)) = self.open.pop_first() else { return };
+            let complete = whole(&parts);
+            if let Some(published) = self.published(time_ns, parts) {
+                self.frames.fetch_add(1, Ordering::Relaxed);
+                (self.listener)(&Arc::new(published));
+            }
+            self.incomplete.fetch_add(u64::from(!complete), Ordering::Relaxed);
+        }
+    }
+
+    fn published(&mut self, time_ns: i64, parts: Parts) -> Option<Published> {
+        let (links, followed) = (parts.links?, parts.tracks?);
+        let mut foreground: Vec<Point> = parts.foreground.into_iter().flat_map(|part| part.points).collect();
+        foreground.sort_by_key(|point| point.sensor);
+        let every = foreground.len().div_ceil(POINTS_DRAWN).max(1);
+        let in_cm = |value_m: f64| (value_m * 100.0).round() as i16; // Saturates beyond 327 m.
+        let mut outcome = Outcome::default();
+        (outcome.frame, outcome.time_ns) = (parts.frame, time_ns);
+        (outcome.tracks, outcome.forecasts) = (followed.tracks, followed.forecasts);
+        let mut tracks = Vec::new();
+        rows::of_outcome(0, &outcome, &mut tracks, &mut Vec::new());
+        let events = self.warnings.changes(&links, &self.names);
+        let now_ns = self.clock.now_ns();
+        let time = |ns: i64| Duration::from_nanos(ns.max(0) as u64);
+        Some(Published {
+            frame: parts.frame,
+            time_ns,
+            published_ns: now_ns,
+            latency: time(now_ns - followed.closed_ns),
+            step: time(followed.took_ns),
+            detections: parts.detections.unwrap_or_default(),
+            tracks,
+            links,
+            events,
+            points_cm: foreground
+                .iter()
+                .step_by(every)
+                .map(|p| p.position_m.to_array().map(in_cm))
+                .collect(),
+            foreground: self.points.then_some(foreground),
+            health: followed.health,
+            sensors: (0..self.sensors).map(|s| followed.sensors.contains(&(s as u32))).collect(),
+            access_points: self.names.clone(),
+            ..Published::default()
+        })
+    }
+}
