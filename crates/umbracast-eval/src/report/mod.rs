@@ -5,7 +5,7 @@ pub mod tables;
 pub mod compare;
 mod long_table;
 mod ladder_table;
-pub(crate) mod plot;
+pub mod plot;
 pub(crate) mod figure;
 mod context;
 mod floor;
