@@ -312,6 +312,13 @@ mod tests {
     }
 
     #[test]
+    fn what_nodes_read_of_a_site_file_is_left_to_them_and_written_nowhere() {
+        let file = "[network]\nuser = \"edge\"\n[site]\nname = \"lab\"\n";
+        let config = Config::with_overlay(Mode::Default, file, "lab.toml").unwrap();
+        assert!(config.site.name == "lab" && !config.to_toml().contains("network"));
+    }
+
+    #[test]
     fn a_file_of_another_mode_is_refused() {
         let text = Config::for_mode(Mode::Default).to_toml();
         let message = Config::with_overlay(Mode::Paper, &text, "config.toml").unwrap_err().to_string();

@@ -8,18 +8,23 @@ use toml::{Table, Value};
 use super::missing;
 use crate::Error;
 
+/// The table of a user's file that nodes read, and nothing here.
+const OF_NODES: &str = "network";
+
 /// Parses `(file name, text)` layers, each over the ones before it. The first layer is complete and says which
-/// keys exist and of which kind they are. Tables merge; arrays replace.
+/// keys exist and of which kind they are. Tables merge; arrays replace. [`OF_NODES`] is left out.
 pub(super) fn parse<T: DeserializeOwned>(layers: &[(&str, &str)]) -> Result<T, Error> {
     let mut merged = Table::new();
     let mut known: Option<Table> = None;
     for &(file, text) in layers {
-        let spans = DeTable::parse(text)
+        let mut spans = DeTable::parse(text)
             .map_err(|e| at(file, text, e.span().map_or(0, |s| s.start), e.message().to_owned()))?;
+        spans.get_mut().remove(OF_NODES);
         if let Some(known) = &known {
             check_table(spans.get_ref(), known, "", &|offset, message| at(file, text, offset, message))?;
         }
-        let table: Table = toml::from_str(text).map_err(|e| Error::new(e.to_string()).within(file))?;
+        let mut table: Table = toml::from_str(text).map_err(|e| Error::new(e.to_string()).within(file))?;
+        table.remove(OF_NODES);
         known.get_or_insert_with(|| table.clone());
         merge(&mut merged, table);
     }

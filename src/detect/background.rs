@@ -26,7 +26,7 @@ const FREEZE_M: f64 = 0.5;
 /// Lower points are the floor's.
 const LOWEST_M: f64 = 0.03;
 /// Most foreground points kept of one frame: 100 people close to the sensors. Bounds the time of a frame.
-const POINTS_MAX: usize = 40_000;
+pub const POINTS_MAX: usize = 40_000;
 /// Voxels: hdl_people_tracking's edge and threshold.
 const VOXEL_M: f64 = 0.2;
 const VOXEL_POINTS_MIN: u8 = 2;

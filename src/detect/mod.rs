@@ -19,6 +19,8 @@ mod limbs;
 mod measure;
 
 pub use background::Background;
+#[doc(hidden)] // For who joins the foreground of several front ends.
+pub use background::POINTS_MAX;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
 #[doc(hidden)] // For the card of the model of the body axis.
