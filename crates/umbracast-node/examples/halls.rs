@@ -153,7 +153,7 @@ fn run(
         );
         fs::write(&site, table)?;
         let mut node = Command::new(command);
-        node.args(["node", "track", "--stages", "forecast,cast", "--quiet", "--site"]).arg(&site);
+        node.args(["node", "track,forecast,cast", "--quiet", "--site"]).arg(&site);
         nodes.0.push(node.stdout(Stdio::null()).stderr(Stdio::null()).spawn()?);
     }
     let warnings = Arc::new(AtomicU64::new(0));

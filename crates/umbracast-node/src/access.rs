@@ -30,8 +30,6 @@ pub enum Kind {
     Objects,
     /// Shows the hall to ROS 2 in this domain, and brings what drivers publish there.
     Ros2(u32),
-    /// Another router: passes on everything.
-    Router,
 }
 
 /// A user's works: a word or a list of them, `"sensor"`, `["hall_a/track", "hall_a/forecast"]`, `"ros2:0"`.
@@ -141,6 +139,10 @@ impl Work {
         let settings: &[&str] = &["config/**"];
         let rights = Rights { sees: keys(&["node/**"]), ..Rights::default() };
         match self.kind {
+            // It passes on what others send, ask and answer, in all halls.
+            Kind::Node(Role::Router) => {
+                Rights { writes: all(), reads: all(), asks: all(), answers: all(), tokens: all(), sees: all() }
+            }
             Kind::Node(role) => {
                 let (writes, reads, asks, answers) = of_role(role);
                 let health = format!("health/{}/*", role.name());
@@ -198,6 +200,7 @@ fn of_role(role: Role) -> (Ends, Ends, Ends, Ends) {
         Role::Serve => (&[], &["**"], &["state"], &["config/**"]),
         Role::Display => (&[], &["**"], &[], &[]),
         Role::Controller => (&[], &["links", "warnings/*"], &[], &[]),
+        Role::Router => (&[], &[], &[], &[]), // Of no hall: see above.
     }
 }
 
@@ -211,13 +214,12 @@ impl std::str::FromStr for Work {
         };
         let kind = match (word, word.strip_prefix("ros2:")) {
             ("objects", _) => Kind::Objects,
-            ("router", _) => Kind::Router,
             (_, Some(domain)) => Kind::Ros2(domain.parse().map_err(|_| {
                 Error::new(format!("expected a number of a domain behind ros2:, found {domain:?}"))
             })?),
             _ => Kind::Node(word.parse().map_err(|error: Error| {
                 Error::new(format!(
-                    "{error}; or objects, ros2:DOMAIN, router; with a hall before it as HALL/..."
+                    "{error}; or objects, ros2:DOMAIN; with a hall before it as HALL/..."
                 ))
             })?),
         };

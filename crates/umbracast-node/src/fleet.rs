@@ -23,6 +23,8 @@ pub struct Hall {
 pub struct Node {
     /// What it does, as its tokens say. None: it is gone.
     pub roles: BTreeSet<String>,
+    /// The sensors that it stands beside.
+    pub sensors: BTreeSet<String>,
     /// What it said last.
     pub health: Option<NodeHealth>,
     /// What it had said before.
@@ -67,8 +69,11 @@ pub fn halls(tokens: &[String], words: Vec<(String, NodeHealth)>) -> BTreeMap<St
     let mut halls: BTreeMap<String, Hall> = BTreeMap::new();
     for token in tokens {
         if let ["umbracast", hall, "node", role, id] = token.split('/').collect::<Vec<_>>()[..] {
+            // A front end shows itself once for each sensor, by the sensor's name before its own.
+            let (sensor, id) = id.rsplit_once('.').map_or((None, id), |(sensor, id)| (Some(sensor), id));
             let node = halls.entry(hall.to_owned()).or_default().nodes.entry(id.to_owned()).or_default();
             node.roles.insert(role.to_owned());
+            node.sensors.extend(sensor.map(str::to_owned));
         }
     }
     for (key, health) in words {
@@ -114,7 +119,7 @@ pub fn look(session: &Session, hall: Option<&str>, listen: Duration) -> Result<B
 /// A table: a line a node.
 pub fn text(halls: &BTreeMap<String, Hall>) -> String {
     let mut text = format!(
-        "{:12} {:20} {:16} {:>8} {:>6} {:>8} {:>9} {:>8} {:>8}  troubles\n",
+        "{:12} {:34} {:22} {:>8} {:>6} {:>8} {:>9} {:>8} {:>8}  troubles\n",
         "hall", "node", "does", "up, s", "cores", "MiB", "frames", "kB/s", "p99, ms"
     );
     for (name, hall) in halls {
@@ -125,7 +130,7 @@ pub fn text(halls: &BTreeMap<String, Hall>) -> String {
             let does = if roles.is_empty() { "gone".to_owned() } else { roles.join(",") + leads };
             let _ = writeln!(
                 text,
-                "{name:12} {id:20} {does:16} {:8.0} {:6.2} {:8.1} {:9} {:8.1} {:8.1}  {}",
+                "{name:12} {id:34} {does:22} {:8.0} {:6.2} {:8.1} {:9} {:8.1} {:8.1}  {}",
                 health.up_s,
                 node.cores().unwrap_or(0.0),
                 health.resident_bytes as f64 / f64::from(1 << 20),
@@ -145,6 +150,7 @@ pub fn json(halls: &BTreeMap<String, Hall>) -> Value {
         let health = node.health.clone().unwrap_or_default();
         let value = json!({
             "roles": node.roles,
+            "sensors": node.sensors,
             "host": health.host,
             "stages": health.stages,
             "leads": health.leads,
@@ -181,7 +187,7 @@ mod tests {
 
     #[test]
     fn nodes_are_listed_by_hall_with_their_load() {
-        let tokens = ["umbracast/a/node/track/t1", "umbracast/a/node/cast/t1", "umbracast/b/node/sensor/s1"];
+        let tokens = ["umbracast/a/node/track/t1", "umbracast/a/node/cast/t1", "umbracast/b/node/sensor/east.s1"];
         let tokens = tokens.map(str::to_owned);
         let words = vec![
             word("umbracast/a/health/track/t1", 10_000_000_000, 1.0, 0),
@@ -193,7 +199,8 @@ mod tests {
         let t1 = &halls["a"].nodes["t1"];
         assert_eq!((t1.roles.len(), t1.cores()), (2, Some(0.5)), "between its last two words");
         assert_eq!(t1.troubles(), ["3 frames skipped"]);
-        assert_eq!(halls["b"].nodes["s1"].troubles(), ["says nothing"]);
+        let s1 = &halls["b"].nodes["s1"];
+        assert_eq!((s1.troubles(), s1.sensors.first().map(String::as_str)), (vec!["says nothing".to_owned()], Some("east")));
         assert!(halls["c"].nodes["dead"].roles.is_empty());
         let text = text(&halls);
         assert_eq!(text.lines().count(), 4);

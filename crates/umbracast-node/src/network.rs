@@ -26,6 +26,9 @@ const LEASE_MS: u64 = 2000;
 /// Who is not there is called again after so long, and after twice as long each time, up to the second value.
 const RETRY_MS: [u64; 2] = [100, 800];
 
+/// A visitor calls for so long, ms.
+const VISIT_MS: &str = "3000";
+
 /// `[network]` of the site file. Paths go from the site file's folder.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -42,7 +45,7 @@ pub struct Network {
     pub wait_s: f64,
     /// The name that this node gives at the door of others.
     pub user: Option<String>,
-    /// A file that holds this node's password, alone on a line.
+    /// A file that holds this node's password, alone on a line; without `user` the line is `user:password`.
     pub password_file: Option<PathBuf>,
     /// A file of those who may connect to this node, `user:password` a line.
     pub users_file: Option<PathBuf>,
@@ -203,7 +206,7 @@ impl Network {
         let retry = serde_json::json!({
             "period_init_ms": first, "period_max_ms": last, "period_increase_factor": 2,
         });
-        let password = self.password_file.as_ref().map(|file| read_line(file)).transpose()?;
+        let credentials = self.password_file.as_ref().map(|file| self.credentials(file)).transpose()?;
         let mut put = |key: &str, value: serde_json::Value| {
             let wrong = |e| Error::new(format!("network: Zenoh does not take {key} = {value}: {e}"));
             config.insert_json5(key, &value.to_string()).map_err(wrong)
@@ -219,7 +222,7 @@ impl Network {
         if !self.roles.is_empty() {
             put("access_control", access::access_control(&self.roles))?;
         }
-        if let (Some(user), Some(password)) = (&self.user, &password) {
+        if let Some((user, password)) = &credentials {
             let wrong = |_| Error::new("network.user: Zenoh does not take this name and password");
             let quoted = |text: &str| serde_json::json!(text).to_string();
             // Not through `put`: its error would show the password.
@@ -244,6 +247,29 @@ impl Network {
             config.insert_json5("transport/link/tls/enable_mtls", &both).map_err(wrong)?;
         }
         Ok(config)
+    }
+
+    /// User and password.
+    fn credentials(&self, file: &Path) -> Result<(String, String), Error> {
+        let line = read_line(file)?;
+        let pair = self.user.as_ref().map(|user| (user.as_str(), line.as_str())).or(line.split_once(':'));
+        let (user, password) = pair.ok_or_else(|| {
+            Error::new("expected user:password, found one word and no network.user").within(file.display())
+        })?;
+        Ok((user.to_owned(), password.to_owned()))
+    }
+
+    /// Opens the session of somebody who looks and goes: nobody meets there.
+    ///
+    /// # Errors
+    /// As [`Self::zenoh`]; where nobody answers.
+    pub fn visit(&self) -> Result<zenoh::Session, Error> {
+        let mut config = Self { mode: Mode::Client, listen: Vec::new(), ..self.clone() }.zenoh(&[])?;
+        for (key, value) in [("connect/timeout_ms", VISIT_MS), ("connect/exit_on_failure", "true")] {
+            config.insert_json5(key, value).map_err(|e| Error::new(format!("network: {key}: {e}")))?;
+        }
+        let opened = zenoh::open(config).wait();
+        opened.map_err(|e| Error::new(format!("network.connect {:?}: nobody answers: {e}", self.connect)))
     }
 
     /// Opens the session. Whoever is not there yet is called again until it is.

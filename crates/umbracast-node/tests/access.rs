@@ -47,12 +47,7 @@ impl Door {
             fs::write(&file, password).unwrap();
             (network.user, network.password_file) = (Some(name.to_owned()), Some(file));
         }
-        // A client that gives up at once, else a stranger would be calling for ever.
-        let mut config = network.zenoh(&[]).unwrap();
-        config.insert_json5("mode", "\"client\"").unwrap();
-        config.insert_json5("connect/timeout_ms", "1000").unwrap();
-        config.insert_json5("connect/exit_on_failure", "true").unwrap();
-        zenoh::open(config).wait().ok()
+        network.visit().ok()
     }
 
     fn user(&self, name: &str) -> Session {
@@ -168,11 +163,7 @@ fn a_certificate_is_a_name_and_without_one_nobody_enters() {
             both: name.is_some(),
         };
         let network = Network { connect: vec![endpoint.clone()], tls: Some(tls), ..Network::default() };
-        let mut config = network.zenoh(&[]).unwrap();
-        config.insert_json5("mode", "\"client\"").unwrap();
-        config.insert_json5("connect/timeout_ms", "1000").unwrap();
-        config.insert_json5("connect/exit_on_failure", "true").unwrap();
-        zenoh::open(config).wait().ok()
+        network.visit().ok()
     };
     let (edge, server) = (enter(Some("edge")).expect("enters"), enter(Some("server")).expect("enters"));
     let to_server = listen(&server, "umbracast/lab/sensor/*/foreground");
