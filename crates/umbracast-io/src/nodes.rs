@@ -233,7 +233,8 @@ impl Message for TrackerState {
 
 impl Message for Warning {
     const NAME: &'static str = "Warning";
-    const WHAT: &'static str = "A link is about to be blocked, is blocked, is clear again, or its owner is gone.";
+    const WHAT: &'static str =
+        "A link is about to be blocked, is blocked, is clear again, or its owner is gone.";
 
     fn empty() -> Self {
         Self::default()
@@ -324,7 +325,8 @@ impl Message for View {
 
 impl Message for Fan {
     const NAME: &'static str = "Fan";
-    const WHAT: &'static str = "Elevations of beams, ascending, and columns fired into each sector of a turn.";
+    const WHAT: &'static str =
+        "Elevations of beams, ascending, and columns fired into each sector of a turn.";
 
     fn empty() -> Self {
         Self { elevations_rad: Vec::new(), columns: [0; SECTORS] }
@@ -441,8 +443,7 @@ impl Message for Observed {
 
 impl Message for Forecast {
     const NAME: &'static str = "Forecast";
-    const WHAT: &'static str =
-        "Where a track will be: mean x, y and covariance xx, xy, yy at each of nine steps of 100 ms, and how their \
+    const WHAT: &'static str = "Where a track will be: mean x, y and covariance xx, xy, yy at each of nine steps of 100 ms, and how their \
          errors hang together.";
 
     fn empty() -> Self {

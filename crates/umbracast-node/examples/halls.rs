@@ -19,7 +19,7 @@ use std::time::Duration;
 
 use umbracast::{Config, Error, STEP_NS};
 use umbracast_eval::report::plot::{self, Mark, Panel, Series};
-use umbracast_io::nodes::Foreground;
+use umbracast_io::nodes::{Foreground, NodeHealth};
 use umbracast_live::HostClock;
 use umbracast_live::receive::Arrived;
 use umbracast_node::fleet::{self, Hall as Seen};
@@ -68,15 +68,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (seconds, clock) = (seconds.parse::<u64>()?, HostClock::start());
     let config = Config::default();
-    let recorded = recorded(&config)?;
-    let messages = recorded.iter().map(Vec::len).sum::<usize>().max(1);
+    let (recorded, packet_bytes) = recorded(&config)?;
     let bytes: usize = recorded.iter().flatten().map(|message| encoded(message).len()).sum();
+    let mb_per_s = |bytes: usize| bytes as f64 / (SCENE_S * recorded.len() as u64) as f64 / 1e6;
+    println!("{PEOPLE} people, each of {} sensors, MB a second", recorded.len());
+    println!("packets as it sends them        {:6.3}", mb_per_s(packet_bytes));
+    println!("foreground, what leaves its host{:6.3}\n", mb_per_s(bytes));
     println!(
-        "{PEOPLE} people before {} sensors: {:.1} kB a message of a front end, mean",
-        recorded.len(),
-        bytes as f64 / messages as f64 / 1e3
+        "halls   cores  a hall  replay  MiB a hall  in, MB/s  out, MB/s  warnings/s a hall  frames  median, ms  99 %, ms"
     );
-    println!("halls   cores  a hall  replay  MiB a hall  in, MB/s  out, MB/s  warnings/s a hall  frames  median, ms  99 %, ms");
     let mut rows = Vec::new();
     for count in counts {
         let row = run(Path::new(command), count.parse()?, seconds, &config, &recorded, clock)?;
@@ -97,12 +97,47 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         );
         rows.push(row);
     }
+    city(&rows);
     fs::write(picture, drawn(&rows)?)?;
     Ok(())
 }
 
-/// What each sensor's front end publishes of the scene, in order.
-fn recorded(config: &Config) -> Result<Vec<Vec<Foreground>>, Error> {
+/// What the last line with every frame done, in time, means for a city; arithmetic, not measured.
+fn city(rows: &[Row]) {
+    let in_time = |row: &&Row| row.frames_done > 0.999 && row.p99_ms < STEP_NS as f64 * 1e-6;
+    let Some(row) = rows.iter().rev().find(in_time) else { return };
+    let halls = row.halls as f64;
+    let health = umbracast_io::fields::encode(&mut NodeHealth {
+        node: "0123456789abcdef0123456789abcdef".to_owned(),
+        host: "edge-17.example.org".to_owned(),
+        stages: vec!["track".to_owned(), "forecast".to_owned(), "cast".to_owned()],
+        ..NodeHealth::default()
+    });
+    println!(
+        "\nArithmetic from the line of {} halls; {NODES} nodes a hall, health of {} bytes",
+        row.halls,
+        health.len()
+    );
+    println!("what                                    a hall   a region of {REGION}   a city of {CITY}");
+    let line = |what: &str, of_hall: f64| {
+        println!("{what:34} {of_hall:11.3} {:17.1} {:17.0}", of_hall * REGION as f64, of_hall * CITY as f64);
+    };
+    line("hosts of this kind for its stages", 1.0 / halls);
+    line("foreground, MB a second", row.in_mb_per_s / halls);
+    line("all that stages publish, MB a second", row.out_mb_per_s / halls);
+    line("warnings a second", row.warnings_per_s / halls);
+    line("sessions", NODES as f64);
+    line("health, messages a second", NODES as f64);
+    line("health, MB a second", (NODES * health.len()) as f64 / 1e6);
+}
+
+/// A front end, a leader and one that stands by.
+const NODES: usize = 3;
+const REGION: usize = 100;
+const CITY: usize = 10_000;
+
+/// What each sensor's front end publishes of the scene, in order, and the bytes of all packets.
+fn recorded(config: &Config) -> Result<(Vec<Vec<Foreground>>, usize), Error> {
     let site = &config.site;
     let empty = Scene::empty(site, SEED, EMPTY)?;
     let sensors = site.sensors.len();
@@ -112,16 +147,17 @@ fn recorded(config: &Config) -> Result<Vec<Vec<Foreground>>, Error> {
     let mut scene = Scene::new(crowd, site, SEED)?;
     let new = |sensor| Front::new(config, &[sensor], &empty, Arc::default(), HostClock::start());
     let mut fronts = (0..sensors).map(new).collect::<Result<Vec<Front>, _>>()?;
-    let mut messages = vec![Vec::new(); sensors];
+    let (mut messages, mut bytes) = (vec![Vec::new(); sensors], 0);
     while let Some(frame) = scene.next_frame() {
         for (sensor, packets) in frame.packets.into_iter().enumerate() {
             for packet in packets {
+                bytes += packet.payload.len();
                 let arrived = Arrived { sensor, packet };
                 fronts[sensor].push(&arrived, |message| messages[sensor].push(message));
             }
         }
     }
-    Ok(messages)
+    Ok((messages, bytes))
 }
 
 fn encoded(message: &Foreground) -> Vec<u8> {
@@ -147,10 +183,8 @@ fn run(
     let mut nodes = Nodes(Vec::new());
     for hall in 0..halls {
         let site = folder.join(format!("{}.toml", name(hall)));
-        let table = format!(
-            "[network]\nhall = \"{}\"\nmode = \"client\"\nconnect = [\"{endpoint}\"]\n",
-            name(hall)
-        );
+        let table =
+            format!("[network]\nhall = \"{}\"\nmode = \"client\"\nconnect = [\"{endpoint}\"]\n", name(hall));
         fs::write(&site, table)?;
         let mut node = Command::new(command);
         node.args(["node", "track,forecast,cast", "--quiet", "--site"]).arg(&site);
@@ -164,7 +198,8 @@ fn run(
     let mut outlets: Vec<Vec<Outlet>> = Vec::new();
     for hall in 0..halls {
         let hall = Hall::new(session.clone(), Keys::new(&name(hall)));
-        let outlet = |s: usize| hall.outlet(&hall.keys().foreground(&config.site.sensors[s].name), Urgency::Points);
+        let outlet =
+            |s: usize| hall.outlet(&hall.keys().foreground(&config.site.sensors[s].name), Urgency::Points);
         outlets.push((0..recorded.len()).map(outlet).collect::<Result<_, _>>()?);
     }
     let (start_ns, settling_ns) = (clock.now_ns(), SETTLING.as_nanos() as i64);

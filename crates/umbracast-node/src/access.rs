@@ -140,9 +140,14 @@ impl Work {
         let rights = Rights { sees: keys(&["node/**"]), ..Rights::default() };
         match self.kind {
             // It passes on what others send, ask and answer, in all halls.
-            Kind::Node(Role::Router) => {
-                Rights { writes: all(), reads: all(), asks: all(), answers: all(), tokens: all(), sees: all() }
-            }
+            Kind::Node(Role::Router) => Rights {
+                writes: all(),
+                reads: all(),
+                asks: all(),
+                answers: all(),
+                tokens: all(),
+                sees: all(),
+            },
             Kind::Node(role) => {
                 let (writes, reads, asks, answers) = of_role(role);
                 let health = format!("health/{}/*", role.name());
@@ -169,14 +174,6 @@ impl Work {
                 answers: vec![format!("{domain}/**")],
                 tokens: vec![format!("@ros2_lv/{domain}/**")],
                 sees: [rights.sees, vec![format!("@ros2_lv/{domain}/**")]].concat(),
-            },
-            Kind::Router => Rights {
-                writes: all(),
-                reads: all(),
-                asks: all(),
-                answers: all(),
-                tokens: all(),
-                sees: all(),
             },
         }
     }
@@ -218,9 +215,7 @@ impl std::str::FromStr for Work {
                 Error::new(format!("expected a number of a domain behind ros2:, found {domain:?}"))
             })?),
             _ => Kind::Node(word.parse().map_err(|error: Error| {
-                Error::new(format!(
-                    "{error}; or objects, ros2:DOMAIN; with a hall before it as HALL/..."
-                ))
+                Error::new(format!("{error}; or objects, ros2:DOMAIN; with a hall before it as HALL/..."))
             })?),
         };
         Ok(Self { hall, kind })
@@ -273,8 +268,8 @@ mod tests {
             "edge = \"sensor\"\nscreen = \"display\"\nradio = \"lab/controller\"\nserver = [\"track\", \"cast\"]",
         );
         let rules = access_control(&users);
-        let put = |user, key| passes(&rules, user, "ingress", "put", key);
-        let gets = |user, key| {
+        let put = |user: &str, key: &str| passes(&rules, user, "ingress", "put", key);
+        let gets = |user: &str, key: &str| {
             passes(&rules, user, "ingress", "declare_subscriber", key)
                 && passes(&rules, user, "egress", "put", key)
         };

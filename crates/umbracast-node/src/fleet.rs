@@ -92,11 +92,16 @@ pub fn halls(tokens: &[String], words: Vec<(String, NodeHealth)>) -> BTreeMap<St
 ///
 /// # Errors
 /// A session that is closed.
-pub fn look(session: &Session, hall: Option<&str>, listen: Duration) -> Result<BTreeMap<String, Hall>, Error> {
+pub fn look(
+    session: &Session,
+    hall: Option<&str>,
+    listen: Duration,
+) -> Result<BTreeMap<String, Hall>, Error> {
     let failed = |e: zenoh::Error| Error::new(format!("fleet: {e}"));
     let hall = hall.unwrap_or("*");
     let words = Arc::new(Mutex::new(Vec::new()));
-    let lock = |words: &Mutex<Vec<_>>| std::mem::take(&mut *words.lock().unwrap_or_else(PoisonError::into_inner));
+    let lock =
+        |words: &Mutex<Vec<_>>| std::mem::take(&mut *words.lock().unwrap_or_else(PoisonError::into_inner));
     let heard = words.clone();
     let subscriber = session.declare_subscriber(format!("umbracast/{hall}/health/*/*"));
     let subscriber = subscriber.callback(move |sample| {
@@ -187,7 +192,8 @@ mod tests {
 
     #[test]
     fn nodes_are_listed_by_hall_with_their_load() {
-        let tokens = ["umbracast/a/node/track/t1", "umbracast/a/node/cast/t1", "umbracast/b/node/sensor/east.s1"];
+        let tokens =
+            ["umbracast/a/node/track/t1", "umbracast/a/node/cast/t1", "umbracast/b/node/sensor/east.s1"];
         let tokens = tokens.map(str::to_owned);
         let words = vec![
             word("umbracast/a/health/track/t1", 10_000_000_000, 1.0, 0),
@@ -200,7 +206,10 @@ mod tests {
         assert_eq!((t1.roles.len(), t1.cores()), (2, Some(0.5)), "between its last two words");
         assert_eq!(t1.troubles(), ["3 frames skipped"]);
         let s1 = &halls["b"].nodes["s1"];
-        assert_eq!((s1.troubles(), s1.sensors.first().map(String::as_str)), (vec!["says nothing".to_owned()], Some("east")));
+        assert_eq!(
+            (s1.troubles(), s1.sensors.first().map(String::as_str)),
+            (vec!["says nothing".to_owned()], Some("east"))
+        );
         assert!(halls["c"].nodes["dead"].roles.is_empty());
         let text = text(&halls);
         assert_eq!(text.lines().count(), 4);

@@ -55,7 +55,9 @@ impl Front {
     ) -> Result<Self, Error> {
         let all = config.site.sensors.len();
         if own.is_empty() || own.iter().any(|&s| s >= all) {
-            return Err(Error::new(format!("sensors of the front end: expected some of {all}, found {own:?}")));
+            return Err(Error::new(format!(
+                "sensors of the front end: expected some of {all}, found {own:?}"
+            )));
         }
         if config.detect.background == BackgroundMethod::Voxels && own.len() < all {
             return Err(Error::new(format!(

@@ -3,6 +3,9 @@
 pub mod role;
 pub mod keys;
 pub mod access;
+pub mod ros2;
+pub mod mqtt;
+pub mod outward;
 pub mod network;
 pub mod hall;
 pub mod front;
@@ -13,9 +16,6 @@ pub mod back;
 pub mod watch;
 pub mod share;
 pub mod node;
-pub mod ros2;
-pub mod mqtt;
-pub mod outward;
 pub mod fleet;
 
 pub use node::{Node, Settings, Source};

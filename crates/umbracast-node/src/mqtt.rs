@@ -204,7 +204,10 @@ mod tests {
         assert_eq!(said[0], ("umbracast/lab/status".to_owned(), "online".to_owned()));
         assert_eq!(said[1].0, "umbracast/lab/warnings/door_a");
         let told: Value = serde_json::from_str(&said[1].1).unwrap();
-        assert_eq!((&told["event"], &told["track"], &told["p_w9"]), (&"warning".into(), &7.into(), &0.75.into()));
+        assert_eq!(
+            (&told["event"], &told["track"], &told["p_w9"]),
+            (&"warning".into(), &7.into(), &0.75.into())
+        );
         assert_eq!((&told["onset_p50_s"], &told["onset_p90_s"]), (&0.4.into(), &Value::Null));
         let ended = std::thread::spawn(move || drop(sender));
         assert_eq!(publication(&mut stream).1, "offline");

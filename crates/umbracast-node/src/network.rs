@@ -131,7 +131,10 @@ impl Network {
         let tls = network.tls.iter_mut().flat_map(|tls| {
             [Some(&mut tls.ca), tls.certificate.as_mut(), tls.key.as_mut()].into_iter().flatten()
         });
-        let mqtt = network.mqtt.iter_mut().flat_map(|mqtt| [mqtt.password_file.as_mut(), mqtt.ca.as_mut()].into_iter().flatten());
+        let mqtt = network
+            .mqtt
+            .iter_mut()
+            .flat_map(|mqtt| [mqtt.password_file.as_mut(), mqtt.ca.as_mut()].into_iter().flatten());
         files.chain(tls).chain(mqtt).for_each(|path| *path = folder.join(&*path));
         network.check().map_err(|e| e.within(file.display()))?;
         Ok(network)

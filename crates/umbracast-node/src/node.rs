@@ -138,8 +138,19 @@ impl Node {
     /// # Errors
     /// A setting that cannot work, a port that is taken, a folder that cannot be made.
     pub fn start(hall: Hall, settings: Settings) -> Result<Self, Error> {
-        let Settings { stages, config, weights, sensors, source, empty, wait, record, listener, shared, clock } =
-            settings;
+        let Settings {
+            stages,
+            config,
+            weights,
+            sensors,
+            source,
+            empty,
+            wait,
+            record,
+            listener,
+            shared,
+            clock,
+        } = settings;
         let has = |role| stages.contains(&role);
         let record_status = Arc::<Mutex<RecordStatus>>::default();
         let points = record.as_ref().is_some_and(|record| record.points) || has(Role::Serve);
@@ -307,7 +318,10 @@ impl Node {
     pub fn is_well(&self) -> bool {
         let front = self.fed.is_some() || self.front.as_ref().is_none_or(|front| !front.is_finished());
         let recording = self.recorder.as_ref().is_none_or(|recorder| recorder.is_well());
-        front && recording && self.backs.iter().all(Back::is_well) && self.watch.as_ref().is_none_or(Watch::is_well)
+        front
+            && recording
+            && self.backs.iter().all(Back::is_well)
+            && self.watch.as_ref().is_none_or(Watch::is_well)
     }
 
     /// How it goes.
@@ -400,9 +414,12 @@ impl Node {
 /// Whether front ends of all sensors are there, and all stages behind them.
 fn all_there(hall: &Hall, sensors: &[String]) -> bool {
     let there = hall.nodes(Role::Sensor, LOOK);
-    let named = |name: &String| there.iter().any(|id| id.rsplit_once('.').is_some_and(|(own, _)| own == name));
+    let named =
+        |name: &String| there.iter().any(|id| id.rsplit_once('.').is_some_and(|(own, _)| own == name));
     sensors.iter().all(named)
-        && [Role::Track, Role::Forecast, Role::Cast].into_iter().all(|role| !hall.nodes(role, LOOK).is_empty())
+        && [Role::Track, Role::Forecast, Role::Cast]
+            .into_iter()
+            .all(|role| !hall.nodes(role, LOOK).is_empty())
 }
 
 fn has_any(stages: &[Role], any: &[Role]) -> bool {

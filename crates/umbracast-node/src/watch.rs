@@ -238,11 +238,7 @@ impl Gather {
             tracks,
             links,
             events,
-            points_cm: foreground
-                .iter()
-                .step_by(every)
-                .map(|p| p.position_m.to_array().map(in_cm))
-                .collect(),
+            points_cm: foreground.iter().step_by(every).map(|p| p.position_m.to_array().map(in_cm)).collect(),
             foreground: self.points.then_some(foreground),
             health: followed.health,
             sensors: (0..self.sensors).map(|s| followed.sensors.contains(&(s as u32))).collect(),

@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use umbracast::Error;
 use umbracast_io::messages::Schema;
-use zenoh::handlers::CallbackDrop;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::CongestionControl;
 use zenoh::{Session, Wait};
