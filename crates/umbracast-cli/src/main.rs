@@ -13,6 +13,7 @@ mod flags;
 mod matches;
 mod input;
 mod page;
+mod outward;
 mod signal;
 mod commands;
 

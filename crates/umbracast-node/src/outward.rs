@@ -1,11 +1,12 @@
 //! What a hall tells those who speak other languages: topics of ROS 2, warnings over MQTT.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::Deserialize;
 use umbracast::{Error, Site};
 use umbracast_io::results::Results;
 use umbracast_live::Published;
+use umbracast_live::run::Listener;
 use zenoh::Session;
 
 use crate::mqtt::{Mqtt, Sender};
@@ -30,33 +31,46 @@ pub struct Outward {
 }
 
 impl Outward {
-    /// Opens what is asked for; `None` where that is nothing.
+    /// Opens what is asked for; `None` where that is nothing. Only ROS 2 needs a session.
     ///
     /// # Errors
-    /// A session that is closed, a hall that ROS 2 cannot name, a broker's name that is none.
+    /// A session that cannot be opened, a hall that ROS 2 cannot name, a broker's name that is none.
     pub fn open(
-        session: &Session,
+        session: impl FnOnce() -> Result<Session, Error>,
         hall: &str,
         site: &Site,
         ros2: Option<Ros2>,
         mqtt: Option<&Mqtt>,
-    ) -> Result<Option<Self>, Error> {
+    ) -> Result<Option<Arc<Self>>, Error> {
         let face = |Ros2 { domain, namespace }| {
             let namespace = if namespace { names::namespace(hall)? } else { String::new() };
-            Face::new(session, domain, &namespace, site).map(Mutex::new)
+            Face::new(&session()?, domain, &namespace, site).map(Mutex::new)
         };
         let face = ros2.map(face).transpose().map_err(|e| e.within("network.ros2"))?;
         let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall)).transpose()?;
-        Ok((face.is_some() || sender.is_some()).then_some(Self { face, sender }))
+        Ok((face.is_some() || sender.is_some()).then(|| Arc::new(Self { face, sender })))
     }
 
-    /// Whether somebody could look at points.
-    pub fn wants_points(&self) -> bool {
-        self.face.is_some()
+    /// Who tells `listener` tells this too.
+    pub fn beside(this: Option<Arc<Self>>, listener: Listener) -> Listener {
+        match this {
+            None => listener,
+            Some(this) => Box::new(move |published| {
+                listener(published);
+                this.tell(published);
+            }),
+        }
+    }
+
+    /// Another site with the same sensors from the next frame on.
+    pub fn take_over(&self, site: &Site) {
+        if let Some(face) = &self.face {
+            face.lock().unwrap_or_else(PoisonError::into_inner).take_over(site);
+        }
     }
 
     /// Tells a frame; waits for nobody.
-    pub fn tell(&self, published: &Published) {
+    fn tell(&self, published: &Published) {
         if let Some(sender) = &self.sender {
             published.events.iter().for_each(|event| sender.send(event));
         }

@@ -28,6 +28,11 @@ impl Face {
         Ok(Self { site: site.clone(), publishers, _node: node })
     }
 
+    /// Another site with the same sensors from the next frame on.
+    pub fn take_over(&mut self, site: &Site) {
+        self.site = site.clone();
+    }
+
     /// Sends a frame.
     ///
     /// # Errors
