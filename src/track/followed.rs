@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::gaussian::State;
+use super::remembered::{Remembered, Words};
 use super::width;
 use crate::gait::{GaitPhase, WALKS_FROM_MPS};
 use crate::geometry::{Aabb, DVec2, Obb};
@@ -97,6 +98,13 @@ pub(super) struct Heading {
     variance_rad2: f64,
 }
 
+impl Remembered for Heading {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.f64(&mut self.mean_rad);
+        words.f64(&mut self.variance_rad2);
+    }
+}
+
 impl Heading {
     /// Of who has never walked.
     pub(super) const ANY: Self = Self { mean_rad: 0.0, variance_rad2: ANY_HEADING_RAD2 };
@@ -121,6 +129,19 @@ impl Heading {
 /// The observation window of a track.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Observations(pub(super) VecDeque<Observed>);
+
+impl Remembered for Observations {
+    fn visit(&mut self, words: &mut impl Words) {
+        let blank = Observed { time_ns: 0, position_m: DVec2::ZERO, velocity_mps: DVec2::ZERO };
+        let count = words.count(self.0.len(), OBSERVED);
+        self.0.resize(count, blank);
+        for observed in &mut self.0 {
+            words.i64(&mut observed.time_ns);
+            words.vec2(&mut observed.position_m);
+            words.vec2(&mut observed.velocity_mps);
+        }
+    }
+}
 
 impl Observations {
     pub(super) fn push(&mut self, time_ns: i64, position_m: DVec2, velocity_mps: DVec2) {

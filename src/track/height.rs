@@ -3,6 +3,8 @@
 //! Beams are up to half a metre apart on a body, so the highest point of one frame lies anywhere between the top
 //! of the head and a gap below it; while the person walks, the beams sweep over the head.
 
+use super::remembered::{Remembered, Words};
+
 /// Lowest height of an adult that is thought of, metres.
 const ADULT_M: f64 = 1.30;
 /// From one height to the next, metres.
@@ -33,6 +35,17 @@ pub(super) struct Height {
     adults: usize,
     mean_m: f64,
     sigma_m: f64,
+}
+
+impl Remembered for Height {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.f64s(&mut self.log_p);
+        let mut adults = self.adults as u64;
+        words.word(&mut adults);
+        self.adults = (adults as usize).min(CELLS);
+        words.f64(&mut self.mean_m);
+        words.f64(&mut self.sigma_m);
+    }
 }
 
 impl Height {
@@ -103,6 +116,7 @@ fn rise(sigmas: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::remembered::{Remembered, Words};
     use super::*;
 
     #[test]

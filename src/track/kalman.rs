@@ -8,6 +8,7 @@
 
 use super::gaussian::{Mat2, State, inverted, plus, quadratic};
 use super::numbers::{MotionModel, Numbers};
+use super::remembered::{Remembered, Words};
 use super::sway::{AHEAD, Axes, LEFT, Sway};
 use crate::geometry::DVec2;
 
@@ -48,6 +49,17 @@ struct Q {
     position: f64,
     cross: f64,
     velocity: f64,
+}
+
+impl Remembered for Filter {
+    /// There are as many hypotheses as motion models.
+    fn visit(&mut self, words: &mut impl Words) {
+        for hypothesis in &mut self.hypotheses {
+            words.f64(&mut hypothesis.weight);
+            words.f64s(&mut hypothesis.state.x);
+            words.f64s(hypothesis.state.P.as_flattened_mut());
+        }
+    }
 }
 
 impl Filter {

@@ -5,6 +5,7 @@
 //! differs from person to person, and the sway of another than its owner's shifts positions and bends velocities.
 
 use super::gaussian::Mat2;
+use super::remembered::{Remembered, Words};
 use super::sway::Wave;
 use crate::detect::LimbCovariance;
 use crate::gait::{GaitPhase, WIDEST_RAD, relative_speed_hz, stride_hz};
@@ -28,6 +29,13 @@ impl Default for LimbPhase {
     /// Any phase.
     fn default() -> Self {
         Self { mean: [0.0; 2], covariance: [[ANY, 0.0], [0.0, ANY]] }
+    }
+}
+
+impl Remembered for LimbPhase {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.f64s(&mut self.mean);
+        words.f64s(self.covariance.as_flattened_mut());
     }
 }
 

@@ -8,6 +8,7 @@ use super::followed::{Track, seconds};
 use super::gaussian::{inverted, plus, quadratic, round};
 use super::numbers::Numbers;
 use super::person::{Person, noise, sway};
+use super::remembered::{PEOPLE_MAX, Remembered, Words};
 use super::visibility::{Body, BodyView, Visibility, detection_probability};
 use crate::Site;
 use crate::config::TrackConfig;
@@ -67,6 +68,15 @@ struct Expected {
     view: BodyView,
     /// Chance of a detection of one's own, given that somebody is there.
     detection_probability: f64,
+}
+
+impl Remembered for MixtureTracker {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.word(&mut self.next_id);
+        words.maybe_i64(&mut self.time_ns);
+        let numbers = &self.numbers;
+        words.list(&mut self.people, PEOPLE_MAX, || Person::blank(numbers));
+    }
 }
 
 impl MixtureTracker {

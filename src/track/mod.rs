@@ -2,6 +2,7 @@
 //!
 //! `mixture` is our tracker, `paper` that of the paper's authors; the method chooses.
 
+mod remembered;
 mod gaussian;
 #[doc(hidden)] // Assignments, for scores that match tracks with people.
 pub mod association;
@@ -27,6 +28,7 @@ pub use mixture::MixtureTracker;
 #[doc(hidden)] // What tests and ablations turn.
 pub use numbers::Numbers;
 use paper::{PaperTracker, Variant};
+use remembered::{Reading, Remembered, Words, Writing};
 
 use crate::Site;
 use crate::config::{TrackConfig, TrackMethod};
@@ -100,6 +102,58 @@ impl Tracker {
         match &self.0 {
             Method::Mixture(tracker) => tracker.priors(time_ns, priors),
             Method::Paper(_) => priors.clear(),
+        }
+    }
+
+    /// All that it remembers, for a tracker elsewhere that goes on from here. Only this version of the program
+    /// understands it.
+    ///
+    /// ```
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
+    /// use umbracast::track::Tracker;
+    ///
+    /// let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
+    /// tracker.update(&views(0), &[detection(1.0, views(0).time_ns)], &mut tracks);
+    /// let mut other = Tracker::new(&config.track, &config.site);
+    /// assert!(other.take_up(&tracker.state()));
+    /// // From here on both say the same.
+    /// let mut same = Vec::new();
+    /// tracker.update(&views(1), &[detection(1.1, views(1).time_ns)], &mut tracks);
+    /// other.update(&views(1), &[detection(1.1, views(1).time_ns)], &mut same);
+    /// assert_eq!(same, tracks);
+    /// ```
+    pub fn state(&self) -> Vec<u8> {
+        let (mut writing, mut copy) = (Writing::default(), self.clone());
+        copy.visit(&mut writing);
+        writing.0
+    }
+
+    /// Remembers what another tracker of the same configuration did ([`Self::state`]). False, and nothing is changed,
+    /// where the bytes are something else.
+    ///
+    /// ```
+    /// use umbracast::{Config, track::Tracker};
+    ///
+    /// let config = Config::default();
+    /// let mut tracker = Tracker::new(&config.track, &config.site);
+    /// assert!(!tracker.take_up(b"something else"));
+    /// ```
+    pub fn take_up(&mut self, state: &[u8]) -> bool {
+        let (mut reading, mut copy) = (Reading { bytes: state, whole: true }, self.clone());
+        copy.visit(&mut reading);
+        let whole = reading.whole && reading.bytes.is_empty();
+        if whole {
+            *self = copy;
+        }
+        whole
+    }
+
+    fn visit(&mut self, words: &mut impl Words) {
+        match &mut self.0 {
+            Method::Mixture(tracker) => tracker.visit(words),
+            Method::Paper(tracker) => tracker.visit(words),
         }
     }
 

@@ -8,9 +8,10 @@
 use super::association::{FORBIDDEN, greedy, in_order, optimal};
 use super::followed::{Heading, Observations, Track, WIDTH_SCALE_SIGMA, seconds};
 use super::gaussian::State;
+use super::remembered::{PEOPLE_MAX, Remembered, Words};
 use crate::detect::Detection;
 use crate::gait::GaitPhase;
-use crate::geometry::{Aabb, DVec2, DVec3, Obb};
+use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 /// Added to the variances of position and velocity in each step, however long.
 const Q: [f64; 2] = [0.03, 0.01];
@@ -64,6 +65,35 @@ struct Person {
     aabb: Aabb,
     obb: Obb,
     observed: Observations,
+}
+
+impl Remembered for PaperTracker {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.word(&mut self.next_id);
+        words.maybe_i64(&mut self.time_ns);
+        words.list(&mut self.people, PEOPLE_MAX, || Person::new(0, DVec3::ZERO));
+    }
+}
+
+impl Remembered for Person {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.word(&mut self.id);
+        words.vec3(&mut self.x_m);
+        words.vec3(&mut self.v_mps);
+        words.f64s(self.P.as_flattened_mut());
+        words.u32(&mut self.points);
+        self.heading.visit(words);
+        words.f64(&mut self.top_m);
+        for corner_m in [&mut self.aabb.min_m, &mut self.aabb.max_m] {
+            words.vec3(corner_m);
+        }
+        words.vec3(&mut self.obb.center_m);
+        words.vec3(&mut self.obb.half_m);
+        let mut columns = self.obb.site_from_box.to_cols_array();
+        words.f64s(&mut columns);
+        self.obb.site_from_box = DMat3::from_cols_array(&columns);
+        self.observed.visit(words);
+    }
 }
 
 impl PaperTracker {
@@ -139,9 +169,15 @@ impl PaperTracker {
 
 impl Person {
     fn born(id: u64, detection: &Detection) -> Self {
-        let mut person = Self {
+        let mut person = Self::new(id, detection.position_m.extend(detection.z_m));
+        person.see(detection);
+        person
+    }
+
+    fn new(id: u64, x_m: DVec3) -> Self {
+        Self {
             id,
-            x_m: detection.position_m.extend(detection.z_m),
+            x_m,
             v_mps: DVec3::ZERO,
             P: [[BORN, 0.0], [0.0, BORN]],
             points: 0,
@@ -150,9 +186,7 @@ impl Person {
             aabb: Aabb::EMPTY,
             obb: Obb::from_aabb(&Aabb::EMPTY),
             observed: Observations::default(),
-        };
-        person.see(detection);
-        person
+        }
     }
 
     fn position_m(&self) -> DVec2 {

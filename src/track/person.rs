@@ -8,6 +8,7 @@ use super::height::Height;
 use super::kalman::Filter;
 use super::limb_phase::LimbPhase;
 use super::numbers::Numbers;
+use super::remembered::{Remembered, Words};
 use super::visibility::{Body, BodyView};
 use super::width::BodyWidth;
 use crate::detect::{Detection, Prior};
@@ -67,13 +68,44 @@ pub(super) struct Person {
     observed: Observations,
 }
 
+impl Remembered for Person {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.word(&mut self.id);
+        self.filter.visit(words);
+        self.limb_phase.visit(words);
+        words.bool(&mut self.confirmed);
+        words.f64(&mut self.existence);
+        words.u32(&mut self.matches);
+        words.f64(&mut self.doubled_s);
+        words.i64(&mut self.born_ns);
+        words.i64(&mut self.last_match_ns);
+        words.u32(&mut self.points);
+        self.heading.visit(words);
+        self.height.visit(words);
+        self.width.visit(words);
+        words.vec2(&mut self.extent_m);
+        self.observed.visit(words);
+    }
+}
+
 impl Person {
     pub(super) fn born(numbers: &Numbers, id: u64, detection: &Detection, time_ns: i64) -> Self {
         let noise = plus(noise(numbers, detection, &BodyView::default()), sway(numbers));
         let variance = noise[0][0].max(noise[1][1]);
-        let mut person = Self {
+        let mut person = Self::new(numbers, id, detection.position_m, variance, time_ns);
+        person.see(numbers, detection, &BodyView::default(), 0.0);
+        person
+    }
+
+    /// Somebody of whom nothing is remembered yet.
+    pub(super) fn blank(numbers: &Numbers) -> Self {
+        Self::new(numbers, 0, DVec2::ZERO, 1.0, 0)
+    }
+
+    fn new(numbers: &Numbers, id: u64, position_m: DVec2, variance_m2: f64, time_ns: i64) -> Self {
+        Self {
             id,
-            filter: Filter::new(numbers, detection.position_m, variance),
+            filter: Filter::new(numbers, position_m, variance_m2),
             limb_phase: LimbPhase::default(),
             confirmed: false,
             existence: EXISTENCE_AT_BIRTH,
@@ -87,9 +119,7 @@ impl Person {
             width: BodyWidth::default(),
             extent_m: DVec2::splat(WIDTH_M),
             observed: Observations::default(),
-        };
-        person.see(numbers, detection, &BodyView::default(), 0.0);
-        person
+        }
     }
 
     /// Moves filter and phase of the gait on.

@@ -6,6 +6,7 @@
 //!
 //! Numbers: `umbracast train width`, simulated returns of 115 adults on tuning scenes.
 
+use super::remembered::{Remembered, Words};
 use super::visibility::BodyView;
 use crate::detect::Detection;
 
@@ -38,6 +39,13 @@ pub(super) struct BodyWidth {
     frames: f64,
     /// Of what a frame's share is off that of a usual body.
     sum: f64,
+}
+
+impl Remembered for BodyWidth {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.f64(&mut self.frames);
+        words.f64(&mut self.sum);
+    }
 }
 
 impl BodyWidth {

@@ -35,6 +35,8 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Run(args) => commands::run::run(&args, &cli.common),
         Command::Live(args) => commands::live::run(&args, &cli.common),
+        #[cfg(feature = "node")]
+        Command::Node(args) => commands::node::run(&args, &cli.common),
         Command::Check(args) => commands::check::run(&args, &cli.common),
         Command::View(args) => commands::view::run(&args, &cli.common),
         Command::Replay(args) => commands::replay::run(&args, &cli.common),

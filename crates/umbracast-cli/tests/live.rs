@@ -1,6 +1,5 @@
 //! Live as a user meets it: packets over loopback, a recording, and the same results from it again.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -13,19 +12,11 @@ use umbracast_io::viewers;
 use umbracast_io::wire::{self, WireRow};
 
 mod common;
+#[path = "common/command.rs"]
+mod command;
 
+use command::{done, results_in, umbracast};
 use common::folder;
-
-fn umbracast(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_umbracast"));
-    command.args(arguments);
-    command
-}
-
-fn done(arguments: &[&str]) {
-    let output = umbracast(arguments).arg("--quiet").output().expect("starts");
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-}
 
 /// A live run that listens on free ports.
 struct Live {
@@ -127,21 +118,6 @@ fn live_and_replayed_results_are_the_same_to_the_byte() {
         "{}",
         tables("detections")
     );
-}
-
-/// Every message by topic, but for packets and what is said once at the beginning of a file.
-fn results_in(file: &Path) -> BTreeMap<String, Vec<Vec<u8>>> {
-    let mut reader = RecordingReader::open(file).expect("opens");
-    let mut messages = BTreeMap::<_, Vec<_>>::new();
-    while let Some(entry) = reader.next_entry().expect("reads") {
-        match entry {
-            Entry::Other(topic, _, message) | Entry::Cloud(topic, message) if topic != "/tf_static" => {
-                messages.entry(topic).or_default().push(message);
-            }
-            _ => {}
-        }
-    }
-    messages
 }
 
 /// `rosbags` and `mcap-ros2-support` read every topic, and the same values.

@@ -8,13 +8,15 @@ use std::time::Duration;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Health};
 use umbracast_io::fields;
-use umbracast_io::nodes::{Followed, Foreground, Priors};
+use umbracast_io::nodes::{Followed, Foreground, Priors, TrackerState};
 use umbracast_io::wire;
 use umbracast_live::HostClock;
 use umbracast_live::latency::Latencies;
 use umbracast_live::queue::{Popped, Queue, WhenFull};
+use zenoh::Wait;
 use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Subscriber;
+use zenoh::query::{Query, Queryable};
 
 use crate::chain::{Chain, Made, Row};
 use crate::hall::{Hall, Outlet, Urgency};
@@ -26,6 +28,10 @@ use crate::role::Role;
 const WAITING: usize = 64;
 /// The longest rest: how often the end may be asked for.
 const REST: Duration = Duration::from_millis(50);
+/// How long others may take to answer at the start.
+const ANSWER: Duration = Duration::from_millis(500);
+/// The tracker's state is published with every so many frames.
+const STATE_EVERY: u64 = 5;
 /// When nothing that could be used has come for so long, time is taken as it comes.
 const SILENCE_NS: i64 = 1_000_000_000;
 
@@ -36,6 +42,8 @@ enum Heard {
     Priors(ZBytes),
     /// Another tracker came or went.
     Tracker(String, bool),
+    /// Somebody asks for the tracker's state.
+    Asked(Query),
 }
 
 /// What a row counts.
@@ -68,6 +76,7 @@ pub struct Back {
     /// What it counts.
     pub counted: Arc<Counted>,
     _subscribers: Vec<Subscriber<()>>,
+    _queryable: Option<Queryable<()>>,
 }
 
 impl Back {
@@ -103,25 +112,31 @@ impl Back {
                 queue.push((kind(bytes.clone()), clock.now_ns()));
             })
         };
-        let mut subscribers = Vec::new();
+        let (mut subscribers, mut queryable) = (Vec::new(), None);
         if row.track {
-            let (queue, own) = (queue.clone(), hall.id());
+            let (seen, own) = (queue.clone(), hall.id());
             subscribers.push(hall.watch_nodes(Role::Track, move |id, here| {
                 if !id.ends_with(&own) {
-                    queue.push((Heard::Tracker(id.to_owned(), here), clock.now_ns()));
+                    seen.push((Heard::Tracker(id.to_owned(), here), clock.now_ns()));
                 }
             })?);
             subscribers.push(hear("priors", Heard::Priors)?);
-            if hall.nodes(Role::Track, Duration::from_millis(500)).iter().all(|id| id.ends_with(&hall.id())) {
+            // What comes meanwhile waits in the queue.
+            subscribers.push(hear("sensor/*/foreground", Heard::Foreground)?);
+            worker.take_up(hall);
+            if hall.nodes(Role::Track, ANSWER).iter().all(|id| id.ends_with(&hall.id())) {
                 worker.take_over();
             }
-            subscribers.push(hear("sensor/*/foreground", Heard::Foreground)?);
+            let asked = queue.clone();
+            queryable = Some(hall.answer(&hall.keys().of("state"), move |query| {
+                asked.push((Heard::Asked(query), clock.now_ns()));
+            })?);
         } else {
             subscribers.push(hear(if row.forecast { "followed" } else { "tracks" }, Heard::Followed)?);
         }
         let items = queue.clone();
         let thread = std::thread::spawn(move || worker.run(&items));
-        Ok(Self { queue, thread: Some(thread), counted, _subscribers: subscribers })
+        Ok(Self { queue, thread: Some(thread), counted, _subscribers: subscribers, _queryable: queryable })
     }
 
     /// True while its thread works.
@@ -141,6 +156,7 @@ impl Back {
 /// Where results leave.
 struct Outlets {
     priors: Option<Outlet>,
+    state: Option<Outlet>,
     detections: Option<Outlet>,
     followed: Option<Outlet>,
     links: Option<Outlet>,
@@ -164,6 +180,7 @@ impl Outlets {
         let tracks = if row.forecast { "tracks" } else { "followed" };
         Ok(Self {
             priors: outlet(row.track, "priors", Urgency::Result)?,
+            state: outlet(row.track, "state", Urgency::Rest)?,
             detections: outlet(row.track, "detections", Urgency::Rest)?,
             followed: outlet(row.track || row.forecast, tracks, Urgency::Stage)?,
             links: outlet(row.cast, "links", Urgency::Result)?,
@@ -246,6 +263,12 @@ impl Worker {
                 }
                 None => self.broken(),
             },
+            Heard::Asked(query) => {
+                if let Some(mut state) = self.chain.state() {
+                    // Who asked and is gone needs no answer.
+                    let _ = query.reply(query.key_expr().clone(), fields::encode(&mut state)).wait();
+                }
+            }
             Heard::Tracker(id, here) => {
                 self.others.retain(|other| *other != id);
                 if here {
@@ -296,7 +319,21 @@ impl Worker {
     }
 
     fn publish(&mut self, made: Made) {
+        let kept = made.frame.is_multiple_of(STATE_EVERY);
         self.outlets.put(made, self.lead.since_ns().unwrap_or(0));
+        if let (true, Some(outlet), Some(mut state)) = (kept, &self.outlets.state, self.chain.state()) {
+            outlet.put(&mut state);
+        }
+    }
+
+    /// Goes on from the newest state that somebody knows.
+    fn take_up(&mut self, hall: &Hall) {
+        let known = hall.ask(&hall.keys().of("state"), ANSWER);
+        let states = known.iter().filter_map(|(_, bytes)| fields::decode::<TrackerState>(bytes));
+        if let Some(newest) = states.max_by_key(|state| state.time_ns) {
+            let taken = self.chain.take_up(&newest);
+            self.counted.broken.fetch_add(u64::from(!taken), Ordering::Relaxed);
+        }
     }
 
     fn count(&self, made: &Made) {

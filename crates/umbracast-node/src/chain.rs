@@ -6,13 +6,16 @@ use umbracast::detect::{Clusterer, Measurer, POINTS_MAX, Prior};
 use umbracast::forecast::{Forecaster, Weights};
 use umbracast::track::Tracker;
 use umbracast::{Config, Error, Outcome, STEP_NS};
-use umbracast_io::nodes::{Followed, Priors, Warning};
+use umbracast_io::nodes::{Followed, Priors, TrackerState, Warning};
 use umbracast_io::rows;
 use umbracast_io::rows::{DetectionRow, LinkRow};
 use umbracast_live::warnings::{Event, Warnings};
 
 use crate::join::Joined;
 use crate::role::Role;
+
+/// States go from a program to one of the same version alone.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Which stages stand in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,6 +167,26 @@ impl Chain {
         (o.tracks, o.forecasts) = (followed.tracks, followed.forecasts);
         let made = Made { closed_ns: followed.closed_ns, ..Made::default() };
         self.later_stages(made, followed.sensors, followed.took_ns, begun_ns, now_ns, false)
+    }
+
+    /// What another tracker needs to go on from here; `None` before the first frame, or where no tracker is in the row.
+    pub fn state(&self) -> Option<TrackerState> {
+        Some(TrackerState {
+            time_ns: self.last_ns?,
+            first_ns: self.first_ns?,
+            version: VERSION.to_owned(),
+            tracker: self.tracker.as_ref()?.state(),
+        })
+    }
+
+    /// Goes on where another tracker stood; false, and nothing is changed, where that cannot be.
+    pub fn take_up(&mut self, state: &TrackerState) -> bool {
+        let Some(tracker) = &mut self.tracker else { return false };
+        let taken = state.version == VERSION && tracker.take_up(&state.tracker);
+        if taken {
+            (self.first_ns, self.last_ns) = (Some(state.first_ns), Some(state.time_ns));
+        }
+        taken
     }
 
     /// Time begins anew: the next frame is taken whatever its time.

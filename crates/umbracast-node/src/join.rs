@@ -232,7 +232,7 @@ mod tests {
         };
         Foreground {
             time_ns: tenths * STEP_NS,
-            sensors: vec!["east".to_owned(), "west".to_owned()],
+            sensors: vec!["lidar_east".to_owned(), "lidar_west".to_owned()],
             covers: vec![sensor],
             views: vec![View { sensor: sensor as usize, site_from_sensor: Pose::IDENTITY, fan: None }],
             points: vec![point; 2],

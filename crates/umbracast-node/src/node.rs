@@ -23,7 +23,7 @@ use crate::chain::Row;
 use crate::front::{Expected, Front};
 use crate::hall::{Hall, Outlet, Urgency};
 use crate::role::Role;
-use crate::share::{Shared, Sharing};
+use crate::share::{Shared, Sharing, keep_state};
 use crate::watch::Watch;
 
 /// Packets that wait for the front end: a second of four HDL-32E.
@@ -117,7 +117,7 @@ pub struct Node {
     started_ns: i64,
     clock: HostClock,
     health: Vec<Outlet>,
-    _sharing: Sharing,
+    _sharing: Vec<Sharing>,
     _tokens: Vec<LivelinessToken>,
     _subscribers: Vec<Subscriber<()>>,
 }
@@ -170,7 +170,7 @@ impl Node {
             started_ns: clock.now_ns(),
             clock,
             health: Vec::new(),
-            _sharing: shared.answer(&hall)?,
+            _sharing: vec![shared.answer(&hall)?],
             _tokens: Vec::new(),
             _subscribers: Vec::new(),
             stages,
@@ -178,6 +178,11 @@ impl Node {
         };
         for row in Row::of(&node.stages) {
             node.backs.push(Back::start(&node.hall, &config, weights.as_ref(), row, wait, clock)?);
+        }
+        // A tracker keeps its own; a front end may be a small machine.
+        let keeps = [Role::Forecast, Role::Cast, Role::Record, Role::Serve];
+        if !node.stages.contains(&Role::Track) && has_any(&node.stages, &keeps) {
+            node._sharing.push(keep_state(&node.hall)?);
         }
         if has_any(&node.stages, &[Role::Record, Role::Serve]) {
             node.look_on(&config, points, listener)?;

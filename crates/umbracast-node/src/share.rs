@@ -1,12 +1,14 @@
 //! What a node that comes asks for, and whoever has it answers: the site, the empty hall, the network's weights.
 
 use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_io::messages;
 use zenoh::Wait;
+use zenoh::bytes::ZBytes;
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::Subscriber;
 use zenoh::query::Queryable;
@@ -24,7 +26,7 @@ pub struct Shared(BTreeMap<String, Vec<u8>>);
 #[derive(Debug)]
 pub struct Sharing {
     _queryable: Queryable<()>,
-    _subscriber: Option<Subscriber<()>>,
+    _heard: Option<Subscriber<()>>,
 }
 
 impl Shared {
@@ -67,8 +69,29 @@ impl Shared {
                 }
             }
         })?;
-        Ok(Sharing { _queryable: queryable, _subscriber: None })
+        Ok(Sharing { _queryable: queryable, _heard: None })
     }
+}
+
+/// Keeps the tracker's state as it was published last, for a tracker that comes when no other is there.
+///
+/// # Errors
+/// A key that is none.
+pub fn keep_state(hall: &Hall) -> Result<Sharing, Error> {
+    let kept = Arc::<Mutex<Option<ZBytes>>>::default();
+    let (key, given) = (hall.keys().of("state"), kept.clone());
+    let lock = |kept: &Mutex<Option<ZBytes>>, change: &mut dyn FnMut(&mut Option<ZBytes>)| {
+        change(&mut kept.lock().unwrap_or_else(PoisonError::into_inner));
+    };
+    let queryable = hall.answer(&key, move |query| {
+        let mut newest = None;
+        lock(&given, &mut |kept| newest = kept.clone());
+        if let Some(state) = newest {
+            let _ = query.reply(query.key_expr().clone(), state).wait();
+        }
+    })?;
+    let heard = hall.hear(&key, move |_, bytes| lock(&kept, &mut |kept| *kept = Some(bytes.clone())))?;
+    Ok(Sharing { _queryable: queryable, _heard: Some(heard) })
 }
 
 /// The configuration that somebody of the hall has; `None` where nobody answers.

@@ -169,7 +169,7 @@ pub struct RecordArgs {
     pub record_points: bool,
 }
 
-fn positive(text: &str) -> Result<f64, Error> {
+pub(super) fn positive(text: &str) -> Result<f64, Error> {
     let number: Option<f64> = text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite());
     number.ok_or_else(|| Error::new(format!("expected a number above 0, found {text}")))
 }

@@ -10,8 +10,12 @@ use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::Preset;
 
 mod live;
+#[cfg(feature = "node")]
+mod node;
 
 pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
+#[cfg(feature = "node")]
+pub use node::Node;
 
 /// Sees people with LiDARs, foresees where they walk, and tells which radio links they are about to block.
 #[derive(Debug, Parser)]
@@ -50,6 +54,9 @@ pub enum Command {
     Run(Run),
     /// Sensors in, warnings out: receives packets, runs all stages as frames close, serves a page, records.
     Live(Live),
+    /// One process of a hall whose stages run on several hosts, over Zenoh.
+    #[cfg(feature = "node")]
+    Node(Node),
     /// Listen to the sensors of a site and say what is wrong with them, before the first person comes.
     Check(Check),
     /// Watch a recording in the browser as if it were live.

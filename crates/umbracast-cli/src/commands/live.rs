@@ -156,7 +156,8 @@ pub fn doors(site: &Site, port: Option<u16>, demo: bool) -> Result<Vec<Door>, Er
     site.sensors.iter().enumerate().map(door).collect()
 }
 
-fn recorder(args: &RecordArgs) -> Option<RecordSettings> {
+/// The recorder's settings; none where nothing is recorded.
+pub fn recorder(args: &RecordArgs) -> Option<RecordSettings> {
     args.record.as_ref().map(|folder: &PathBuf| RecordSettings {
         folder: folder.clone(),
         file_bytes: args.record_mb << 20,

@@ -8,6 +8,8 @@ pub mod evaluate;
 pub mod demo;
 pub mod inspect;
 pub mod live;
+#[cfg(feature = "node")]
+pub mod node;
 pub mod check;
 pub mod replay;
 pub mod reproduce;

@@ -1,0 +1,158 @@
+//! Nodes as a user meets them: processes that find each other, and the results of one process.
+#![cfg(feature = "node")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+use std::time::{Duration, Instant};
+
+mod common;
+#[path = "common/command.rs"]
+mod command;
+
+use command::{done, results_in, umbracast};
+use common::folder;
+
+/// Two people: one crosses in front of the access point, the other walks the other way.
+const CROSSING: &str = "t_s,id,x_m,y_m,height_m\n\
+    0.0,1,6.0,-2.0,1.80\n1.0,1,6.0,-0.7,1.80\n2.0,1,6.0,0.6,1.80\n3.0,1,6.0,1.9,1.80\n\
+    0.0,2,1.0,0.3,1.70\n1.0,2,0.0,0.3,1.70\n2.0,2,-1.0,0.3,1.70\n3.0,2,-2.0,0.3,1.70\n";
+
+/// A node that runs until it is asked to end.
+struct Node {
+    child: Child,
+    said: BufReader<ChildStdout>,
+}
+
+impl Node {
+    /// Returns once it is ready.
+    fn start(arguments: &[&str]) -> Self {
+        let command =
+            umbracast(&["node", "--json", "--no-serve"]).args(arguments).stdout(Stdio::piped()).spawn();
+        let mut child = command.expect("starts");
+        let mut said = BufReader::new(child.stdout.take().expect("piped"));
+        let mut line = String::new();
+        while !line.trim_end().ends_with("ready") {
+            line.clear();
+            assert!(
+                said.read_line(&mut line).expect("a line") > 0,
+                "{arguments:?}: ended before it was ready"
+            );
+        }
+        Self { child, said }
+    }
+
+    /// Asks for the end as a service manager does; gives the summary.
+    fn stop(self) -> serde_json::Value {
+        let pid = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-TERM", &pid]).status().expect("kill").success());
+        self.ended()
+    }
+
+    /// The summary of one that ends by itself.
+    fn ended(mut self) -> serde_json::Value {
+        let mut text = String::new();
+        self.said.read_to_string(&mut text).expect("a summary");
+        self.child.wait().expect("ends");
+        serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}"))
+    }
+}
+
+/// A hall of its own: a folder, a site file, and an endpoint where its nodes meet.
+struct Hall {
+    folder: PathBuf,
+    site: String,
+    meet: String,
+}
+
+impl Hall {
+    fn new(name: &str) -> Self {
+        let folder = folder(name);
+        let port = TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).expect("a port").port();
+        let site = text(&folder.join("hall.toml"));
+        // A busy machine is late: no frame goes on without a front end.
+        fs::write(&site, format!("[network]\nhall = \"{name}\"\nwait_s = 5.0\n")).expect("writes");
+        Self { folder, site, meet: format!("tcp/127.0.0.1:{port}") }
+    }
+
+    /// The node that the others know.
+    fn first(&self, arguments: &[&str]) -> Node {
+        Node::start(&[&["--site", &self.site, "--listen", &self.meet][..], arguments].concat())
+    }
+
+    fn node(&self, arguments: &[&str]) -> Node {
+        Node::start(&[&["--site", &self.site, "--connect", &self.meet][..], arguments].concat())
+    }
+
+    fn path(&self, name: &str) -> String {
+        text(&self.folder.join(name))
+    }
+}
+
+fn text(path: &Path) -> String {
+    path.to_str().expect("a plain name").to_owned()
+}
+
+fn recording_in(folder: &str) -> PathBuf {
+    fs::read_dir(folder).expect("recordings").next().expect("one").expect("readable").path()
+}
+
+/// The scene and the empty hall, and what one process makes of it, message by message.
+fn simulated(hall: &Hall, run: &[&str]) -> (String, String, BTreeMap<String, Vec<Vec<u8>>>) {
+    let (sim, out) = (hall.path("sim"), hall.path("one"));
+    let walk = hall.path("crossing.csv");
+    fs::write(&walk, CROSSING).expect("writes");
+    done(&["simulate", "--trajectories", &walk, "--seed", "7", "--out", &sim]);
+    let (scene, empty) = (format!("{sim}/scene-0000.mcap"), format!("{sim}/empty.mcap"));
+    done(&[&["run", &scene, "--out", &out, "--mcap", "--points"][..], run].concat());
+    (scene, empty, results_in(&Path::new(&out).join("results-0000.mcap")))
+}
+
+fn assert_same(found: &BTreeMap<String, Vec<Vec<u8>>>, expected: &BTreeMap<String, Vec<Vec<u8>>>) {
+    assert!(expected["/umbracast/tracks"].len() >= 30 && expected.len() >= 7, "{:?}", expected.keys());
+    for (topic, messages) in expected {
+        let found = found.get(topic).map_or(&[][..], Vec::as_slice);
+        let apart = messages.iter().zip(found).position(|(a, b)| a != b);
+        assert_eq!((found.len(), apart), (messages.len(), None), "{topic}: messages, first that differs");
+    }
+}
+
+#[test]
+fn two_front_ends_a_tracker_and_a_caster_give_what_one_process_gives_to_the_byte() {
+    let hall = Hall::new("nodes-empty");
+    let (scene, empty, expected) = simulated(&hall, &[]);
+    let track = hall.first(&["track,forecast", "--empty", &empty]);
+    let cast = hall.node(&["cast"]);
+    let records = hall.path("records");
+    let record = hall.node(&["record", "--record", &records, "--record-points"]);
+    // One front end is given the empty hall, the other asks for it.
+    let east = hall.node(&["sensor", "--sensors", "lidar_east", "--from", &scene, "--empty", &empty]);
+    let west = hall.node(&["sensor", "--sensors", "lidar_west", "--from", &scene]);
+    let fronts = [east.ended(), west.ended()];
+    wait_for_frames(&records, expected["/umbracast/tracks"].len());
+    let summaries = [track.stop(), cast.stop(), record.stop()];
+    for summary in fronts.iter().chain(&summaries) {
+        assert_eq!(
+            (&summary["frames_incomplete"], &summary["messages_late"]),
+            (&0.into(), &0.into()),
+            "{summary}"
+        );
+    }
+    assert_same(&results_in(&recording_in(&records)), &expected);
+}
+
+/// Until the recorder has written so many frames: it flushes once a second.
+fn wait_for_frames(records: &str, frames: usize) {
+    let begun = Instant::now();
+    let recorded = || {
+        let file = fs::read_dir(records).ok()?.next()?.ok()?.path();
+        Some(results_in(&file).get("/umbracast/tracks")?.len())
+    };
+    while recorded().is_none_or(|found| found < frames) {
+        assert!(begun.elapsed() < Duration::from_secs(60), "{:?} frames recorded of {frames}", recorded());
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
