@@ -6,6 +6,7 @@ use umbracast::{Error, Site};
 use umbracast_live::run::Listener;
 
 /// Nobody, or those whom the site file names.
+#[derive(Default)]
 pub struct Outward {
     #[cfg(feature = "node")]
     told: Option<std::sync::Arc<umbracast_node::outward::Outward>>,
@@ -16,7 +17,7 @@ impl Outward {
     /// Opens what the site file asks for.
     pub fn of_site_file(file: Option<&Path>, site: &Site) -> Result<Self, Error> {
         use umbracast_node::network::Network;
-        let Some(file) = file else { return Ok(Self { told: None }) };
+        let Some(file) = file else { return Ok(Self::default()) };
         let network = Network::of_site_file(&crate::setup::read_text(file)?, file)?;
         Self::of_network(&network, || network.open(), &network.hall(site).unwrap_or_default(), site)
     }
@@ -24,7 +25,7 @@ impl Outward {
     /// The same of settings that are read already.
     pub fn of_network(
         network: &umbracast_node::network::Network,
-        session: impl FnOnce() -> Result<zenoh::Session, Error>,
+        session: impl FnOnce() -> Result<umbracast_node::Session, Error>,
         hall: &str,
         site: &Site,
     ) -> Result<Self, Error> {

@@ -10,6 +10,7 @@ pub mod network;
 pub mod hall;
 pub mod front;
 pub mod join;
+pub mod objects;
 pub mod lead;
 pub mod chain;
 pub mod back;
@@ -19,3 +20,4 @@ pub mod node;
 pub mod fleet;
 
 pub use node::{Node, Settings, Source};
+pub use zenoh::Session;
