@@ -39,7 +39,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 26] = [
+const JOBS: [Job; 27] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -52,6 +52,7 @@ const JOBS: [Job; 26] = [
     job("speed", "how long a frame takes, in every mode", Needs::Nothing, house::speed),
     job("live", "ten minutes live, three times over, the page open", Needs::Asking, house::live),
     job("halls", "1 to 64 halls on one host", Needs::Asking, halls::halls),
+    job("deployed", "the files for containers and clusters, run here", Needs::Asking, halls::deployed),
     job("faults", "a live run in which something fails", Needs::Nothing, house::faults),
     job("kills", "a recording run killed at twenty moments", Needs::Nothing, house::kills),
     job("same-bytes", "the same seed on one thread and on two", Needs::Nothing, house::same_bytes),

@@ -194,7 +194,7 @@ fn of_role(role: Role) -> (Ends, Ends, Ends, Ends) {
         Role::Forecast => (&["tracks"], &["followed", "state"], &["state"], &["state", "config/**"]),
         Role::Cast => (&["links", "warnings/*"], &["tracks", "state"], &["state"], &["state", "config/**"]),
         Role::Record => (&[], &["**"], &["state"], &["state", "config/**"]),
-        Role::Serve => (&[], &["**"], &["state"], &["config/**"]),
+        Role::Serve => (&[], &["**"], &["state"], &["state", "config/**"]),
         Role::Display => (&[], &["**"], &[], &[]),
         Role::Controller => (&[], &["links", "warnings/*"], &[], &[]),
         Role::Router => (&[], &[], &[], &[]), // Of no hall: see above.
