@@ -9,6 +9,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use umbracast_io::rows::TrackRow;
+use umbracast_io::wire;
+
 mod common;
 #[path = "common/command.rs"]
 mod command;
@@ -58,6 +61,14 @@ impl Node {
         self.said.read_to_string(&mut text).expect("a summary");
         self.child.wait().expect("ends");
         serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}"))
+    }
+}
+
+impl Node {
+    /// As a machine that loses its power.
+    fn kill(mut self) {
+        self.child.kill().expect("is there");
+        self.child.wait().expect("ends");
     }
 }
 
@@ -142,6 +153,76 @@ fn two_front_ends_a_tracker_and_a_caster_give_what_one_process_gives_to_the_byte
         );
     }
     assert_same(&results_in(&recording_in(&records)), &expected);
+}
+
+#[test]
+fn the_background_is_learned_beside_the_sensors_with_what_the_tracker_expects() {
+    let hall = Hall::new("nodes-learning");
+    let (scene, _, expected) = simulated(&hall, &["--no-empty"]);
+    let track = hall.first(&["track"]);
+    let stages = [hall.node(&["forecast"]), hall.node(&["cast"])];
+    let records = hall.path("records");
+    let record = hall.node(&["record", "--record", &records, "--record-points"]);
+    let sensor = |name| hall.node(&["sensor", "--sensors", name, "--from", &scene]);
+    let fronts = [sensor("lidar_east"), sensor("lidar_west")].map(Node::ended);
+    wait_for_frames(&records, expected["/umbracast/tracks"].len());
+    stages.into_iter().chain([track, record]).for_each(|node| drop(node.stop()));
+    if fronts.iter().all(|front| front["priors_late"] == 0) {
+        assert_same(&results_in(&recording_in(&records)), &expected);
+    } else {
+        // A busy machine: then it must have been told.
+        assert!(fronts.iter().any(|front| front["priors_late"].as_u64() > Some(0)), "{fronts:?}");
+    }
+}
+
+#[test]
+fn where_the_leader_dies_the_one_that_stands_by_goes_on_and_no_byte_is_lost() {
+    let hall = Hall::new("nodes-leader");
+    let (scene, empty, expected) = simulated(&hall, &[]);
+    let leader = hall.first(&["track", "--empty", &empty]);
+    let other = hall.node(&["track"]);
+    let stages = [hall.node(&["forecast"]), hall.node(&["cast"])];
+    let records = hall.path("records");
+    let record = hall.node(&["record", "--record", &records, "--record-points"]);
+    let sensor = |name| hall.node(&["sensor", "--sensors", name, "--from", &scene, "--rate", "0.5"]);
+    let fronts = [sensor("lidar_east"), sensor("lidar_west")];
+    wait_for_frames(&records, 5);
+    leader.kill();
+    fronts.map(Node::ended);
+    wait_for_frames(&records, expected["/umbracast/tracks"].len());
+    let summary = other.stop();
+    assert!(summary["leads"] == true && summary["messages_late"] == 0, "{summary}");
+    stages.into_iter().chain([record]).for_each(|node| drop(node.stop()));
+    assert_same(&results_in(&recording_in(&records)), &expected);
+}
+
+#[test]
+fn a_tracker_that_comes_back_knows_its_people_and_counts_on() {
+    let hall = Hall::new("nodes-back");
+    let (scene, empty, expected) = simulated(&hall, &[]);
+    let cast = hall.first(&["forecast,cast"]);
+    let track = hall.node(&["track"]);
+    let records = hall.path("records");
+    let record = hall.node(&["record", "--record", &records, "--record-points"]);
+    let sensor = |name| {
+        hall.node(&["sensor", "--sensors", name, "--from", &scene, "--rate", "0.5", "--empty", &empty])
+    };
+    let fronts = [sensor("lidar_east"), sensor("lidar_west")];
+    wait_for_frames(&records, 10);
+    track.kill();
+    let track = hall.node(&["track"]);
+    fronts.map(Node::ended);
+    std::thread::sleep(Duration::from_secs(2)); // What was seen last is recorded.
+    [cast, track, record].map(Node::stop);
+    let access_points = ["side".to_owned(), "centre".to_owned()];
+    let last = |messages: &BTreeMap<String, Vec<Vec<u8>>>| {
+        let message = messages["/umbracast/tracks"].last().expect("tracks").clone();
+        let (frame, _, rows) = wire::decode::<TrackRow>(&message, &access_points).expect("tracks");
+        (frame, rows.iter().map(|row| row.track).collect::<Vec<_>>())
+    };
+    let found = results_in(&recording_in(&records));
+    assert_eq!(last(&found), last(&expected), "the last frame and who is in it");
+    assert!(found["/umbracast/tracks"].len() < expected["/umbracast/tracks"].len(), "it was gone");
 }
 
 /// Until the recorder has written so many frames: it flushes once a second.

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use umbracast_io::messages::{self, Schema};
+use umbracast_io::nodes;
 use umbracast_io::rows::{DetectionRow, LinkRow, TrackRow};
 use umbracast_io::wire;
 
@@ -15,7 +16,7 @@ const OURS: &str = "umbracast_msgs/";
 fn definitions() -> BTreeMap<String, String> {
     let rows = [wire::schema::<DetectionRow>(), wire::schema::<TrackRow>(), wire::schema::<LinkRow>()];
     let rest = [messages::PEOPLE, messages::LINKS, messages::SENSOR_PACKETS];
-    rows.into_iter().chain(rest).flat_map(|schema| parts(&schema)).collect()
+    rows.into_iter().chain(rest).chain(nodes::schemas()).flat_map(|schema| parts(&schema)).collect()
 }
 
 /// A concatenated definition taken apart: the first part is the message's own, the others say whose they are.
