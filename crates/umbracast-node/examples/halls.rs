@@ -61,7 +61,7 @@ struct Row {
     p99_ms: f64,
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let [command, seconds, picture, counts @ ..] = &words[..] else {
         return Err("expected COMMAND SECONDS PICTURE COUNT...".into());
@@ -172,7 +172,7 @@ fn run(
     config: &Config,
     recorded: &[Vec<Foreground>],
     clock: HostClock,
-) -> Result<Row, Box<dyn std::error::Error>> {
+) -> Result<Row, Box<dyn std::error::Error + Send + Sync>> {
     let folder = std::env::temp_dir().join(format!("umbracast-halls-{}", std::process::id()));
     fs::create_dir_all(&folder)?;
     let port = std::net::TcpListener::bind("127.0.0.1:0")?.local_addr()?.port();
@@ -193,7 +193,11 @@ fn run(
     let warnings = Arc::new(AtomicU64::new(0));
     let counted = warnings.clone();
     let subscriber = session.declare_subscriber("umbracast/*/warnings/*");
-    let _subscriber = subscriber.callback(move |_| drop(counted.fetch_add(1, Ordering::Relaxed))).wait()?;
+    let _subscriber = subscriber
+        .callback(move |_| {
+            counted.fetch_add(1, Ordering::Relaxed);
+        })
+        .wait()?;
     while fleet::look(&session, None, Duration::from_millis(500))?.len() < halls {}
     let mut outlets: Vec<Vec<Outlet>> = Vec::new();
     for hall in 0..halls {

@@ -271,8 +271,13 @@ impl Network {
         for (key, value) in [("connect/timeout_ms", VISIT_MS), ("connect/exit_on_failure", "true")] {
             config.insert_json5(key, value).map_err(|e| Error::new(format!("network: {key}: {e}")))?;
         }
-        let opened = zenoh::open(config).wait();
-        opened.map_err(|e| Error::new(format!("network.connect {:?}: nobody answers: {e}", self.connect)))
+        let meeting = format!("tcp/{MEETING_POINT}");
+        let called = if self.connect.is_empty() { &meeting } else { &self.connect.join(", ") };
+        zenoh::open(config).wait().map_err(|_| {
+            Error::new(format!(
+                "network.connect: nobody at {called} answers, or lets in whoever has these credentials"
+            ))
+        })
     }
 
     /// Opens the session. Whoever is not there yet is called again until it is.
