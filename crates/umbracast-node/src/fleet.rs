@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
+use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -112,11 +113,13 @@ pub fn look(
     });
     let subscriber = subscriber.wait().map_err(failed)?;
     std::thread::sleep(listen);
-    let tokens = session.liveliness().get(format!("umbracast/{hall}/node/*/*")).wait().map_err(failed)?;
-    let mut present = Vec::new();
-    while let Ok(reply) = tokens.recv() {
-        present.extend(reply.result().ok().map(|sample| sample.key_expr().to_string()));
-    }
+    // A channel without a bound: a router answers itself before the question returns, and would wait for ever on a full one.
+    let (sender, replies) = channel();
+    let tokens = session.liveliness().get(format!("umbracast/{hall}/node/*/*"));
+    let tokens = tokens.callback(move |reply| drop(sender.send(reply)));
+    tokens.wait().map_err(failed)?;
+    let key = |reply: zenoh::query::Reply| Some(reply.result().ok()?.key_expr().to_string());
+    let present: Vec<String> = replies.into_iter().filter_map(key).collect();
     subscriber.undeclare().wait().map_err(failed)?;
     Ok(halls(&present, lock(&words)))
 }
