@@ -16,7 +16,7 @@ mod common;
 #[path = "common/command.rs"]
 mod command;
 
-use command::{done, results_in, umbracast};
+use command::{done, results_in, umbracast, whole_results_in};
 use common::folder;
 
 /// Two people: one crosses in front of the access point, the other walks the other way.
@@ -69,6 +69,14 @@ impl Node {
     fn kill(mut self) {
         self.child.kill().expect("is there");
         self.child.wait().expect("ends");
+    }
+}
+
+/// A test that fails leaves nobody behind.
+impl Drop for Node {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
@@ -184,11 +192,12 @@ fn where_the_leader_dies_the_one_that_stands_by_goes_on_and_no_byte_is_lost() {
     let stages = [hall.node(&["forecast"]), hall.node(&["cast"])];
     let records = hall.path("records");
     let record = hall.node(&["record", "--record", &records, "--record-points"]);
-    let sensor = |name| hall.node(&["sensor", "--sensors", name, "--from", &scene, "--rate", "0.5"]);
+    let sensor = |name| hall.node(&["sensor", "--sensors", name, "--from", &scene, "--rate", "0.25"]);
     let fronts = [sensor("lidar_east"), sensor("lidar_west")];
     wait_for_frames(&records, 5);
     leader.kill();
-    fronts.map(Node::ended);
+    assert_running(&fronts);
+    fronts.into_iter().for_each(|front| drop(front.ended()));
     wait_for_frames(&records, expected["/umbracast/tracks"].len());
     let summary = other.stop();
     assert!(summary["leads"] == true && summary["messages_late"] == 0, "{summary}");
@@ -205,15 +214,17 @@ fn a_tracker_that_comes_back_knows_its_people_and_counts_on() {
     let records = hall.path("records");
     let record = hall.node(&["record", "--record", &records, "--record-points"]);
     let sensor = |name| {
-        hall.node(&["sensor", "--sensors", name, "--from", &scene, "--rate", "0.5", "--empty", &empty])
+        hall.node(&["sensor", "--sensors", name, "--from", &scene, "--rate", "0.25", "--empty", &empty])
     };
     let fronts = [sensor("lidar_east"), sensor("lidar_west")];
     wait_for_frames(&records, 10);
     track.kill();
+    std::thread::sleep(Duration::from_millis(400)); // Two frames at this pace.
     let track = hall.node(&["track"]);
-    fronts.map(Node::ended);
+    assert_running(&fronts);
+    fronts.into_iter().for_each(|front| drop(front.ended()));
     std::thread::sleep(Duration::from_secs(2)); // What was seen last is recorded.
-    [cast, track, record].map(Node::stop);
+    [cast, track, record].into_iter().for_each(|node| drop(node.stop()));
     let access_points = ["side".to_owned(), "centre".to_owned()];
     let last = |messages: &BTreeMap<String, Vec<Vec<u8>>>| {
         let message = messages["/umbracast/tracks"].last().expect("tracks").clone();
@@ -225,12 +236,20 @@ fn a_tracker_that_comes_back_knows_its_people_and_counts_on() {
     assert!(found["/umbracast/tracks"].len() < expected["/umbracast/tracks"].len(), "it was gone");
 }
 
+/// What happened, happened in the midst of the scene.
+fn assert_running(fronts: &[Node]) {
+    let fronts: Vec<u32> = fronts.iter().map(|front| front.child.id()).collect();
+    let runs =
+        |id: &u32| fs::read_to_string(format!("/proc/{id}/stat")).is_ok_and(|stat| !stat.contains(") Z"));
+    assert!(fronts.iter().all(runs), "the scene was over");
+}
+
 /// Until the recorder has written so many frames: it flushes once a second.
 fn wait_for_frames(records: &str, frames: usize) {
     let begun = Instant::now();
     let recorded = || {
         let file = fs::read_dir(records).ok()?.next()?.ok()?.path();
-        Some(results_in(&file).get("/umbracast/tracks")?.len())
+        Some(whole_results_in(&file).ok()?.get("/umbracast/tracks")?.len())
     };
     while recorded().is_none_or(|found| found < frames) {
         assert!(begun.elapsed() < Duration::from_secs(60), "{:?} frames recorded of {frames}", recorded());
