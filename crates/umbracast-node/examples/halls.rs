@@ -1,7 +1,7 @@
 //! How many halls one host carries: their front ends are simulated, everything behind them is real.
 //!
 //! ```sh
-//! cargo run --release -p umbracast-node --example halls -- target/release/umbracast 30 halls.svg 1 2 4 8 16 32 64
+//! cargo run --release -p umbracast-node --example halls -- target/release/umbracast 30 halls.svg 1 2 4 8 16 32 64 96
 //! ```
 //!
 //! A minute of ten people before two HDL-32E is turned into what both front ends publish, once. Then it is replayed for so

@@ -98,7 +98,19 @@ def heard(sample):
 
 
 subscribers = [session.declare_subscriber(f"{domain}/umbracast/**", heard), session.declare_subscriber(f"{domain}/tf/**", heard)]
+warning = []
+
+
+def warned(sample):
+    message = store.deserialize_cdr(sample.payload.to_bytes(), "umbracast_msgs/msg/Warning")
+    warning[:] = [str(sample.key_expr), message.state, message.p_w9]
+
+
+subscribers.append(session.declare_subscriber("umbracast/*/warnings/*", warned))
 complete = enough.wait(20)
+until = time.monotonic() + 5
+while not warning and time.monotonic() < until:
+    time.sleep(0.05)
 
 # 3. What a driver publishes: a cloud of two points and a scan of two packets.
 header = store.types["std_msgs/msg/Header"](store.types["builtin_interfaces/msg/Time"](1700000000, 100000000), "lidar")
@@ -136,4 +148,4 @@ listed = subprocess.run(
     capture_output=True, text=True, timeout=60, check=True,
 ).stdout.split("\n")
 
-print(json.dumps({"nodes": nodes, "topics": found, "complete": complete, "answered": done.is_set(), "listed": [line for line in listed if line]}))
+print(json.dumps({"nodes": nodes, "topics": found, "complete": complete, "warning": warning, "answered": done.is_set(), "listed": [line for line in listed if line]}))

@@ -13,8 +13,11 @@ use serde_json::Value;
 use umbracast::Config;
 use umbracast::detect::Point;
 use umbracast::geometry::DVec3;
+use umbracast_io::nodes::Warning;
 use umbracast_io::results::Results;
 use umbracast_io::rows::{DetectionRow, LinkRow, TrackRow};
+use umbracast_node::hall::{Hall, Urgency};
+use umbracast_node::keys::Keys;
 use umbracast_node::ros2::{self, Face, Node};
 use zenoh::Wait;
 
@@ -52,6 +55,8 @@ fn clients_of_others_list_decode_and_send() {
     let child = peer.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let Ok(mut child) = child else { return skipped(&python) };
 
+    let hall = Hall::new(session.clone(), Keys::new("lab"));
+    let outlet = hall.outlet(&hall.keys().warnings("side"), Urgency::Warning).unwrap();
     let over = Arc::new(AtomicBool::new(false));
     let publishing = {
         let over = over.clone();
@@ -74,6 +79,13 @@ fn clients_of_others_list_decode_and_send() {
                     foreground: Some(&points),
                 };
                 face.publish(&results).unwrap();
+                let mut warning = Warning {
+                    access_point: "side".to_owned(),
+                    p_w9: 0.75,
+                    state: "warning".to_owned(),
+                    ..Warning::default()
+                };
+                outlet.put(&mut warning);
                 std::thread::sleep(Duration::from_millis(50));
             }
         })
@@ -96,6 +108,7 @@ fn clients_of_others_list_decode_and_send() {
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["nodes"], serde_json::json!(["umbracast", "umbracast_sensor"]));
     assert_eq!((&found["complete"], &found["answered"]), (&true.into(), &true.into()), "{found}");
+    assert_eq!(found["warning"], serde_json::json!(["umbracast/lab/warnings/side", "warning", 0.75]));
     let topics = found["topics"].as_object().unwrap();
     let expected = ["blockages", "detections", "foreground", "markers", "people", "tracks"];
     let mut expected: Vec<String> = expected.iter().map(|name| format!("/umbracast/{name}")).collect();

@@ -15,7 +15,7 @@ pub fn halls(book: &mut Book) -> Result<()> {
     let run = |command: &str, picture: &str| {
         format!(
             "cargo run --release --quiet --package umbracast-node --example halls -- {command} {SECONDS} {picture} \
-             1 2 4 8 16 32 64 96 128"
+             1 2 4 8 16 32 64 96"
         )
     };
     book.command(&run("umbracast", "halls.svg"));
