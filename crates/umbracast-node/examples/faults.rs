@@ -1,0 +1,471 @@
+//! A hall in three network namespaces, as on three hosts: whether its results are those of one process, what the wire
+//! adds, and what happens when something fails. Needs root, `ip` and `python3`:
+//! `faults UMBRACAST SECONDS SECONDS`, with the command built with the feature `node`, the length of the comparison and
+//! that of each failure's run. `short`, behind them: a few failures, and an error where what must happen does not.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use umbracast::Error;
+use umbracast_io::fields;
+use umbracast_io::nodes::Followed;
+use umbracast_io::recording::{Entry, RecordingReader};
+use umbracast_node::hall::Hall;
+use umbracast_node::keys::Keys;
+use umbracast_node::network::Network;
+
+const PLACES: [(&str, &str); 3] = [("edge", "10.77.0.2"), ("server", "10.77.0.3"), ("radio", "10.77.0.4")];
+/// The bad wire's ends.
+const BAD: [(&str, &str); 2] = [("edge", "10.78.0.2"), ("server", "10.78.0.3")];
+const FAILS_AFTER: Duration = Duration::from_secs(6);
+const FAILS_FOR: Duration = Duration::from_secs(5);
+/// A frame every 100 ms: after a longer gap than this something was missing.
+const GAP: Duration = Duration::from_millis(150);
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (command, equal_s, fault_s, short) = match &arguments[..] {
+        [command, equal_s, fault_s] => (command, equal_s, fault_s, false),
+        [command, equal_s, fault_s, short] if short == "short" => (command, equal_s, fault_s, true),
+        _ => return Err("expected UMBRACAST SECONDS SECONDS [short]".into()),
+    };
+    let folder = std::env::temp_dir().join(format!("umbracast-nodes-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    let bench = Bench { command: command.into(), folder, short };
+    bench.lay_wires()?;
+    let outcome = bench.equality(equal_s).and_then(|()| bench.faults(fault_s));
+    bench.take_wires_away();
+    std::fs::remove_dir_all(&bench.folder)?;
+    Ok(outcome?)
+}
+
+struct Bench {
+    command: PathBuf,
+    folder: PathBuf,
+    /// A few failures only, and an error where what must happen does not.
+    short: bool,
+}
+
+/// Ends with its scope.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Running {
+    /// Asks for the end; what it said.
+    fn stop(mut self) -> Result<String, Error> {
+        shell(&format!("kill -TERM {}", self.0.id()))?;
+        let mut said = String::new();
+        if let Some(mut out) = self.0.stdout.take() {
+            out.read_to_string(&mut said).map_err(|e| Error::new(e.to_string()))?;
+        }
+        self.0.wait().map_err(|e| Error::new(e.to_string()))?;
+        Ok(said)
+    }
+}
+
+impl Bench {
+    /// A namespace for each place, on one bridge.
+    fn lay_wires(&self) -> Result<(), Error> {
+        self.take_wires_away();
+        shell(
+            "ip link add umbra0 type bridge && ip address add 10.77.0.1/24 dev umbra0 && ip link set umbra0 up",
+        )?;
+        for (place, address) in PLACES {
+            shell(&format!(
+                "ip netns add {place} && ip link add {place}0 type veth peer name wire0 netns {place} && \
+                 ip link set {place}0 master umbra0 up && ip -n {place} address add {address}/24 dev wire0 && \
+                 ip -n {place} link set wire0 up && ip -n {place} link set lo up"
+            ))?;
+        }
+        Ok(())
+    }
+
+    /// Without a word where there are none.
+    fn take_wires_away(&self) {
+        for (place, _) in PLACES {
+            let _ = shell(&format!("ip netns delete {place} 2>/dev/null"));
+        }
+        let _ = shell("ip link delete umbra0 2>/dev/null");
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.folder.join(name).display().to_string()
+    }
+
+    fn run(&self, words: &str) -> Result<String, Error> {
+        shell(&format!("{} {words}", self.command.display()))
+    }
+
+    /// A node at a place; returns once it is ready.
+    fn node(&self, place: &str, words: &str) -> Result<Running, Error> {
+        let site = self.path("hall.toml");
+        let command = format!(
+            "exec ip netns exec {place} {} node {words} --site {site} --no-serve --json 2>>{}",
+            self.command.display(),
+            self.path("said.txt")
+        );
+        let mut child = Command::new("bash")
+            .args(["-c", &command])
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|e| Error::new(e.to_string()))?;
+        let mut said = BufReader::new(child.stdout.take().ok_or_else(|| Error::new("no pipe"))?);
+        let mut line = String::new();
+        while !line.trim_end().ends_with("ready") {
+            line.clear();
+            if said.read_line(&mut line).map_err(|e| Error::new(e.to_string()))? == 0 {
+                let told = std::fs::read_to_string(self.path("said.txt")).unwrap_or_default();
+                return Err(Error::new(format!("{words}: ended before it was ready: {told}")));
+            }
+        }
+        child.stdout = Some(said.into_inner());
+        Ok(Running(child))
+    }
+
+    /// A recording of so many seconds, the empty hall, and the site file.
+    fn record(&self, name: &str, seconds: &str) -> Result<String, Error> {
+        if !Path::new(&self.path("sim")).exists() {
+            self.run(&format!("simulate --out {} --quiet", self.path("sim")))?;
+            std::fs::write(self.path("hall.toml"), "[network]\nhall = \"lab\"\nanyone = true\n")
+                .map_err(|e| Error::new(e.to_string()))?;
+        }
+        let folder = self.path(name);
+        self.run(&format!(
+            "live --demo --people 10 --seconds {seconds} --no-serve --quiet --json --record {folder} --record-mb 100000"
+        ))?;
+        let entries = std::fs::read_dir(&folder).map_err(|e| Error::new(e.to_string()).within(&folder))?;
+        let file = entries.flatten().next().ok_or_else(|| Error::new("no recording"))?.path();
+        Ok(file.display().to_string())
+    }
+
+    /// Three nodes, one at each place, against one process.
+    fn equality(&self, seconds: &str) -> Result<(), Error> {
+        let recording = self.record("whole", seconds)?;
+        let (empty, one) = (format!("{}/empty.mcap", self.path("sim")), self.path("one"));
+        self.run(&format!("run {recording} --empty {empty} --out {one} --mcap --quiet"))?;
+        let [(_, edge), (_, server), (_, radio)] = PLACES;
+        let track = self.node("server", &format!("track,forecast --listen tcp/{server}:7447"))?;
+        let cast = self.node(
+            "radio",
+            &format!(
+                "cast,record --record {} --listen tcp/{radio}:7447 --connect tcp/{server}:7447",
+                self.path("nodes")
+            ),
+        )?;
+        let begun = clock();
+        let sensor = self.node(
+            "edge",
+            &format!(
+                "sensor --from {recording} --empty {empty} --listen tcp/{edge}:7447 --connect tcp/{server}:7447"
+            ),
+        )?;
+        let mut sensor = sensor;
+        let mut said = String::new();
+        if let Some(mut out) = sensor.0.stdout.take() {
+            out.read_to_string(&mut said).map_err(|e| Error::new(e.to_string()))?;
+        }
+        let took_s = begun.elapsed().as_secs_f64();
+        sleep(Duration::from_secs(2));
+        let summaries = [
+            ("edge: sensor", said),
+            ("server: track,forecast", track.stop()?),
+            ("radio: cast,record", cast.stop()?),
+        ];
+        println!("three namespaces, 10 people, two HDL-32E, {took_s:.0} s");
+        println!(
+            "{:24} {:>7} {:>10} {:>10} {:>13} {:>12} {:>11}",
+            "node", "frames", "messages/s", "kB/s", "latency,ms", "of wire,ms", "99 %, ms"
+        );
+        for (name, said) in &summaries {
+            let json: serde_json::Value =
+                serde_json::from_str(said).map_err(|e| Error::new(format!("{e}: {said}")))?;
+            let number = |key: &str| json[key].as_f64().unwrap_or(f64::NAN);
+            println!(
+                "{name:24} {:7} {:10.1} {:10.1} {:13.3} {:12.3} {:11.3}",
+                number("frames"),
+                number("messages_published") / took_s,
+                number("bytes_published") / took_s * 1e-3,
+                number("latency_ms_median"),
+                number("wire_ms_median"),
+                number("wire_ms_p99")
+            );
+        }
+        let expected = results(&format!("{one}/results-0000.mcap"))?;
+        let found = results(&self.only_file("nodes")?)?;
+        for (topic, messages) in &expected {
+            let nothing = Vec::new();
+            let of_nodes = found.get(topic).unwrap_or(&nothing);
+            let same = messages.iter().zip(of_nodes).filter(|(a, b)| a == b).count();
+            println!(
+                "{topic}: {} messages of one process, {same} the same to the byte from the nodes",
+                messages.len()
+            );
+            if self.short && (same, of_nodes.len()) != (messages.len(), messages.len()) {
+                return Err(Error::new(format!("{topic}: expected the messages of one process")));
+            }
+        }
+        Ok(())
+    }
+
+    fn only_file(&self, name: &str) -> Result<String, Error> {
+        let entries = std::fs::read_dir(self.path(name)).map_err(|e| Error::new(e.to_string()))?;
+        let file = entries.flatten().next().ok_or_else(|| Error::new("no recording"))?.path();
+        Ok(file.display().to_string())
+    }
+
+    fn faults(&self, seconds: &str) -> Result<(), Error> {
+        let recording = self.record("short", seconds)?;
+        println!(
+            "\n{:44} {:40} {:>7} {:>7} {:>9} {:>11} {:>10}",
+            "what failed", "what must happen", "frames", "lost", "gap, ms", "recovers,s", "renumbered"
+        );
+        for fault in FAULTS.iter().filter(|fault| fault.short || !self.short) {
+            let (seen, well) = self.fault(fault, &recording)?;
+            println!("{:44} {:40} {seen}", fault.what, fault.must);
+            if self.short && !well {
+                return Err(Error::new(format!("{}: expected: {}", fault.what, fault.must)));
+            }
+        }
+        println!(
+            "lost: frames without results from the first to the last. Gap: longest time between results. Recovers: from the \
+             end of the failure until frames come again in time with all sensors and as many people as before. Renumbered: \
+             people who have another number than before the failure. Loss and jitter: a relay of IP packets between two \
+             tun devices, as this kernel has no netem; jitter lets packets overtake each other."
+        );
+        Ok(())
+    }
+
+    fn fault(&self, fault: &Fault, recording: &str) -> Result<(String, bool), Error> {
+        let empty = format!("{}/empty.mcap", self.path("sim"));
+        let [(_, edge), (_, server), (_, radio)] = PLACES;
+        let bad = fault.wire.map(|(loss, jitter_ms)| self.bad_wire(loss, jitter_ms)).transpose()?;
+        let of_server = if bad.is_some() { BAD[1].1 } else { server };
+        let listen = if bad.is_some() {
+            format!("--listen tcp/{server}:7447,tcp/{}:7447", BAD[1].1)
+        } else {
+            format!("--listen tcp/{server}:7447")
+        };
+        let track = format!("track {listen}");
+        let second = format!("track --listen tcp/{server}:7448 --connect tcp/{server}:7447,tcp/{radio}:7447");
+        let cast = format!("forecast,cast --listen tcp/{radio}:7447 --connect tcp/{server}:7447");
+        let at_edge = if bad.is_some() { BAD[0].1 } else { edge };
+        let front = |name: &str, port: u16, listens: u16| {
+            format!(
+                "sensor --sensors {name} --port {port} --empty {empty} --listen tcp/{at_edge}:{listens} \
+                 --connect tcp/{of_server}:7447,tcp/{of_server}:7448"
+            )
+        };
+        let mut nodes = BTreeMap::new();
+        let mut start = |name: &'static str, place: &str, words: &str| -> Result<(), Error> {
+            nodes.insert(name, self.node(place, words)?);
+            Ok(())
+        };
+        start("cast", "radio", &cast)?;
+        start("track", "server", &track)?;
+        if fault.doubled {
+            start("second", "server", &second)?;
+        }
+        start("east", "edge", &front("lidar_east", 2368, 7447))?;
+        start("west", "edge", &front("lidar_west", 2369, 7448))?;
+        let watch = Arc::<Mutex<Vec<Seen>>>::default();
+        let _looking = look(&watch, &[format!("tcp/{radio}:7447"), format!("tcp/{server}:7447")])?;
+        sleep(Duration::from_secs(1));
+        let replay = format!(
+            "exec ip netns exec edge {} replay {recording} --to 127.0.0.1:2368 --quiet",
+            self.command.display()
+        );
+        let mut replay = Running(
+            Command::new("bash")
+                .args(["-c", &replay])
+                .stdout(Stdio::null())
+                .spawn()
+                .map_err(|e| Error::new(e.to_string()))?,
+        );
+        sleep(FAILS_AFTER);
+        let failed = clock();
+        let restored = match fault.kind {
+            Kind::Nothing => failed,
+            Kind::Cut => {
+                shell("ip -n edge link set wire0 down")?;
+                sleep(FAILS_FOR);
+                shell("ip -n edge link set wire0 up")?;
+                clock()
+            }
+            Kind::Killed(name) => {
+                nodes.remove(name);
+                if fault.doubled {
+                    failed
+                } else {
+                    sleep(Duration::from_secs(1));
+                    let again = clock();
+                    let (place, words) = match name {
+                        "cast" => ("radio", cast.clone()),
+                        "track" => ("server", track.clone()),
+                        _ => ("edge", front("lidar_east", 2368, 7447)),
+                    };
+                    nodes.insert(name, self.node(place, &words)?);
+                    again
+                }
+            }
+        };
+        replay.0.wait().map_err(|e| Error::new(e.to_string()))?;
+        sleep(Duration::from_secs(1));
+        let seen = std::mem::take(&mut *watch.lock().unwrap_or_else(PoisonError::into_inner));
+        Ok(account(seen, failed, restored, fault.doubled))
+    }
+
+    /// In place of the wire between edge and server.
+    fn bad_wire(&self, loss: f64, jitter_ms: f64) -> Result<BadWire, Error> {
+        let [(a, at_a), (b, at_b)] = BAD;
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/wire.py");
+        let mut child = Command::new("python3")
+            .arg(script)
+            .args([a, at_a, b, at_b, &loss.to_string(), &jitter_ms.to_string()])
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|e| Error::new(format!("python3: {e}")))?;
+        let mut line = String::new();
+        let said = child.stdout.take().ok_or_else(|| Error::new("no pipe"))?;
+        BufReader::new(said).read_line(&mut line).map_err(|e| Error::new(e.to_string()))?;
+        if line.trim() != "ready" {
+            return Err(Error::new("wire.py: ended before it was ready"));
+        }
+        shell("ip -n edge link set wire0 down")?;
+        Ok(BadWire(Running(child)))
+    }
+}
+
+/// The good wire comes back with its end.
+struct BadWire(#[expect(dead_code, reason = "it ends with its scope")] Running);
+
+impl Drop for BadWire {
+    fn drop(&mut self) {
+        let _ = shell("ip -n edge link set wire0 up");
+    }
+}
+
+struct Fault {
+    what: &'static str,
+    must: &'static str,
+    kind: Kind,
+    /// Share of packets lost, and by how much they are late at most, ms, all the time.
+    wire: Option<(f64, f64)>,
+    /// Whether a second tracker stands by.
+    doubled: bool,
+    /// Whether it is among the few.
+    short: bool,
+}
+
+enum Kind {
+    Nothing,
+    Cut,
+    Killed(&'static str),
+}
+
+const fn fault(what: &'static str, must: &'static str, kind: Kind) -> Fault {
+    Fault { what, must, kind, wire: None, doubled: false, short: false }
+}
+
+#[rustfmt::skip]
+const FAULTS: &[Fault] = &[
+    fault("nothing", "nothing", Kind::Nothing),
+    fault("the front ends' wire cut for 5 s", "goes on by itself", Kind::Cut),
+    Fault { wire: Some((0.01, 0.0)), ..fault("1 % of packets lost, all the time", "nothing", Kind::Nothing) },
+    Fault { wire: Some((0.1, 0.0)), ..fault("10 % of packets lost, all the time", "late frames, counted", Kind::Nothing) },
+    Fault { wire: Some((0.0, 100.0)), ..fault("0 to 100 ms of jitter, all the time", "late frames, counted", Kind::Nothing) },
+    fault("a front end killed, back after 1 s", "people are followed with the other one", Kind::Killed("east")),
+    Fault { short: true, ..fault("the tracker killed, back after 1 s", "everybody has the same number", Kind::Killed("track")) },
+    fault("forecast and cast killed, back after 1 s", "goes on by itself", Kind::Killed("cast")),
+    Fault { short: true, doubled: true, ..fault("the tracker that leads killed, another by", "no frame lost", Kind::Killed("track")) },
+];
+
+/// A frame's results as they came.
+struct Seen {
+    at: Instant,
+    time_ns: i64,
+    sensors: usize,
+    people: BTreeSet<u64>,
+}
+
+/// Looks at the frames that stage 2 publishes, from outside of the three places.
+fn look(watch: &Arc<Mutex<Vec<Seen>>>, connect: &[String]) -> Result<impl Sized + use<>, Error> {
+    let network = Network { connect: connect.to_vec(), ..Network::default() };
+    let hall = Hall::new(network.open()?, Keys::new("lab"));
+    let seen = watch.clone();
+    let heard = hall.hear(&hall.keys().of("tracks"), move |_, bytes| {
+        let Some(followed) = fields::decode::<Followed>(&bytes.to_bytes()) else { return };
+        let confirmed = followed.tracks.iter().filter(|track| track.confirmed);
+        seen.lock().unwrap_or_else(PoisonError::into_inner).push(Seen {
+            at: clock(),
+            time_ns: followed.time_ns,
+            sensors: followed.sensors.len(),
+            people: confirmed.map(|track| track.id).collect(),
+        });
+    })?;
+    Ok((hall, heard))
+}
+
+#[expect(clippy::disallowed_methods, reason = "what is measured is time")]
+fn clock() -> Instant {
+    Instant::now()
+}
+
+/// A row of the table, and whether all was well in the end: everybody has the same number, and nothing was lost where
+/// nothing may be.
+fn account(seen: Vec<Seen>, failed: Instant, restored: Instant, none_lost: bool) -> (String, bool) {
+    let times: BTreeSet<i64> = seen.iter().map(|frame| frame.time_ns).collect();
+    let (Some(first), Some(last)) = (times.first(), times.last()) else {
+        return ("no frame came".to_owned(), false);
+    };
+    let all = (last - first) / umbracast::STEP_NS + 1;
+    let gap = seen.windows(2).map(|pair| pair[1].at - pair[0].at).max().unwrap_or_default();
+    let before: Vec<&Seen> = seen.iter().filter(|frame| frame.at < failed).collect();
+    let known: BTreeSet<u64> = before.iter().flat_map(|frame| frame.people.iter().copied()).collect();
+    let followed = before.last().map_or(0, |frame| frame.people.len());
+    let in_time = |pair: &[Seen]| pair[1].at - pair[0].at < GAP;
+    let well = |frame: &Seen| frame.sensors == 2 && frame.people.len() + 1 > followed;
+    let recovered = seen.windows(2).find(|pair| pair[1].at > restored && in_time(pair) && well(&pair[1]));
+    let recovers =
+        recovered.map_or("never".to_owned(), |pair| format!("{:.2}", (pair[1].at - restored).as_secs_f64()));
+    let renumbered = seen.last().map_or(0, |frame| frame.people.difference(&known).count());
+    let lost = all - times.len() as i64;
+    let (frames, gap_ms) = (times.len(), gap.as_secs_f64() * 1e3);
+    let row = format!("{frames:7} {lost:7} {gap_ms:9.0} {recovers:>11} {renumbered:10}");
+    (row, recovered.is_some() && renumbered == 0 && (!none_lost || lost == 0))
+}
+
+/// The results of a recording by topic.
+fn results(file: &str) -> Result<BTreeMap<String, Vec<Vec<u8>>>, Error> {
+    let mut reader = RecordingReader::open(Path::new(file))?;
+    let mut messages = BTreeMap::<_, Vec<_>>::new();
+    while let Some(entry) = reader.next_entry()? {
+        if let Entry::Other(topic, _, message) = entry
+            && topic.starts_with("/umbracast/")
+            && topic != "/umbracast/config"
+        {
+            messages.entry(topic).or_default().push(message);
+        }
+    }
+    Ok(messages)
+}
+
+fn shell(line: &str) -> Result<String, Error> {
+    let done = Command::new("bash").args(["-c", line]).output().map_err(|e| Error::new(e.to_string()))?;
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    // Code 3: done, but data was lost; what was lost stands in the table.
+    match done.status.code() {
+        Some(0 | 3) => Ok(text(&done.stdout)),
+        _ => Err(Error::new(format!("{line}: {}{}", text(&done.stdout), text(&done.stderr)))),
+    }
+}
