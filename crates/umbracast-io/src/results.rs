@@ -27,19 +27,22 @@ pub struct Results<'a> {
     pub foreground: Option<&'a [Point]>,
 }
 
+/// What gives a message's type, for who needs it.
+pub type SchemaOf = fn() -> Schema;
+
 /// A message with the topic it goes to.
 #[derive(Debug, Clone)]
 pub struct Message {
     /// As ROS 2 names it.
     pub topic: &'static str,
     /// Its type.
-    pub schema: fn() -> Schema,
+    pub schema: SchemaOf,
     /// Its CDR.
     pub bytes: Vec<u8>,
 }
 
 /// The topics of [`Results::messages`] that every frame has, with their types.
-pub const TOPICS: [(&str, fn() -> Schema); 6] = [
+pub const TOPICS: [(&str, SchemaOf); 6] = [
     (DetectionRow::TOPIC, wire::schema::<DetectionRow>),
     (TrackRow::TOPIC, wire::schema::<TrackRow>),
     (LinkRow::TOPIC, wire::schema::<LinkRow>),

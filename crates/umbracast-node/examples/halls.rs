@@ -120,7 +120,7 @@ fn city(rows: &[Row]) {
     );
     println!("what                                    a hall   a region of {REGION}   a city of {CITY}");
     let line = |what: &str, of_hall: f64| {
-        println!("{what:34} {of_hall:11.3} {:17.1} {:17.0}", of_hall * REGION as f64, of_hall * CITY as f64);
+        println!("{what:38}{of_hall:8.3} {:17.1} {:17.0}", of_hall * REGION as f64, of_hall * CITY as f64);
     };
     line("hosts of this kind for its stages", 1.0 / halls);
     line("foreground, MB a second", row.in_mb_per_s / halls);

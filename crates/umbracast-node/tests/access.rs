@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
+use umbracast_live::HostClock;
 use umbracast_node::network::{Network, Tls};
 use zenoh::{Session, Wait};
 
@@ -67,8 +68,9 @@ fn listen(session: &Session, key: &str) -> Receiver<String> {
 
 /// Sends until it comes, or for so long as nothing must come.
 fn comes(from: &Session, key: &str, to: &Receiver<String>, within: Duration) -> bool {
-    let until = std::time::Instant::now() + within;
-    while std::time::Instant::now() < until {
+    let clock = HostClock::start();
+    let until_ns = clock.now_ns() + within.as_nanos() as i64;
+    while clock.now_ns() < until_ns {
         from.put(key.to_owned(), "word").wait().unwrap();
         if to.recv_timeout(Duration::from_millis(50)).is_ok_and(|came| came == key) {
             return true;
