@@ -199,7 +199,7 @@ mod tests {
         assert_eq!((kind >> 4, &hello[2..6]), (1, &b"MQTT"[..]));
         assert!(hello.windows(7).any(|word| word == b"offline"), "the last will");
         stream.write_all(&[0x20, 2, 0, 0]).unwrap();
-        let mut said = vec![publication(&mut stream), publication(&mut stream)];
+        let mut said = [publication(&mut stream), publication(&mut stream)];
         said.sort();
         assert_eq!(said[0], ("umbracast/lab/status".to_owned(), "online".to_owned()));
         assert_eq!(said[1].0, "umbracast/lab/warnings/door_a");
