@@ -9,11 +9,11 @@ use umbracast_io::trajectories::Unit;
 use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::Preset;
 
-#[cfg(feature = "node")]
-mod fleet;
 mod live;
 #[cfg(feature = "node")]
 mod node;
+#[cfg(feature = "node")]
+mod fleet;
 
 #[cfg(feature = "node")]
 pub use fleet::Fleet;
