@@ -181,3 +181,22 @@ fn arms_that_swing_make_a_walker_seen_from_the_side_block_sooner() {
     assert!(some > 0.3 * swinging && some < 0.7 * swinging, "{some} of {swinging}");
     assert_eq!(standing, 0.0);
 }
+
+#[test]
+fn a_crowd_sheds_samples_says_so_and_hardly_changes_what_it_tells() {
+    let config = Config::default();
+    let place = |id: u64| DVec2::from_angle(2.4 * id as f64) * (0.9 * (id as f64).sqrt());
+    let velocity = |id: u64| DVec2::from_angle(1.7 * id as f64) * 1.2;
+    let everybody = || (0..100).map(|id| person(id, place(id), velocity(id), [0.01, 0.01, 0.04, 0.04]));
+    let (tracks, forecasts): (Vec<Track>, Vec<Forecast>) = everybody().unzip();
+    let mut caster = Caster::new(&config.blockage, &config.site);
+    let (mut all, mut fewer) = (Vec::new(), Vec::new());
+    caster.cast(&tracks, &forecasts, &mut all);
+    assert!(!caster.took_fewer_samples(), "nobody was there before");
+    caster.cast(&tracks, &forecasts, &mut fewer);
+    assert!(caster.took_fewer_samples());
+    let off: Vec<f64> = all.iter().zip(&fewer).map(|(a, b)| (a.p[2] - b.p[2]).abs()).collect();
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    // One sigma of a single one is 0.09 at most.
+    assert!(mean > 0.0 && mean < 0.03, "{mean}");
+}

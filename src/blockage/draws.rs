@@ -25,15 +25,27 @@ pub(super) struct Draws {
 
 impl Draws {
     /// Those of a track: by seed and id alone.
-    pub(super) fn new(samples: usize, seed: u64, track: u64) -> Self {
+    pub(super) fn new(quantiles: &Quantiles, seed: u64, track: u64) -> Self {
         let mut random = Pcg64Mcg::seed_from_u64(seed ^ track.wrapping_mul(0x9E37_79B9_7F4A_7C15));
-        let (even, normal) = (even(samples), normal(samples));
-        let mut normal = || shuffled(&normal, 0.0, &mut random);
+        let mut normal = || shuffled(&quantiles.normal, 0.0, &mut random);
         let state = std::array::from_fn(|_| normal());
         let process_noise = std::array::from_fn(|_| std::array::from_fn(|_| normal()));
         let (height, width, heading) = (normal(), normal(), normal());
-        let mut even = || shuffled(&even, 0.5, &mut random);
+        let mut even = || shuffled(&quantiles.even, 0.5, &mut random);
         Self { state, process_noise, height, width, heading, phase: even(), arm_swing: even() }
+    }
+}
+
+/// What each of so many samples has of a distribution.
+#[derive(Debug, Clone)]
+pub(super) struct Quantiles {
+    even: Vec<f32>,
+    normal: Vec<f32>,
+}
+
+impl Quantiles {
+    pub(super) fn new(samples: usize) -> Self {
+        Self { even: even(samples), normal: normal(samples) }
     }
 }
 
@@ -82,7 +94,7 @@ mod tests {
 
     #[test]
     fn every_coordinate_has_each_quantile_once_in_an_order_of_its_own() {
-        let draws = Draws::new(64, 1, 7);
+        let draws = Draws::new(&Quantiles::new(64), 1, 7);
         let sorted = |values: &[f32]| {
             let mut values = values.to_vec();
             values.sort_by(f32::total_cmp);
@@ -90,7 +102,7 @@ mod tests {
         };
         assert_eq!(sorted(&draws.state[0]), sorted(&draws.process_noise[8][1]));
         assert_ne!(draws.state[0], draws.state[1]);
-        assert_ne!(draws.state[0], Draws::new(64, 1, 8).state[0]);
-        assert_eq!(draws.phase, Draws::new(64, 1, 7).phase);
+        assert_ne!(draws.state[0], Draws::new(&Quantiles::new(64), 1, 8).state[0]);
+        assert_eq!(draws.phase, Draws::new(&Quantiles::new(64), 1, 7).phase);
     }
 }

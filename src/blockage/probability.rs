@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::crossing::{Crossing, Part};
-use super::draws::Draws;
+use super::draws::{Draws, Quantiles};
 use super::figure::Figure;
 use super::lanes::WORD;
 use super::numbers::Numbers;
@@ -25,9 +25,9 @@ use crate::{STEP_S, STEPS};
 const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 
 /// Most body-ray tests of a frame: everybody who may stand in the way of somebody at a step, times samples. So many take
-/// some 10 ms of one core (`bench/src/bin/growth.rs`): a hundred people in 500 m^2 with two access points ask for more, forty
-/// only where they all meet.
-const TESTS_MAX: usize = 1 << 20;
+/// some 3 ms of one core (`bench/src/bin/growth.rs`): forty people who all meet in 500 m^2 ask for more with two access points,
+/// a hundred always.
+const TESTS_MAX: usize = 1 << 18;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
 const SAMPLES_MIN: usize = WORD;
 
@@ -54,11 +54,14 @@ pub struct Sampler {
     figure: Figure,
     /// By track: what a person's samples are made of, drawn once.
     draws: BTreeMap<u64, Draws>,
+    quantiles: Quantiles,
     people: Vec<Trajectories>,
     /// How many of `people` are in the frame.
     present: usize,
-    /// How many of their samples are asked.
+    /// How many samples each of them has.
     samples: usize,
+    /// How many the last frame would have left time for.
+    affordable: usize,
     shadows: Shadows,
     /// Of all links, access points first: who may stand in the way of each, and where each link's end.
     meetings: Vec<Meeting>,
@@ -98,9 +101,11 @@ impl Sampler {
         Self {
             figure: Figure::new(&numbers.body),
             draws: BTreeMap::new(),
+            quantiles: Quantiles::new(numbers.samples),
             people: Vec::new(),
             present: 0,
             samples: numbers.samples,
+            affordable: numbers.samples,
             shadows: Shadows::default(),
             meetings: Vec::new(),
             ends: Vec::new(),
@@ -150,6 +155,9 @@ impl Sampler {
         people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
     ) {
         self.draws.retain(|&id, _| people.clone().any(|(track, _)| track.id == id));
+        // Where there is more to ask than time allows, samples are left out, for all links alike; what is left is a sample of
+        // the same distribution, for draws are in no order. A frame has about as much to ask as the one before.
+        self.samples = numbers.samples.min(self.affordable);
         self.present = 0;
         for (track, forecast) in people {
             if self.people.len() == self.present {
@@ -158,8 +166,8 @@ impl Sampler {
             let draws = self
                 .draws
                 .entry(track.id)
-                .or_insert_with(|| Draws::new(numbers.samples, numbers.seed, track.id));
-            self.people[self.present].fill(numbers, &self.figure, draws, track, forecast);
+                .or_insert_with(|| Draws::new(&self.quantiles, numbers.seed, track.id));
+            self.people[self.present].fill(numbers, &self.figure, draws, self.samples, track, forecast);
             self.present += 1;
         }
         self.meetings.clear();
@@ -172,13 +180,10 @@ impl Sampler {
                 self.ends.push(self.meetings.len());
             }
         }
-        // Where there is more to ask than time allows, samples are left out, for all links alike; what is left is a sample of
-        // the same distribution, for draws are in no order.
-        let affordable = (TESTS_MAX / self.meetings.len().max(1)).max(SAMPLES_MIN) / WORD * WORD;
-        self.samples = numbers.samples.min(affordable);
+        self.affordable = (TESTS_MAX / self.meetings.len().max(1)).max(SAMPLES_MIN) / WORD * WORD;
     }
 
-    /// Whether there were more meetings than could be asked with all samples.
+    /// Whether the frame before had more meetings than could be asked with all samples.
     pub fn takes_fewer(&self, numbers: &Numbers) -> bool {
         self.samples < numbers.samples
     }
@@ -248,14 +253,18 @@ impl Sampler {
         let of_step = self.meetings[rest.clone()].iter().take_while(|m| m.step as usize == step).count();
         let meetings = rest.start..rest.start + of_step;
         self.link.blocked[words.clone()].fill(0);
-        if !meetings.is_empty() {
+        let blocked_now = counts.blocked_now;
+        if !meetings.is_empty() && self.link.is_open(words.clone(), step, blocked_now) {
             if !aim.ue.is_on_axis() {
                 self.people[aim.person].walk(&self.figure, &self.draws);
             }
             self.rays.aim(aim.ap_m, aim.ue, &self.people[aim.person], step, words.clone());
-        }
-        for m in meetings.clone() {
-            self.mark(m, step, words.clone(), counts.blocked_now);
+            for m in meetings.clone() {
+                self.mark(m, step, words.clone(), blocked_now);
+                if !self.link.is_open(words.clone(), step, blocked_now) {
+                    break;
+                }
+            }
         }
         self.link.count(step, self.samples, words, counts);
         meetings.end..rest.end
@@ -311,6 +320,11 @@ impl Link {
             (_, false) => !met | (!now & !over),
         };
         matters & !self.blocked[word]
+    }
+
+    #[inline(always)]
+    fn is_open(&self, mut words: Range<usize>, step: usize, blocked_now: bool) -> bool {
+        words.any(|word| self.open(word, step, blocked_now) != 0)
     }
 
     /// Takes what a step has shown.

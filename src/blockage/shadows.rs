@@ -7,7 +7,6 @@
 use std::f64::consts::{PI, TAU};
 
 use super::figure::{Band, Figure};
-use super::spread::Spread;
 use super::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
@@ -130,124 +129,133 @@ impl Shadows {
                 }
             }
         }
-        let second = Bundle::of_second(self.ap_m, q, self.ue_reach_m);
-        self.candidates.retain(|&other| {
-            let p = &people[other as usize];
-            let radius_m = p.second.radius_m;
-            let around = Around { center_m: p.second.center_m, reach_m: p.reach_m + radius_m, spread: None };
-            other as usize != person && second.share(&around).is_some()
-        });
         let rises_m = q.heights_m.map(|height_m| self.ue_height_share * height_m - self.ap_m.z);
+        let second = Bundle::of_second(self.ap_m, q, self.ue_reach_m);
+        // Whom all rays of the second pass above is in nobody's way at any step.
+        let mut candidates = std::mem::take(&mut self.candidates);
+        candidates.retain(|&other| {
+            let p = &people[other as usize];
+            let seen = second.seen(p.second.center_m);
+            let share = second.share(&seen, p.reach_m, [p.second.radius_m; 4]);
+            other as usize != person && share.and_then(|share| self.band(rises_m, share, p)).is_some()
+        });
         for step in 0..MOMENTS {
             let first = meetings.len();
             let bundle = Bundle::of_step(self.ap_m, q, step, self.ue_reach_m);
-            for &other in &self.candidates {
+            for &other in &candidates {
                 let p = &people[other as usize];
-                let around =
-                    |reach_m| Around { center_m: p.mean_m[step], reach_m, spread: Some(&p.spread[step]) };
-                let whole = bundle.share(&around(p.reach_m)).and_then(|share| self.band(rises_m, share, p));
-                let Some(band) = whole else { continue };
+                let (seen, spread) = (bundle.seen(p.mean_m[step]), &p.spread[step]);
+                if bundle.is_aside(&seen, p.reach_m + spread.radius_m) {
+                    continue;
+                }
+                let spreads_m = bundle.sides.map(|side| spread.along_m(side));
+                let of = |reach_m: f64| {
+                    bundle.share(&seen, reach_m, spreads_m).and_then(|share| self.band(rises_m, share, p))
+                };
+                let Some(band) = of(p.reach_m) else { continue };
                 // What is within those heights does not reach as far, so they are fewer still.
                 let reach_m = p.reach_of_m[figure.plan_of(band)];
-                let part = bundle.share(&around(reach_m)).and_then(|share| self.band(rises_m, share, p));
-                let Some(band) = part else { continue };
-                let off_m = bundle.off_m(p.mean_m[step]).abs() as f32;
+                let Some(band) = of(reach_m) else { continue };
+                let off_m = seen.off_m.abs() as f32;
                 let (plan, reach_m) = (figure.plan_of(band) as u32, (reach_m + ROOM) as f32);
                 let holds = figure.holds(band);
                 meetings.push(Meeting { other, step: step as u32, band, holds, plan, reach_m, off_m });
             }
             // Who stands nearest to the line blocks most, and what is blocked is not asked again.
-            meetings[first..]
-                .sort_unstable_by(|a, b| a.off_m.total_cmp(&b.off_m).then(a.other.cmp(&b.other)));
+            meetings[first..].sort_unstable_by_key(Meeting::rank);
         }
+        self.candidates = candidates;
     }
 
     /// The heights at which rays may meet the body of `p` between two shares of their length; `None` where they pass above
-    /// it. `rises_m` are those of the least and the most of the rays over their whole length.
+    /// it. `rises_m` are the least and the most of the rays over their whole length.
     #[inline(always)]
-    fn band(&self, rises_m: [f64; 2], (near, far): (f64, f64), p: &Trajectories) -> Option<Band> {
-        let [of_least, of_most] = rises_m.map(|rise_m| [near * rise_m, far * rise_m]);
-        let low_m = self.ap_m.z + of_least[0].min(of_least[1]).min(of_most[0]).min(of_most[1]);
-        let high_m = self.ap_m.z + of_least[0].max(of_least[1]).max(of_most[0]).max(of_most[1]);
-        let [short, tall] = p.heights_m;
-        let per =
-            |height_m: f64, [tall, short]: [f64; 2]| height_m / if height_m > 0.0 { tall } else { short };
-        let band = Band { low: per(low_m, [tall, short]) - ROOM, high: per(high_m, [short, tall]) + ROOM };
-        (band.low <= 1.0).then_some(band)
+    fn band(&self, [least_m, most_m]: [f64; 2], (near, far): (f64, f64), p: &Trajectories) -> Option<Band> {
+        let low_m = self.ap_m.z + least_m * if least_m < 0.0 { far } else { near };
+        let high_m = self.ap_m.z + most_m * if most_m > 0.0 { far } else { near };
+        let [per_short, per_tall] = p.per_height;
+        let low = low_m * if low_m > 0.0 { per_tall } else { per_short } - ROOM;
+        let high = high_m * if high_m > 0.0 { per_short } else { per_tall } + ROOM;
+        (low <= 1.0).then_some(Band { low, high })
+    }
+}
+
+impl Meeting {
+    /// Nearest to the middle ray first, then in order of people: distances are not negative, so their bits are in order.
+    #[inline(always)]
+    fn rank(&self) -> u64 {
+        u64::from(self.off_m.to_bits()) << 32 | u64::from(self.other)
     }
 }
 
 /// All rays from an access point to the samples of a person, in plan view.
 struct Bundle {
     start_m: DVec2,
-    /// Unit vector along their middle, and its length.
-    along: DVec2,
+    /// Unit vectors along their middle, back, to the left and to the right; and how long the middle is.
+    sides: [DVec2; 4],
     length_m: f64,
-    /// How far the rays' ends lie from the middle's: ahead, back, to the left and to the right.
+    /// Shares of the shortest and of the longest of them in a metre.
+    per_m: [f64; 2],
+    /// How far the rays' ends lie from the middle's, to each side.
     ends_m: [f64; 4],
 }
 
-/// Where bodies may be.
-struct Around<'a> {
-    center_m: DVec2,
-    reach_m: f64,
-    /// How far they spread besides.
-    spread: Option<&'a Spread>,
+/// Where the middle of somebody's samples is: along a bundle's middle, and to the left of it.
+struct Seen {
+    way_m: f64,
+    off_m: f64,
 }
 
 impl Bundle {
     fn of_second(ap_m: DVec3, q: &Trajectories, ue_reach_m: f64) -> Self {
-        let (along, length_m) = Self::middle(ap_m, q.second.center_m);
-        Self { start_m: ap_m.truncate(), along, length_m, ends_m: [q.second.radius_m + ue_reach_m; 4] }
+        Self::new(ap_m, q.second.center_m, |_| q.second.radius_m + ue_reach_m)
     }
 
     #[inline(always)]
     fn of_step(ap_m: DVec3, q: &Trajectories, step: usize, ue_reach_m: f64) -> Self {
-        let (along, length_m) = Self::middle(ap_m, q.mean_m[step]);
-        let ends_m = sides(along).map(|side| q.spread[step].along_m(side) + ue_reach_m);
-        Self { start_m: ap_m.truncate(), along, length_m, ends_m }
+        Self::new(ap_m, q.mean_m[step], |side| q.spread[step].along_m(side) + ue_reach_m)
     }
 
-    fn middle(ap_m: DVec3, end_m: DVec2) -> (DVec2, f64) {
+    #[inline(always)]
+    fn new(ap_m: DVec3, end_m: DVec2, reach_m: impl Fn(DVec2) -> f64) -> Self {
         let way_m = end_m - ap_m.truncate();
-        (way_m.normalize_or(DVec2::X), way_m.length())
+        let along = way_m.normalize_or(DVec2::X);
+        let sides = [along, -along, along.perp(), -along.perp()];
+        let (length_m, ends_m) = (way_m.length(), sides.map(reach_m));
+        let per_m = [length_m - ends_m[1], length_m + ends_m[0]].map(|length_m| 1.0 / length_m);
+        Self { start_m: ap_m.truncate(), sides, length_m, per_m, ends_m }
     }
 
-    /// How far to the left of the middle a place is.
     #[inline(always)]
-    fn off_m(&self, place_m: DVec2) -> f64 {
-        self.along.perp_dot(place_m - self.start_m)
+    fn seen(&self, place_m: DVec2) -> Seen {
+        let (along, from_start_m) = (self.sides[0], place_m - self.start_m);
+        Seen { way_m: along.dot(from_start_m), off_m: along.perp_dot(from_start_m) }
     }
 
-    /// Between which shares of their length rays may meet what is around a place; `None` where none can. A ray that
-    /// does comes as near as the reach, along the middle and across it.
+    /// True where no ray can come as near as this.
     #[inline(always)]
-    fn share(&self, around: &Around) -> Option<(f64, f64)> {
-        let reach_m = around.reach_m + ROOM;
-        let off_m = self.off_m(around.center_m);
-        let [fore, back, left, right] = self.ends_m;
-        if off_m.abs() > reach_m + around.spread.map_or(0.0, |spread| spread.radius_m) + left.max(right) {
-            return None;
-        }
-        let spread_m = |side: DVec2| reach_m + around.spread.map_or(0.0, |spread| spread.along_m(side));
-        let way_m = self.along.dot(around.center_m - self.start_m);
-        let last_m = way_m + spread_m(self.along);
+    fn is_aside(&self, seen: &Seen, reach_m: f64) -> bool {
+        let [_, _, left, right] = self.ends_m;
+        seen.off_m.abs() > reach_m + ROOM + left.max(right)
+    }
+
+    /// Between which shares of their length rays may meet what reaches so far round samples that spread so far to each side;
+    /// `None` where none can. A ray that does comes as near as the reach, along the middle and across it.
+    #[inline(always)]
+    fn share(&self, seen: &Seen, reach_m: f64, spreads_m: [f64; 4]) -> Option<(f64, f64)> {
+        let [_, back, left, right] = self.ends_m;
+        let [to_fore, to_back, to_left, to_right] = spreads_m.map(|spread_m| reach_m + ROOM + spread_m);
+        let last_m = seen.way_m + to_fore;
         if last_m < 0.0 {
             return None;
         }
-        let far = if last_m < self.length_m - back { last_m / (self.length_m - back) } else { 1.0 };
-        let across = self.along.perp();
-        if off_m - spread_m(-across) > far * left || off_m + spread_m(across) < -far * right {
+        let far = if last_m < self.length_m - back { last_m * self.per_m[0] } else { 1.0 };
+        if seen.off_m - to_right > far * left || seen.off_m + to_left < -far * right {
             return None;
         }
-        let near = ((way_m - spread_m(-self.along)) / (self.length_m + fore)).max(0.0);
+        let near = ((seen.way_m - to_back) * self.per_m[1]).max(0.0);
         (near <= 1.0).then_some((near, far))
     }
-}
-
-/// Ahead, back, to the left and to the right.
-fn sides(along: DVec2) -> [DVec2; 4] {
-    [along, -along, along.perp(), -along.perp()]
 }
 
 fn wider(disc: Disc, by_m: f64) -> Disc {

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use super::body;
 use super::draws::Draws;
 use super::figure::Figure;
-use super::lanes::{cos_sin, larger, smaller};
+use super::lanes::{WORD, cos_sin, larger, smaller};
 use super::numbers::Numbers;
 use super::phases::Phases;
 use super::spread::Spread;
@@ -49,6 +49,8 @@ pub(super) struct Trajectories {
     pub(super) second: Disc,
     /// The least and the most of all samples.
     pub(super) heights_m: [f64; 2],
+    /// One over both.
+    pub(super) per_height: [f64; 2],
     /// No part of a sample's body is farther from its position; the same of what each plan holds.
     pub(super) reach_m: f64,
     pub(super) reach_of_m: Vec<f64>,
@@ -87,17 +89,18 @@ pub(super) struct Gait {
 }
 
 impl Trajectories {
-    /// Draws all samples of a track.
+    /// Draws so many samples of a track, up to whole words.
     #[inline(always)]
     pub(super) fn fill(
         &mut self,
         numbers: &Numbers,
         figure: &Figure,
         draws: &Draws,
+        samples: usize,
         track: &Track,
         forecast: &Forecast,
     ) {
-        self.samples = draws.height.len();
+        self.samples = samples.next_multiple_of(WORD);
         self.asked = numbers.samples;
         self.track = track.id;
         self.phase = Some(track.gait);
@@ -125,7 +128,7 @@ impl Trajectories {
         let z = &draws.state;
         for (r, (state, row)) in self.state.iter_mut().zip(root).enumerate() {
             let row = row.map(|x| x as f32);
-            renew(state, z[0].iter().map(|z| row[0] * z));
+            renew(state, z[0][..self.samples].iter().map(|z| row[0] * z));
             for (weight, z) in row[1..=r].iter().zip(&z[1..]) {
                 state.iter_mut().zip(z).for_each(|(state, z)| *state += weight * z);
             }
@@ -179,10 +182,13 @@ impl Trajectories {
         // Who walks faces where he goes: an error of the velocity is one of the heading.
         let per2 = if walks { 1.0 / velocity.length_squared() as f32 } else { 0.0 };
         let drifts = || self.state[2].iter().zip(&self.state[3]);
-        renew(&mut self.height_m, draws.height.iter().map(|z| larger(height_m + height_sigma_m * z, 0.5)));
+        renew(
+            &mut self.height_m,
+            draws.height[..self.samples].iter().map(|z| larger(height_m + height_sigma_m * z, 0.5)),
+        );
         renew(
             &mut self.width_scale,
-            draws.width.iter().map(|z| smaller(larger(width + width_sigma * z, 0.5), 1.8)),
+            draws.width[..self.samples].iter().map(|z| smaller(larger(width + width_sigma * z, 0.5), 1.8)),
         );
         renew(&mut self.speed_mps, drifts().map(|(x, y)| ((vx + x) * (vx + x) + (vy + y) * (vy + y)).sqrt()));
         renew(
@@ -197,6 +203,7 @@ impl Trajectories {
         let largest = |values: &[f32]| values.iter().fold(0.0_f32, |a, b| larger(a, *b));
         let least_m = self.height_m.iter().fold(f32::MAX, |a, b| smaller(a, *b));
         self.heights_m = [least_m, largest(&self.height_m)].map(f64::from);
+        self.per_height = self.heights_m.map(|height_m| 1.0 / height_m);
         let (height_m, width) = (self.heights_m[1], f64::from(largest(&self.width_scale)).max(1.0));
         let fastest_hz = body::relative_speed_hz(f64::from(largest(&self.speed_mps)), height_m);
         self.reach_of_m.clear();

@@ -201,9 +201,16 @@ fn are_expected_apart(a_m: DVec2, b_m: DVec2, priors: &[Prior]) -> bool {
 
 /// Where confirmed people are expected within the cluster.
 fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> Vec<DVec2> {
+    let of = || cluster.iter().map(|&i| moved_m[i as usize].truncate());
+    let bounds_m = |(least, most): (DVec2, DVec2), p: DVec2| (least.min(p), most.max(p));
+    let (least_m, most_m) = of().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), bounds_m);
     let is_inside = |prior: &&Prior| {
-        let near = |i: &u32| moved_m[*i as usize].truncate().distance(prior.position_m) < EXPECTED_M;
-        prior.confirmed && cluster.iter().any(near)
+        let at_m = prior.position_m;
+        // Most people are elsewhere.
+        let away_m = at_m - at_m.clamp(least_m, most_m);
+        prior.confirmed
+            && away_m.length_squared() < EXPECTED_M * EXPECTED_M
+            && of().any(|p| p.distance(at_m) < EXPECTED_M)
     };
     priors.iter().filter(is_inside).map(|prior| prior.position_m).collect()
 }

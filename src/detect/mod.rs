@@ -4,6 +4,7 @@
 //! plan view, split and merged until each is one person. Detections: position and boxes of each.
 
 mod range_model;
+mod sensor_model;
 mod voxel;
 mod background;
 #[doc(hidden)] // What the model of the body axis reads, for its fit.

@@ -119,6 +119,7 @@ impl RangeModel {
     }
 
     /// The same of a column: the first azimuth is that of row 0.
+    #[inline(always)]
     pub fn pixels(&self, azimuths_cdeg: &[f32], pixels: &mut [u32]) {
         for (row, (pixel, azimuth_cdeg)) in (0_u32..).zip(pixels.iter_mut().zip(azimuths_cdeg)) {
             *pixel = self.bin(*azimuth_cdeg) * self.rows as u32 + row;
@@ -145,10 +146,29 @@ impl RangeModel {
     }
 
     /// Whether any return of a column is new, or is one that cannot be told, as NaN.
+    #[inline(always)]
     pub fn any_new(&self, pixels: &[u32], ranges_m: &[f32]) -> bool {
-        let is_known =
-            |pixel: u32, range_m: f32| (range_m == 0.0) | (range_m >= self.limit_m(pixel as usize));
-        !pixels.iter().zip(ranges_m).fold(true, |all, (pixel, range_m)| all & is_known(*pixel, *range_m))
+        let is_known = |limit_m: f32, range_m: f32| (range_m == 0.0) | (range_m >= limit_m);
+        let least = pixels.iter().fold(u32::MAX, |least, &pixel| least.min(pixel));
+        let most = pixels.iter().fold(0, |most, &pixel| most.max(pixel));
+        let (bin, last) = (least as usize / self.rows, most as usize / self.rows);
+        if last > bin + 1 {
+            let known = |(&pixel, &range_m): (&u32, &f32)| is_known(self.limit_m(pixel as usize), range_m);
+            return !pixels.iter().zip(ranges_m).fold(true, |all, of| all & known(of));
+        }
+        // The beams of a column look into one bin or two beside each other, if the sensor does not fan them out: then
+        // the limits of both lie in a row, and nothing need be looked up.
+        let n = ranges_m.len().min(pixels.len()).min(self.rows);
+        let next = (last * self.rows) as u32;
+        let (pixels, ranges_m) = (&pixels[..n], &ranges_m[..n]);
+        let (limits_m, of_next_m) =
+            (&self.limit_m[bin * self.rows..][..n], &self.limit_m[last * self.rows..][..n]);
+        let mut new = 0;
+        for i in 0..n {
+            let limit_m = if pixels[i] < next { limits_m[i] } else { of_next_m[i] };
+            new |= u32::from(!is_known(limit_m, ranges_m[i]));
+        }
+        new != 0
     }
 
     /// Returns nearer than this are new. Zero, so that nothing is, until the scene is known.
@@ -329,6 +349,33 @@ mod tests {
             (-1e30, 0),
         ] {
             assert_eq!(model.bin(azimuth_cdeg), bin, "{azimuth_cdeg}");
+        }
+    }
+
+    #[test]
+    fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
+        let mut model = RangeModel::new(0.05, 1.0);
+        model.grow(ROWS);
+        (0..model.limit_m.len()).for_each(|pixel| model.limit_m[pixel] = 2.0 + (pixel * 7 % 13) as f32);
+        let columns = [
+            [500.0; ROWS],
+            [590.0, 595.0, 600.0, 605.0],
+            [35_990.0, 36_010.0, 35_900.0, 0.0],
+            [0.0, 500.0, 9e3, 2e4],
+        ];
+        for azimuths_cdeg in columns {
+            let mut pixels = [0; ROWS];
+            model.pixels(&azimuths_cdeg, &mut pixels);
+            let limits_m = pixels.map(|pixel| model.limit_m(pixel as usize));
+            assert!(!model.any_new(&pixels, &limits_m), "{azimuths_cdeg:?}");
+            assert!(!model.any_new(&pixels, &[0.0; ROWS]), "nothing came back");
+            for row in 0..ROWS {
+                for nearer_m in [limits_m[row] - 0.001, f32::NAN] {
+                    let mut ranges_m = limits_m;
+                    ranges_m[row] = nearer_m;
+                    assert!(model.any_new(&pixels, &ranges_m), "{azimuths_cdeg:?}, row {row}");
+                }
+            }
         }
     }
 

@@ -116,7 +116,6 @@ fn rise(sigmas: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::remembered::{Remembered, Words};
     use super::*;
 
     #[test]

@@ -51,6 +51,7 @@ const JOBS: [Job; 28] = [
     job("forecasts", "the residual beside a constant velocity", Needs::Data, crowds::forecasts),
     job("logictronix", "real people before a real VLP-16", Needs::Data, crowds::logictronix),
     job("speed", "how long a frame takes, in every mode", Needs::Nothing, house::speed),
+    job("growth", "how long a step takes with more people and access points", Needs::Nothing, house::growth),
     job("live", "ten minutes live, three times over, the page open", Needs::Asking, house::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", Needs::Asking, nodes::nodes),
     job("halls", "1 to 64 halls on one host", Needs::Asking, halls::halls),

@@ -1,5 +1,5 @@
 //! How long a step of the default mode takes as people and access points grow: `cargo run --release --manifest-path
-//! bench/Cargo.toml --bin growth [PEOPLE ACCESS_POINTS]`. On one core; each frame is run three times from the same
+//! bench/Cargo.toml --bin growth [PEOPLE ACCESS_POINTS | FIGURE.svg]`. On one core; each frame is run three times from the same
 //! memory and the fastest counts, since other programs run beside.
 
 use std::time::Duration;
@@ -11,11 +11,14 @@ use umbracast::site::AccessPoint;
 use umbracast::{Config, Health, Pipeline};
 use umbracast_bench::Stages;
 use umbracast_bench::simulated::{Recording, crossing, walking};
+use umbracast_eval::report::plot::{Mark, Panel, Series, draw};
 use umbracast_sim::crowd::{Crowd, Trajectory};
 
 /// People with two access points, and access points with so many people.
 const PEOPLE: [usize; 5] = [10, 20, 40, 100, 300];
 const ACCESS_POINTS: [usize; 5] = [1, 2, 4, 16, 64];
+/// With so many people every number of access points is tried.
+const LINKS_GROW_WITH: [usize; 2] = [10, 100];
 /// Until everybody is followed.
 const BEFORE: usize = 30;
 /// A circle is crossed within; people meet in the middle after 12 s, sooner where they are many.
@@ -26,22 +29,90 @@ const LANES_FRAMES: usize = 90;
 const TRIES: usize = 3;
 
 fn main() {
-    let words: Vec<usize> = std::env::args().skip(1).map(|word| word.parse().expect("a number")).collect();
+    let words: Vec<String> = std::env::args().skip(1).collect();
     println!(
         "people  access points  followed  links   median ms    99 % ms   fore  clust  detec  track  forec   cast  fewer"
     );
-    if let [people, access_points, ..] = words[..] {
+    if let [people, access_points] = &words[..] {
+        let [people, access_points] = [people, access_points].map(|word| word.parse().expect("a number"));
         measure(&recording(people), people, access_points);
         return;
     }
+    let mut rows = Vec::new();
     for people in PEOPLE {
         let recording = recording(people);
         for access_points in ACCESS_POINTS {
-            if access_points == 2 || [10, 100, 300].contains(&people) {
-                measure(&recording, people, access_points);
+            if access_points == 2 || LINKS_GROW_WITH.contains(&people) {
+                rows.push(measure(&recording, people, access_points));
             }
         }
     }
+    if let [figure] = &words[..] {
+        std::fs::write(figure, drawn(&rows)).expect("the figure's place can be written");
+    }
+}
+
+/// A line of the table.
+struct Row {
+    people: usize,
+    access_points: usize,
+    median_ms: f64,
+    p99_ms: f64,
+}
+
+/// Over people with two access points, and over access points with each number of people.
+fn drawn(rows: &[Row]) -> String {
+    const COLORS: [&str; 2] = ["#1b6ca8", "#b74a2f"];
+    let line = |name: String, color, mark, points| Series { name, color, mark, points, band: Vec::new() };
+    let of = |row: &Row, x: f64, p99: bool| (x, if p99 { row.p99_ms } else { row.median_ms });
+    let two = || rows.iter().filter(|row| row.access_points == 2);
+    let over_people = |p99: bool| two().map(|row| of(row, row.people as f64, p99)).collect();
+    let people = vec![
+        line("median".into(), COLORS[0], Mark::Line(2.0), over_people(false)),
+        line("99 %".into(), COLORS[0], Mark::Dashed(2.0), over_people(true)),
+    ];
+    let with = |(people, color): (usize, &'static str)| {
+        let points = rows.iter().filter(|row| row.people == people);
+        let points = points.map(|row| of(row, row.access_points as f64, false)).collect();
+        line(format!("{people} people, median"), color, Mark::Line(2.0), points)
+    };
+    let access_points = LINKS_GROW_WITH.into_iter().zip(COLORS).map(with).collect();
+    let panel = |title: &str, x_label: &str, series: Vec<Series>| {
+        let most =
+            |at: fn(&(f64, f64)) -> f64| series.iter().flat_map(|s| &s.points).map(at).fold(1.0, f64::max);
+        Panel {
+            title: title.to_owned(),
+            x_label: x_label.to_owned(),
+            x: (0.0, most(|p| p.0)),
+            y: (0.0, 1.1 * most(|p| p.1)),
+            x_step: None,
+            y_step: None,
+            y_digits: 0,
+            y_names: Vec::new(),
+            y_log: false,
+            equal_axes: false,
+            series,
+            shaded: Vec::new(),
+            notes: Vec::new(),
+        }
+    };
+    let panels = [
+        panel("a step, ms, two access points", "people", people),
+        panel("a step, ms", "access points", access_points),
+    ];
+    let drawn = |name, panel| draw(name, panel, (520.0, 320.0)).expect("a figure").svg;
+    joined(&[drawn("growth-people", &panels[0]), drawn("growth-links", &panels[1])])
+}
+
+/// One picture above the other.
+fn joined(pictures: &[String; 2]) -> String {
+    let placed = pictures.iter().enumerate().map(|(i, svg)| {
+        svg.replacen("<svg", &format!("<svg y=\"{}\" width=\"520\" height=\"320\"", 320 * i), 1)
+    });
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 520 640\">\n{}\n</svg>\n",
+        placed.collect::<Vec<_>>().join("\n")
+    )
 }
 
 fn recording(people: usize) -> Recording {
@@ -101,7 +172,7 @@ fn config(access_points: usize) -> Config {
     config
 }
 
-fn measure(recording: &Recording, people: usize, access_points: usize) {
+fn measure(recording: &Recording, people: usize, access_points: usize) -> Row {
     let config = config(access_points);
     let mut stages = Stages::new(&config, &recording.empty).expect("the defaults work");
     let mut pipeline = Pipeline::new(&config, None).expect("the defaults work");
@@ -140,11 +211,13 @@ fn measure(recording: &Recording, people: usize, access_points: usize) {
         values[values.len() / 2]
     };
     print!("{people:6} {access_points:14} {:9} {:6} ", middle(&mut followed), middle(&mut links));
-    print!("{:11.2} {:10.2} ", ms(&mut whole, 0.5), ms(&mut whole, 0.99));
+    let [median_ms, p99_ms] = [0.5, 0.99].map(|share| ms(&mut whole, share));
+    print!("{median_ms:11.2} {p99_ms:10.2} ");
     for part in &mut parts {
         print!(" {:6.2}", ms(part, 0.5));
     }
     println!(" {fewer:6}");
+    Row { people, access_points, median_ms, p99_ms }
 }
 
 fn by_stage(stages: &mut Stages, frame: &Frame) -> [Duration; 6] {

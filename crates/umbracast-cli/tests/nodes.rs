@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use umbracast_io::rows::TrackRow;
 use umbracast_io::wire;
@@ -144,7 +144,8 @@ fn two_front_ends_a_tracker_and_a_caster_give_what_one_process_gives_to_the_byte
     let hall = Hall::new("nodes-empty");
     let (scene, empty, expected) = simulated(&hall, &[]);
     let track = hall.first(&["track,forecast", "--empty", &empty]);
-    let cast = hall.node(&["cast"]);
+    // One node is given no site: it asks for it.
+    let cast = Node::start(&["cast", "--hall", "nodes-empty", "--connect", &hall.meet]);
     let records = hall.path("records");
     let record = hall.node(&["record", "--record", &records, "--record-points"]);
     // One front end is given the empty hall, the other asks for it.
@@ -171,16 +172,13 @@ fn the_background_is_learned_beside_the_sensors_with_what_the_tracker_expects() 
     let stages = [hall.node(&["forecast"]), hall.node(&["cast"])];
     let records = hall.path("records");
     let record = hall.node(&["record", "--record", &records, "--record-points"]);
-    let sensor = |name| hall.node(&["sensor", "--sensors", name, "--from", &scene]);
+    // At half the pace a busy machine is in time, too.
+    let sensor = |name| hall.node(&["sensor", "--sensors", name, "--from", &scene, "--rate", "0.5"]);
     let fronts = [sensor("lidar_east"), sensor("lidar_west")].map(Node::ended);
     wait_for_frames(&records, expected["/umbracast/tracks"].len());
     stages.into_iter().chain([track, record]).for_each(|node| drop(node.stop()));
-    if fronts.iter().all(|front| front["priors_late"] == 0) {
-        assert_same(&results_in(&recording_in(&records)), &expected);
-    } else {
-        // A busy machine: then it must have been told.
-        assert!(fronts.iter().any(|front| front["priors_late"].as_u64() > Some(0)), "{fronts:?}");
-    }
+    assert!(fronts.iter().all(|front| front["priors_late"] == 0), "{fronts:?}");
+    assert_same(&results_in(&recording_in(&records)), &expected);
 }
 
 #[test]
@@ -244,15 +242,15 @@ fn assert_running(fronts: &[Node]) {
     assert!(fronts.iter().all(runs), "the scene was over");
 }
 
-/// Until the recorder has written so many frames: it flushes once a second.
+/// Until the recorder has written so many frames: it flushes once a second. A minute at most.
 fn wait_for_frames(records: &str, frames: usize) {
-    let begun = Instant::now();
     let recorded = || {
         let file = fs::read_dir(records).ok()?.next()?.ok()?.path();
         Some(whole_results_in(&file).ok()?.get("/umbracast/tracks")?.len())
     };
-    while recorded().is_none_or(|found| found < frames) {
-        assert!(begun.elapsed() < Duration::from_secs(60), "{:?} frames recorded of {frames}", recorded());
+    let enough = |_| {
         std::thread::sleep(Duration::from_millis(100));
-    }
+        recorded().is_some_and(|found| found >= frames)
+    };
+    assert!((0..600).any(enough), "{:?} frames recorded of {frames}", recorded());
 }

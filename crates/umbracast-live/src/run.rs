@@ -80,6 +80,14 @@ pub struct Counters {
 }
 
 impl Counters {
+    /// Counts a frame that is published.
+    pub fn count(&self, published: &Published) {
+        self.frames.fetch_add(1, Ordering::Relaxed);
+        lock(&self.latencies).add(published.latency);
+        lock(&self.steps).add(published.step);
+        *lock(&self.health) = published.health;
+    }
+
     /// How the recorder does now.
     pub fn recorder(&self) -> RecordStatus {
         lock(&self.recorder).clone()
@@ -336,11 +344,7 @@ impl Publish {
     }
 
     fn out(&self, published: Published) {
-        let counters = &self.counters;
-        counters.frames.fetch_add(1, Ordering::Relaxed);
-        lock(&counters.latencies).add(published.latency);
-        lock(&counters.steps).add(published.step);
-        *lock(&counters.health) = published.health;
+        self.counters.count(&published);
         let published = Arc::new(published);
         (self.listener)(&published);
         if let Some(recorder) = &self.recorder {

@@ -162,7 +162,8 @@ impl Chain {
         let begun_ns = now_ns();
         let foreseen = followed.forecasts.len() == followed.tracks.len()
             && followed.forecasts.iter().zip(&followed.tracks).all(|(f, t)| f.track == t.id);
-        if !self.is_later(followed.time_ns) || self.forecaster.is_none() && !foreseen {
+        let finite = followed.tracks.iter().all(|track| track.position_m.is_finite());
+        if !finite || !self.is_later(followed.time_ns) || self.forecaster.is_none() && !foreseen {
             self.out_of_order += 1;
             return None;
         }

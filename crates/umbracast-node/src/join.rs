@@ -113,7 +113,7 @@ impl Join {
         let sensors = self.sensors.len();
         let within = message.covers.iter().all(|&s| (s as usize) < sensors)
             && message.views.iter().all(|view| view.sensor < sensors)
-            && message.points.iter().all(|point| usize::from(point.sensor) < sensors);
+            && message.points.iter().all(|p| usize::from(p.sensor) < sensors && p.position_m.is_finite());
         if !known || !within || message.covers.is_empty() {
             self.counts.strangers += 1;
             return;

@@ -80,17 +80,15 @@ impl Shared {
 pub fn keep_state(hall: &Hall) -> Result<Sharing, Error> {
     let kept = Arc::<Mutex<Option<ZBytes>>>::default();
     let (key, given) = (hall.keys().of("state"), kept.clone());
-    let lock = |kept: &Mutex<Option<ZBytes>>, change: &mut dyn FnMut(&mut Option<ZBytes>)| {
-        change(&mut kept.lock().unwrap_or_else(PoisonError::into_inner));
-    };
     let queryable = hall.answer(&key, move |query| {
-        let mut newest = None;
-        lock(&given, &mut |kept| newest = kept.clone());
+        let newest = given.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if let Some(state) = newest {
-            let _ = query.reply(query.key_expr().clone(), state).wait();
+            let _ = query.reply(query.key_expr().clone(), state).wait(); // Who asked may be gone.
         }
     })?;
-    let heard = hall.hear(&key, move |_, bytes| lock(&kept, &mut |kept| *kept = Some(bytes.clone())))?;
+    let heard = hall.hear(&key, move |_, bytes| {
+        *kept.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes.clone());
+    })?;
     Ok(Sharing { _queryable: queryable, _heard: Some(heard) })
 }
 

@@ -11,8 +11,9 @@ use umbracast::forecast::Weights;
 use umbracast::lidar::Packet;
 use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_live::HostClock;
+use umbracast_live::Published;
 use umbracast_live::receive::{Arrived, Door};
-use umbracast_live::run::Counters;
+use umbracast_live::run::{Counters, Listener};
 use umbracast_node::hall::Hall;
 use umbracast_node::keys::Keys;
 use umbracast_node::network::{self, Mode, Network};
@@ -79,7 +80,7 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let settings = Settings {
         wait: network.wait(),
         source: source(args, &network, &config.site, &sensors)?,
-        listener: stages.contains(&Role::Serve).then(|| outward.beside(page.listener())),
+        listener: stages.contains(&Role::Serve).then(|| outward.beside(listener(&page, counters))),
         stages: stages.clone(),
         config: config.clone(),
         weights: Some(weights),
@@ -115,6 +116,15 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let summary = node.stop();
     page.close();
     Ok(tell(&summary, &names, &watch, common))
+}
+
+/// The page, and what `/metrics` counts.
+fn listener(page: &Page, counters: Arc<Counters>) -> Listener {
+    let told = page.listener();
+    Box::new(move |published: &Arc<Published>| {
+        counters.count(published);
+        told(published);
+    })
 }
 
 fn stages(args: &args::Node) -> Result<Vec<Role>, Error> {
@@ -210,7 +220,10 @@ fn empty(
     }
     match share::ask_empty(hall, site, own) {
         Some(packets) => Ok((share::empty_frames(site, &packets)?, shared.with_empty(hall, site, &packets))),
-        None => Ok((Vec::new(), shared)),
+        None => {
+            say::note("nobody here has the empty hall: the background is learned on the way");
+            Ok((Vec::new(), shared))
+        }
     }
 }
 

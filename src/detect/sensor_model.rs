@@ -1,0 +1,312 @@
+//! One sensor's view of the empty scene, pixel by pixel, and the returns that are nearer.
+
+use super::range_model::RangeModel;
+use super::{Point, Prior};
+use crate::Health;
+use crate::geometry::{DVec3, Pose};
+use crate::lidar::{Cloud, Model, RangeImage, Scan, SensorPoint};
+use crate::site::Sensor;
+
+/// Width of a pixel of an organised scan: a little more than one column of a sensor at 10 Hz.
+const AZIMUTH_BIN_DEG: f64 = 0.2;
+/// The same of a sensor whose columns lie farther apart and always at the same azimuths: with narrower pixels some would
+/// never see anything.
+const BIN_COLUMNS: f64 = 1.02;
+/// The same of an unorganised cloud, whose columns are not known: a VLP-16 at 20 Hz fires every 0.4 degrees.
+const CLOUD_AZIMUTH_BIN_DEG: f64 = 1.0;
+const CLOUD_ELEVATION_BIN_DEG: f64 = 0.5;
+/// A return is new when it is nearer than the background by so many standard deviations of the sensor's range,
+const MARGIN_SIGMAS: f64 = 5.0;
+/// and at least by this.
+const MARGIN_MIN_M: f64 = 0.05;
+/// Lower points are the floor's.
+const LOWEST_M: f64 = 0.03;
+
+/// What the empty scene looks like to one sensor, and what it sees now.
+#[derive(Debug, Clone)]
+pub(super) struct SensorModel {
+    pub(super) range_min_m: f32,
+    pub(super) range_max_m: f32,
+    ranges: RangeModel,
+    cloud_ranges: RangeModel,
+    /// Row of each bin of elevation, for clouds whose beams are not known.
+    row_of_elevation: Vec<Option<u16>>,
+    elevation_bins_per_rad: f64,
+    returns: Vec<Return>,
+    /// Of each beam: how long the head has turned on, and how far it looks to the right.
+    turned: Vec<[f32; 2]>,
+    /// Of each beam of the column that is looked at.
+    azimuths_cdeg: Vec<f32>,
+    pixels: Vec<u32>,
+}
+
+/// A point of an unorganised cloud as the sensor saw it.
+#[derive(Debug, Clone, Copy)]
+struct Return {
+    elevation_bin: usize,
+    azimuth_cdeg: f32,
+    range_m: f32,
+    point: SensorPoint,
+}
+
+/// What may be learned.
+#[derive(Clone, Copy)]
+pub(super) struct Learn<'a> {
+    /// Not from an empty scan. Then returns nearer than the sensor's range are learned too, though never new: behind
+    /// somebody beside the sensor the scene is unknown, not empty, and what appears there later is no person.
+    pub(super) on_the_way: bool,
+    /// Where somebody is expected nothing is learned.
+    pub(super) priors: &'a [Prior],
+    pub(super) freeze_m: f64,
+}
+
+impl Learn<'_> {
+    fn is_frozen(&self, position_m: DVec3) -> bool {
+        let near = |prior: &Prior| {
+            let reach_m = self.freeze_m + prior.position_sigma_m.min(self.freeze_m);
+            prior.position_m.distance_squared(position_m.truncate()) < reach_m * reach_m
+        };
+        self.priors.iter().any(near)
+    }
+}
+
+/// Where people can be: the hall is known, so what lies outside is a reflection.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clip {
+    pub(super) half_length_m: f64,
+    pub(super) half_width_m: f64,
+    pub(super) highest_m: f64,
+}
+
+impl Clip {
+    fn holds(&self, p: DVec3) -> bool {
+        p.x.abs() <= self.half_length_m
+            && p.y.abs() <= self.half_width_m
+            && p.z >= LOWEST_M
+            && p.z <= self.highest_m
+    }
+}
+
+impl SensorModel {
+    /// Knows nothing yet.
+    pub(super) fn new(sensor: &Sensor) -> Self {
+        let margin_m = (MARGIN_SIGMAS * sensor.range_noise_m).max(MARGIN_MIN_M);
+        Self {
+            range_min_m: sensor.range_min_m as f32,
+            range_max_m: sensor.range_max_m as f32,
+            ranges: RangeModel::new(margin_m, azimuth_bin_deg(sensor)),
+            cloud_ranges: RangeModel::new(margin_m, CLOUD_AZIMUTH_BIN_DEG),
+            row_of_elevation: vec![None; (180.0 / CLOUD_ELEVATION_BIN_DEG) as usize + 3],
+            elevation_bins_per_rad: 1.0_f64.to_degrees() / CLOUD_ELEVATION_BIN_DEG,
+            returns: Vec::new(),
+            turned: Vec::new(),
+            azimuths_cdeg: Vec::new(),
+            pixels: Vec::new(),
+        }
+    }
+
+    /// One scan; what is new goes to `points`. The scene is `known` once it was learned without people.
+    pub(super) fn scan(
+        &mut self,
+        scan: &Scan,
+        clip: &Clip,
+        learn: Option<Learn>,
+        known: bool,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
+        let ranges = match &scan.cloud {
+            Cloud::Organised(image) => {
+                self.organised(scan, image, clip, learn, health, points);
+                &mut self.ranges
+            }
+            Cloud::Unorganised(cloud) => {
+                self.unorganised(scan, cloud, clip, learn, health, points);
+                &mut self.cloud_ranges
+            }
+        };
+        if learn.is_some() {
+            ranges.close_revolution(known);
+        }
+    }
+
+    fn organised(
+        &mut self,
+        scan: &Scan,
+        image: &RangeImage,
+        clip: &Clip,
+        learn: Option<Learn>,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has just said that it has what the function was compiled for.
+            return unsafe { self.organised_avx2(scan, image, clip, learn, health, points) };
+        }
+        self.organised_portably(scan, image, clip, learn, health, points);
+    }
+
+    /// Once more for processors with wider registers; no instruction that rounds otherwise is used, so both give the same
+    /// bits.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn organised_avx2(
+        &mut self,
+        scan: &Scan,
+        image: &RangeImage,
+        clip: &Clip,
+        learn: Option<Learn>,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
+        self.organised_portably(scan, image, clip, learn, health, points);
+    }
+
+    #[inline(always)]
+    fn organised_portably(
+        &mut self,
+        scan: &Scan,
+        image: &RangeImage,
+        clip: &Clip,
+        learn: Option<Learn>,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
+        let beams = image.beams.len();
+        if beams == 0 {
+            return;
+        }
+        self.ranges.grow(beams);
+        let (range_min_m, range_max_m) = (self.range_min_m, self.range_max_m);
+        let Self { ranges, turned, azimuths_cdeg, pixels, .. } = self;
+        turned.clear();
+        turned.extend(image.beams.iter().map(|beam| [beam.turned_ns as f32, beam.azimuth_offset_cdeg]));
+        azimuths_cdeg.resize(beams, 0.0);
+        pixels.resize(beams, 0);
+        for (c, (column, ranges_m)) in image.columns.iter().zip(image.range_m.chunks_exact(beams)).enumerate()
+        {
+            for (azimuth_cdeg, [turned_ns, offset_cdeg]) in azimuths_cdeg.iter_mut().zip(&*turned) {
+                let turned_cdeg = column.azimuth_rate_cdeg_per_ns * turned_ns;
+                *azimuth_cdeg = column.azimuth_cdeg + turned_cdeg + offset_cdeg;
+            }
+            ranges.pixels(azimuths_cdeg, pixels);
+            // Nearly every column sees nothing but the hall.
+            if learn.is_none() && !ranges.any_new(pixels, ranges_m) {
+                continue;
+            }
+            for (b, &range_m) in ranges_m.iter().enumerate() {
+                if range_m == 0.0 {
+                    continue;
+                }
+                let pixel = pixels[b] as usize;
+                // Written so that NaN is caught: it is neither beyond the limit nor in the range.
+                let background = range_m >= ranges.limit_m(pixel);
+                if background && learn.is_none() {
+                    continue;
+                }
+                if !(range_m >= range_min_m && range_m <= range_max_m) {
+                    health.points_invalid += 1;
+                    if range_m > 0.0 && range_m < range_min_m && learn.is_some_and(|learn| learn.on_the_way) {
+                        ranges.observe(pixel, range_m);
+                    }
+                    continue;
+                }
+                let mut frozen = false;
+                if !background {
+                    let point = organised_point(scan, image, c, b, range_m);
+                    if clip.holds(point.position_m) {
+                        points.push(point);
+                        frozen = learn.is_some_and(|learn| learn.is_frozen(point.position_m));
+                    }
+                }
+                if learn.is_some() && !frozen {
+                    ranges.observe(pixel, range_m);
+                }
+            }
+        }
+    }
+
+    fn unorganised(
+        &mut self,
+        scan: &Scan,
+        cloud: &[SensorPoint],
+        clip: &Clip,
+        learn: Option<Learn>,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
+        self.sort_returns(cloud, learn.is_some_and(|learn| learn.on_the_way), health);
+        for i in 0..self.returns.len() {
+            let Return { elevation_bin, azimuth_cdeg, range_m, point } = self.returns[i];
+            // Beams sit between two bins of elevation, so both neighbours count as well.
+            let rows = &self.row_of_elevation[elevation_bin.saturating_sub(1)..=elevation_bin + 1];
+            let pixel = |row: u16| self.cloud_ranges.pixel(usize::from(row), azimuth_cdeg);
+            let limits_m = rows.iter().flatten().map(|&row| self.cloud_ranges.limit_m(pixel(row)));
+            let limit_m = limits_m.fold(f32::INFINITY, f32::min);
+            let own = self.row_of_elevation[elevation_bin].map(pixel);
+            let mut frozen = false;
+            if range_m < limit_m && range_m >= self.range_min_m {
+                let point = unorganised_point(scan, &point);
+                if clip.holds(point.position_m) {
+                    points.push(point);
+                    frozen = learn.is_some_and(|learn| learn.is_frozen(point.position_m));
+                }
+            }
+            if let Some(own) = own.filter(|_| learn.is_some() && !frozen) {
+                self.cloud_ranges.observe(own, range_m);
+            }
+        }
+    }
+
+    /// The cloud as a spinning sensor saw it, in an order that does not depend on the cloud's; with what is nearer
+    /// than the sensor's range where `keep_near`.
+    fn sort_returns(&mut self, cloud: &[SensorPoint], keep_near: bool, health: &mut Health) {
+        self.returns.clear();
+        for &point in cloud {
+            let [x, y, z] = point.position_m;
+            let range_m = (x * x + y * y + z * z).sqrt();
+            if !(range_m >= self.range_min_m && range_m <= self.range_max_m) {
+                health.points_invalid += 1;
+                if !(keep_near && range_m > 0.0 && range_m < self.range_min_m) {
+                    continue;
+                }
+            }
+            let elevation_rad = f64::from(z / range_m).clamp(-1.0, 1.0).asin();
+            let above_nadir_rad = elevation_rad + std::f64::consts::FRAC_PI_2;
+            // Bins are centred on their multiples, where beams use to be; bin 0 stays empty for the neighbours.
+            let elevation_bin = (above_nadir_rad * self.elevation_bins_per_rad).round() as usize + 1;
+            let elevation_bin = elevation_bin.min(self.row_of_elevation.len() - 2);
+            if self.row_of_elevation[elevation_bin].is_none() {
+                self.row_of_elevation[elevation_bin] = Some(self.cloud_ranges.rows() as u16);
+                self.cloud_ranges.grow(self.cloud_ranges.rows() + 1);
+            }
+            let azimuth_cdeg = (-y).atan2(x).to_degrees() * 100.0;
+            self.returns.push(Return { elevation_bin, azimuth_cdeg, range_m, point });
+        }
+        self.returns.sort_unstable_by(|a, b| {
+            let key = |r: &Return| (r.elevation_bin, r.point.time_ns, r.range_m.to_bits());
+            let place = |r: &Return| r.point.position_m.map(f32::to_bits);
+            key(a).cmp(&key(b)).then_with(|| place(a).cmp(&place(b)))
+        });
+    }
+}
+
+/// A sensor that is not known has no pixels to fill.
+fn azimuth_bin_deg(sensor: &Sensor) -> f64 {
+    let turn = Model::of_sensor(sensor).ok().and_then(|model| model.turn);
+    turn.map_or(AZIMUTH_BIN_DEG, |turn| AZIMUTH_BIN_DEG.max(BIN_COLUMNS * 360.0 / f64::from(turn.columns)))
+}
+
+fn organised_point(scan: &Scan, image: &RangeImage, c: usize, b: usize, range_m: f32) -> Point {
+    to_site(&scan.site_from_sensor, scan.sensor, image.point_m(c, b, f64::from(range_m)), image.time_ns(c, b))
+}
+
+pub(super) fn unorganised_point(scan: &Scan, point: &SensorPoint) -> Point {
+    let position_m = DVec3::from(point.position_m.map(f64::from));
+    to_site(&scan.site_from_sensor, scan.sensor, position_m, point.time_ns)
+}
+
+pub(super) fn to_site(site_from_sensor: &Pose, sensor: usize, position_m: DVec3, time_ns: i64) -> Point {
+    Point { position_m: site_from_sensor.point(position_m), time_ns, sensor: sensor as u16 }
+}
