@@ -8,7 +8,7 @@
 //! | key of a topic: domain, topic, type, hash of the type | [`names`] |
 //! | liveliness tokens of nodes, publishers and subscribers | [`names`] |
 //! | attachment of a message: number, time, sender | [`names`] |
-//! | hash of a type, `RIHS01`, from its definition | [`type_hash`] |
+//! | hash of a type, `RIHS01`, from its definition | [`type_hash()`] |
 //! | payload: CDR, as in our recordings | `umbracast_io` |
 //!
 //! By hand, because it is so little: `hiroz` 0.2 does the same with nodes, services, actions and generated types of its own

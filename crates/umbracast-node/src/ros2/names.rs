@@ -37,7 +37,7 @@ pub struct TopicName {
     pub topic: String,
     /// As DDS writes it, see [`dds_type`].
     pub dds_type: String,
-    /// See [`super::type_hash`].
+    /// See [`super::type_hash()`].
     pub hash: String,
 }
 
