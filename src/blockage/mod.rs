@@ -6,12 +6,12 @@ pub mod body_model;
 pub mod body;
 #[doc(hidden)] // For the corpus of rays; `Caster` chooses by the config.
 pub mod algorithm1;
+mod lanes;
 mod draws;
 mod phases;
 mod steps;
 #[doc(hidden)] // What tests and ablations turn.
 pub mod numbers;
-mod lanes;
 mod spread;
 mod figure;
 mod trajectories;

@@ -31,6 +31,7 @@ impl Aabb {
     /// assert_eq!(Aabb::around(corners).max_m, DVec3::new(1.0, 3.0, 2.0));
     /// assert_eq!(Aabb::around([]), Aabb::EMPTY);
     /// ```
+    #[inline]
     pub fn around(points: impl IntoIterator<Item = DVec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, |b, p| Self { min_m: b.min_m.min(p), max_m: b.max_m.max(p) })
     }
@@ -42,6 +43,7 @@ impl Aabb {
     ///
     /// assert_eq!(Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE }.center_m(), DVec3::splat(0.5));
     /// ```
+    #[inline]
     pub fn center_m(&self) -> DVec3 {
         (self.min_m + self.max_m) * 0.5
     }
@@ -53,6 +55,7 @@ impl Aabb {
     ///
     /// assert_eq!(Aabb { min_m: -DVec3::ONE, max_m: DVec3::ONE }.size_m(), DVec3::splat(2.0));
     /// ```
+    #[inline]
     pub fn size_m(&self) -> DVec3 {
         self.max_m - self.min_m
     }

@@ -48,6 +48,7 @@ impl Pose {
     /// let raised = Pose { translation_m: DVec3::new(0.0, 0.0, 3.0), ..Pose::IDENTITY };
     /// assert_eq!(raised.point(DVec3::X), DVec3::new(1.0, 0.0, 3.0));
     /// ```
+    #[inline]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.rotation * p + self.translation_m
     }
@@ -60,6 +61,7 @@ impl Pose {
     /// let raised = Pose { translation_m: DVec3::new(0.0, 0.0, 3.0), ..Pose::IDENTITY };
     /// assert_eq!(raised.direction(DVec3::X), DVec3::X);
     /// ```
+    #[inline]
     pub fn direction(&self, v: DVec3) -> DVec3 {
         self.rotation * v
     }
@@ -89,6 +91,7 @@ impl Pose {
     /// assert!(there_and_back.abs_diff_eq(DVec3::X, 1e-12));
     /// ```
     #[must_use]
+    #[inline]
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         Self { rotation, translation_m: -(rotation * self.translation_m) }

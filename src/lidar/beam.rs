@@ -50,6 +50,7 @@ impl Beam {
     /// let (origin_m, direction) = beam.ray(90_f64.to_radians().sin_cos());
     /// assert!(origin_m.length() < 1e-9 && (direction.y + 1.0).abs() < 1e-9);
     /// ```
+    #[inline]
     pub fn ray(&self, head_sin_cos: (f64, f64)) -> (DVec3, DVec3) {
         (turned(head_sin_cos, self.origin_m), turned(head_sin_cos, self.direction))
     }

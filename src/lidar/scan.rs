@@ -152,6 +152,7 @@ impl RangeImage {
     /// // The last of 32 beams fires 35.7 us after the first: 0.13 degrees later.
     /// assert_eq!((image.azimuth_cdeg(0, 0), image.azimuth_cdeg(0, 31)), (9000, 9013));
     /// ```
+    #[inline]
     pub fn azimuth_cdeg(&self, c: usize, b: usize) -> u32 {
         let column = &self.columns[c];
         let azimuth = column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * self.beams[b].turned_ns as f32;
@@ -170,6 +171,7 @@ impl RangeImage {
     /// // Azimuth 90 degrees is to the right: y points to the left.
     /// assert!((image.point_m(0, 15, 8.0).y + 8.0).abs() < 0.01);
     /// ```
+    #[inline]
     pub fn point_m(&self, c: usize, b: usize, range_m: f64) -> DVec3 {
         let beam = &self.beams[b];
         let head_sin_cos = match beam.whole_cdeg {
@@ -205,6 +207,7 @@ impl RangeImage {
     /// # let image = image();
     /// assert_eq!(image.time_ns(0, 31), 5 + 31 * 1152);
     /// ```
+    #[inline]
     pub fn time_ns(&self, c: usize, b: usize) -> i64 {
         self.columns[c].time_ns + i64::from(self.beams[b].fire_offset_ns)
     }

@@ -3,6 +3,7 @@
 
 mod book;
 mod crowds;
+mod halls;
 mod house;
 mod locked;
 mod nodes;
@@ -39,7 +40,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 27] = [
+const JOBS: [Job; 29] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -53,6 +54,8 @@ const JOBS: [Job; 27] = [
     job("growth", "how long a step takes with more people and access points", Needs::Nothing, house::growth),
     job("live", "ten minutes live, three times over, the page open", Needs::Asking, house::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", Needs::Asking, nodes::nodes),
+    job("halls", "1 to 64 halls on one host", Needs::Asking, halls::halls),
+    job("deployed", "the files for containers and clusters, run here", Needs::Asking, halls::deployed),
     job("faults", "a live run in which something fails", Needs::Nothing, house::faults),
     job("kills", "a recording run killed at twenty moments", Needs::Nothing, house::kills),
     job("same-bytes", "the same seed on one thread and on two", Needs::Nothing, house::same_bytes),

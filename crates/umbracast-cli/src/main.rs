@@ -13,6 +13,7 @@ mod flags;
 mod matches;
 mod input;
 mod page;
+mod outward;
 mod signal;
 mod commands;
 
@@ -36,6 +37,8 @@ fn main() -> ExitCode {
         Command::Live(args) => commands::live::run(&args, &cli.common),
         #[cfg(feature = "node")]
         Command::Node(args) => commands::node::run(&args, &cli.common),
+        #[cfg(feature = "node")]
+        Command::Fleet(args) => commands::fleet::run(&args, &cli.common),
         Command::Check(args) => commands::check::run(&args, &cli.common),
         Command::View(args) => commands::view::run(&args, &cli.common),
         Command::Replay(args) => commands::replay::run(&args, &cli.common),

@@ -12,6 +12,8 @@ pub mod wire;
 pub mod fields;
 pub mod nodes;
 pub mod viewers;
+pub mod results;
+pub mod objects;
 pub mod recording;
 pub mod trajectories;
 pub mod bvh;

@@ -9,6 +9,7 @@ use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Health};
 use umbracast_io::fields;
 use umbracast_io::nodes::{Followed, Foreground, Priors, TrackerState};
+use umbracast_io::objects;
 use umbracast_io::wire;
 use umbracast_live::HostClock;
 use umbracast_live::latency::Latencies;
@@ -20,8 +21,9 @@ use zenoh::query::{Query, Queryable};
 
 use crate::chain::{Chain, Made, Row};
 use crate::hall::{Hall, Outlet, Urgency};
-use crate::join::Join;
+use crate::join::{Join, Joined};
 use crate::lead::Lead;
+use crate::objects::Lists;
 use crate::role::Role;
 
 /// Messages that wait for the stages: more than a second of four front ends.
@@ -40,6 +42,8 @@ enum Heard {
     Foreground(ZBytes),
     Followed(ZBytes),
     Priors(ZBytes),
+    /// A list of another perception, and whose.
+    Objects(String, ZBytes),
     /// Another tracker came or went.
     Tracker(String, bool),
     /// Somebody asks for the tracker's state.
@@ -100,6 +104,7 @@ impl Back {
             chain,
             outlets,
             join: Join::new(&config.site, wait),
+            lists: Lists::new(&config.site),
             lead: Lead::new(hall.id()),
             others: Vec::new(),
             used_ns: clock.now_ns(),
@@ -123,6 +128,11 @@ impl Back {
             subscribers.push(hear("priors", Heard::Priors)?);
             // What comes meanwhile waits in the queue.
             subscribers.push(hear("sensor/*/foreground", Heard::Foreground)?);
+            let lists = queue.clone();
+            subscribers.push(hall.hear(&hall.keys().of("objects/*"), move |key, bytes| {
+                let source = key.rsplit('/').next().unwrap_or_default().to_owned();
+                lists.push((Heard::Objects(source, bytes.clone()), clock.now_ns()));
+            })?);
             worker.take_up(hall);
             if hall.nodes(Role::Track, ANSWER).iter().all(|id| id.ends_with(&hall.id())) {
                 worker.take_over();
@@ -218,6 +228,7 @@ struct Worker {
     chain: Chain,
     outlets: Outlets,
     join: Join,
+    lists: Lists,
     lead: Lead<Made>,
     /// Other trackers that are there.
     others: Vec<String>,
@@ -269,6 +280,13 @@ impl Worker {
                     let _ = query.reply(query.key_expr().clone(), fields::encode(&mut state)).wait();
                 }
             }
+            Heard::Objects(source, bytes) => match objects::read(&bytes.to_bytes()) {
+                Some(list) => {
+                    let joined = self.lists.joined(&source, &list, now_ns);
+                    joined.into_iter().for_each(|joined| self.joined(joined));
+                }
+                None => self.broken(),
+            },
             Heard::Tracker(id, here) => {
                 self.others.retain(|other| *other != id);
                 if here {
@@ -284,13 +302,7 @@ impl Worker {
     fn go_on(&mut self) {
         let clock = self.clock;
         while let Some(joined) = self.join.pop(clock.now_ns()) {
-            if let Some(made) = self.chain.joined(joined, || clock.now_ns()) {
-                self.count(&made);
-                let priors_ns = made.priors.as_ref().map_or(0, |priors| priors.time_ns);
-                if let Some(made) = self.lead.done(priors_ns, made, clock.now_ns()) {
-                    self.publish(made);
-                }
-            }
+            self.joined(joined);
         }
         if self.lead.is_overdue(clock.now_ns()) {
             self.take_over();
@@ -299,6 +311,18 @@ impl Worker {
         self.counted.incomplete.store(counts.incomplete, Ordering::Relaxed);
         self.counted.late.store(counts.late, Ordering::Relaxed);
         self.counted.leads.store(self.lead.since_ns().is_some(), Ordering::Relaxed);
+    }
+
+    /// A frame of front ends, or of another perception.
+    fn joined(&mut self, joined: Joined) {
+        let clock = self.clock;
+        if let Some(made) = self.chain.joined(joined, || clock.now_ns()) {
+            self.count(&made);
+            let priors_ns = made.priors.as_ref().map_or(0, |priors| priors.time_ns);
+            if let Some(made) = self.lead.done(priors_ns, made, clock.now_ns()) {
+                self.publish(made);
+            }
+        }
     }
 
     fn followed(&mut self, followed: Followed) {

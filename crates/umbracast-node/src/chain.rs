@@ -131,8 +131,13 @@ impl Chain {
         o.health.points_over_limit += o.foreground.len().saturating_sub(POINTS_MAX) as u64;
         o.foreground.truncate(POINTS_MAX);
         tracker.priors(time_ns, &mut self.priors);
-        self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);
-        self.measurer.detections(&o.foreground, &o.clusters, &self.priors, &mut o.detections);
+        match joined.detections {
+            Some(detections) => o.detections = detections,
+            None => {
+                self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);
+                self.measurer.detections(&o.foreground, &o.clusters, &self.priors, &mut o.detections);
+            }
+        }
         tracker.update(&joined.views, &o.detections, &mut o.tracks);
         tracker.priors(time_ns + STEP_NS, &mut self.priors);
         o.health.frames_out_of_order += self.out_of_order;

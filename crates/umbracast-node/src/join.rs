@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use umbracast::detect::Point;
+use umbracast::detect::{Detection, Point};
 use umbracast::lidar::Views;
 use umbracast::{Health, STEP_NS, Site};
 use umbracast_io::nodes::Foreground;
@@ -84,6 +84,8 @@ pub struct Joined {
     pub took_ns: i64,
     /// True where time does not go on from the frame before.
     pub anew: bool,
+    /// Everybody that another perception saw, in place of the foreground.
+    pub detections: Option<Vec<Detection>>,
 }
 
 impl Join {

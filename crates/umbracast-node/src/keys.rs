@@ -1,5 +1,7 @@
 //! The keys of a hall: what is where on the network.
 
+use umbracast::Error;
+
 use crate::role::Role;
 
 /// Keys of one hall, `umbracast/HALL/...`.
@@ -25,7 +27,7 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// Of a hall, whose name is one chunk: [`crate::network::chunk`].
+    /// Of a hall, whose name is one chunk: [`chunk`].
     pub fn new(hall: &str) -> Self {
         Self { hall: hall.to_owned() }
     }
@@ -63,5 +65,19 @@ impl Keys {
     /// Health of a node.
     pub fn health(&self, role: Role, id: &str) -> String {
         self.of(&format!("health/{}/{id}", role.name()))
+    }
+}
+
+/// A name as one chunk of a key: not empty, without what Zenoh gives a meaning.
+///
+/// # Errors
+/// What was found.
+pub fn chunk(name: &str) -> Result<String, Error> {
+    let fits = !name.is_empty() && !name.starts_with('@') && !name.contains(['/', '*', '$', '?', '#']);
+    match fits {
+        true => Ok(name.to_owned()),
+        false => Err(Error::new(format!(
+            "expected a name without / * $ ? # that does not begin with @, found {name:?}"
+        ))),
     }
 }

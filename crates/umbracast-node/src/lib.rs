@@ -2,15 +2,22 @@
 
 pub mod role;
 pub mod keys;
+pub mod access;
+pub mod ros2;
+pub mod mqtt;
+pub mod outward;
 pub mod network;
 pub mod hall;
 pub mod front;
 pub mod join;
+pub mod objects;
 pub mod lead;
 pub mod chain;
 pub mod back;
 pub mod watch;
 pub mod share;
 pub mod node;
+pub mod fleet;
 
 pub use node::{Node, Settings, Source};
+pub use zenoh::Session;

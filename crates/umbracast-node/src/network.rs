@@ -13,7 +13,10 @@ use serde::Deserialize;
 use umbracast::{Error, Site};
 use zenoh::Wait;
 
-use crate::role::Role;
+use crate::access::{self, Works};
+pub use crate::keys::chunk;
+use crate::mqtt::Mqtt;
+use crate::outward::Ros2;
 
 /// Where nodes of one host meet without settings: Zenoh's own port.
 const MEETING_POINT: &str = "127.0.0.1:7447";
@@ -22,6 +25,9 @@ const MEETING_POINT: &str = "127.0.0.1:7447";
 const LEASE_MS: u64 = 2000;
 /// Who is not there is called again after so long, and after twice as long each time, up to the second value.
 const RETRY_MS: [u64; 2] = [100, 800];
+
+/// A visitor calls for so long, ms.
+const VISIT_MS: &str = "3000";
 
 /// `[network]` of the site file. Paths go from the site file's folder.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -39,16 +45,20 @@ pub struct Network {
     pub wait_s: f64,
     /// The name that this node gives at the door of others.
     pub user: Option<String>,
-    /// A file that holds this node's password, alone on a line.
+    /// A file that holds this node's password, alone on a line; without `user` the line is `user:password`.
     pub password_file: Option<PathBuf>,
     /// A file of those who may connect to this node, `user:password` a line.
     pub users_file: Option<PathBuf>,
     /// Certificates, for endpoints that begin with `tls/`.
     pub tls: Option<Tls>,
-    /// Whose work each user, or each certificate's common name, may do.
-    pub roles: BTreeMap<String, Role>,
+    /// What each user, or each certificate's common name, may do here; others nothing. Empty: whoever may connect may all.
+    pub roles: BTreeMap<String, Works>,
     /// True where anybody who reaches an endpoint beyond loopback may connect: a network of one's own.
     pub anyone: bool,
+    /// Where a node that serves tells the hall to ROS 2.
+    pub ros2: Option<Ros2>,
+    /// Where it sends warnings over MQTT.
+    pub mqtt: Option<Mqtt>,
 }
 
 /// How a session stands among others.
@@ -93,6 +103,8 @@ impl Default for Network {
             tls: None,
             roles: BTreeMap::new(),
             anyone: false,
+            ros2: None,
+            mqtt: None,
         }
     }
 }
@@ -119,7 +131,11 @@ impl Network {
         let tls = network.tls.iter_mut().flat_map(|tls| {
             [Some(&mut tls.ca), tls.certificate.as_mut(), tls.key.as_mut()].into_iter().flatten()
         });
-        files.chain(tls).for_each(|path| *path = folder.join(&*path));
+        let mqtt = network
+            .mqtt
+            .iter_mut()
+            .flat_map(|mqtt| [mqtt.password_file.as_mut(), mqtt.ca.as_mut()].into_iter().flatten());
+        files.chain(tls).chain(mqtt).for_each(|path| *path = folder.join(&*path));
         network.check().map_err(|e| e.within(file.display()))?;
         Ok(network)
     }
@@ -136,6 +152,19 @@ impl Network {
             chunk(hall).map_err(|e| e.within("network.hall"))?;
         }
         let guarded = self.users_file.is_some() || self.tls.as_ref().is_some_and(|tls| tls.both);
+        if !self.roles.is_empty() && !guarded {
+            return Err(Error::new(
+                "network.roles: expected a users_file, or tls with both = true, beside it: without them nobody says who \
+                 they are",
+            ));
+        }
+        let unknown = self.connect.iter().find(|endpoint| !endpoint.starts_with("tls/"));
+        if let Some(endpoint) = unknown.filter(|_| !self.roles.is_empty()) {
+            return Err(Error::new(format!(
+                "network.connect: expected tls/ endpoints beside roles, as their certificates say who answers, found \
+                 {endpoint:?}"
+            )));
+        }
         let open = self.listen.iter().find(|endpoint| !is_loopback(endpoint));
         match open.filter(|_| !guarded && !self.anyone) {
             None => Ok(()),
@@ -180,7 +209,7 @@ impl Network {
         let retry = serde_json::json!({
             "period_init_ms": first, "period_max_ms": last, "period_increase_factor": 2,
         });
-        let password = self.password_file.as_ref().map(|file| read_line(file)).transpose()?;
+        let credentials = self.password_file.as_ref().map(|file| self.credentials(file)).transpose()?;
         let mut put = |key: &str, value: serde_json::Value| {
             let wrong = |e| Error::new(format!("network: Zenoh does not take {key} = {value}: {e}"));
             config.insert_json5(key, &value.to_string()).map_err(wrong)
@@ -193,7 +222,10 @@ impl Network {
         put("listen/endpoints", serde_json::json!(listen))?;
         put("scouting/multicast/enabled", false.into())?;
         put("transport/link/tx/lease", LEASE_MS.into())?;
-        if let (Some(user), Some(password)) = (&self.user, &password) {
+        if !self.roles.is_empty() {
+            put("access_control", access::access_control(&self.roles))?;
+        }
+        if let Some((user, password)) = &credentials {
             let wrong = |_| Error::new("network.user: Zenoh does not take this name and password");
             let quoted = |text: &str| serde_json::json!(text).to_string();
             // Not through `put`: its error would show the password.
@@ -220,6 +252,34 @@ impl Network {
         Ok(config)
     }
 
+    /// User and password.
+    fn credentials(&self, file: &Path) -> Result<(String, String), Error> {
+        let line = read_line(file)?;
+        let pair = self.user.as_ref().map(|user| (user.as_str(), line.as_str())).or(line.split_once(':'));
+        let (user, password) = pair.ok_or_else(|| {
+            Error::new("expected user:password, found one word and no network.user").within(file.display())
+        })?;
+        Ok((user.to_owned(), password.to_owned()))
+    }
+
+    /// Opens the session of somebody who looks and goes: nobody meets there.
+    ///
+    /// # Errors
+    /// As [`Self::zenoh`]; where nobody answers.
+    pub fn visit(&self) -> Result<zenoh::Session, Error> {
+        let mut config = Self { mode: Mode::Client, listen: Vec::new(), ..self.clone() }.zenoh(&[])?;
+        for (key, value) in [("connect/timeout_ms", VISIT_MS), ("connect/exit_on_failure", "true")] {
+            config.insert_json5(key, value).map_err(|e| Error::new(format!("network: {key}: {e}")))?;
+        }
+        let meeting = format!("tcp/{MEETING_POINT}");
+        let called = if self.connect.is_empty() { &meeting } else { &self.connect.join(", ") };
+        zenoh::open(config).wait().map_err(|_| {
+            Error::new(format!(
+                "network.connect: nobody at {called} answers, or lets in whoever has these credentials"
+            ))
+        })
+    }
+
     /// Opens the session. Whoever is not there yet is called again until it is.
     ///
     /// # Errors
@@ -239,20 +299,6 @@ impl Network {
             ([], _) => open(&["tcp/127.0.0.1:0".to_owned()]),
             (listen, _) => open(listen),
         }
-    }
-}
-
-/// A name as one chunk of a key: not empty, without what Zenoh gives a meaning.
-///
-/// # Errors
-/// What was found.
-pub fn chunk(name: &str) -> Result<String, Error> {
-    let fits = !name.is_empty() && !name.starts_with('@') && !name.contains(['/', '*', '$', '?', '#']);
-    match fits {
-        true => Ok(name.to_owned()),
-        false => Err(Error::new(format!(
-            "expected a name without / * $ ? # that does not begin with @, found {name:?}"
-        ))),
     }
 }
 

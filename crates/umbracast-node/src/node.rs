@@ -23,6 +23,7 @@ use crate::chain::Row;
 use crate::front::{Expected, Front};
 use crate::hall::{Hall, Outlet, Urgency};
 use crate::role::Role;
+use crate::ros2;
 use crate::share::{Shared, Sharing, keep_state};
 use crate::watch::Watch;
 
@@ -63,6 +64,8 @@ pub struct Settings {
 pub enum Source {
     /// Sockets.
     Doors(Vec<Door>),
+    /// Topics of a domain of ROS 2, one for each sensor, whose place in the site stands before it.
+    Ros2(u32, Vec<(usize, String)>),
     /// A recording, so many times as fast as it was, once front ends of all sensors and all stages are there.
     Replay(Box<dyn Iterator<Item = Arrived> + Send>, f64),
 }
@@ -111,6 +114,9 @@ pub struct Node {
     front_counted: Arc<FrontCounted>,
     backs: Vec<Back>,
     watch: Option<Watch>,
+    /// As ROS 2 sees a front end that reads its topics.
+    driven: Option<ros2::Node>,
+    drivers: Vec<ros2::Subscriber>,
     recorder: Option<Arc<Recorder>>,
     record_status: Arc<Mutex<RecordStatus>>,
     stages: Vec<Role>,
@@ -126,6 +132,8 @@ pub struct Node {
 #[derive(Debug, Default)]
 struct FrontCounted {
     packets: AtomicU64,
+    /// Messages of drivers that hold no packets.
+    broken: AtomicU64,
     frames: AtomicU64,
     priors_late: AtomicU64,
     health: Mutex<Health>,
@@ -165,6 +173,8 @@ impl Node {
             front_counted: Arc::default(),
             backs: Vec::new(),
             watch: None,
+            driven: None,
+            drivers: Vec::new(),
             recorder,
             record_status,
             started_ns: clock.now_ns(),
@@ -265,6 +275,17 @@ impl Node {
         }));
         match source {
             Source::Doors(doors) => self.receivers = Some(Receivers::start(&doors, clock, &packets)?),
+            Source::Ros2(domain, topics) => {
+                let node = ros2::Node::new(self.hall.session(), domain, "", "umbracast_sensor")?;
+                for (sensor, topic) in topics {
+                    let (queue, counted) = (packets.clone(), self.front_counted.clone());
+                    self.drivers.extend(ros2::packets(&node, &topic, move |packet| match packet {
+                        Some(packet) => queue.push(Arrived { sensor, packet }),
+                        None => drop(counted.broken.fetch_add(1, Ordering::Relaxed)),
+                    })?);
+                }
+                self.driven = Some(node);
+            }
             Source::Replay(recorded, rate) => {
                 let names = config.site.sensors.iter().map(|sensor| sensor.name.clone()).collect();
                 self.fed = Some(self.replay(recorded, rate, own.to_vec(), names, packets.clone()));
@@ -337,6 +358,7 @@ impl Node {
             packets_lost: self.packets.as_ref().map_or(0, |packets| packets.lost()),
             frames: front.frames.load(Ordering::Relaxed),
             priors_late: front.priors_late.load(Ordering::Relaxed),
+            broken: front.broken.load(Ordering::Relaxed),
             published: self.hall.published(),
             latency: lock(&front.latency).clone(),
             health: *lock(&front.health),
@@ -397,6 +419,7 @@ impl Node {
         if let Some(receivers) = &mut self.receivers {
             receivers.stop();
         }
+        self.drivers.clear();
         if let Some(packets) = &self.packets {
             packets.close();
         }

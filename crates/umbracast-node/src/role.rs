@@ -23,11 +23,13 @@ pub enum Role {
     Display,
     /// A radio controller: reads warnings and links.
     Controller,
+    /// Passes on between those who do not meet: the door of a site.
+    Router,
 }
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Sensor,
         Self::Track,
         Self::Forecast,
@@ -36,6 +38,7 @@ impl Role {
         Self::Serve,
         Self::Display,
         Self::Controller,
+        Self::Router,
     ];
 
     /// Its name in keys, files and on the command line.
@@ -49,6 +52,7 @@ impl Role {
             Self::Serve => "serve",
             Self::Display => "display",
             Self::Controller => "controller",
+            Self::Router => "router",
         }
     }
 }

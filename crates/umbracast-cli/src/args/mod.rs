@@ -12,7 +12,11 @@ use umbracast_sim::crowd::Preset;
 mod live;
 #[cfg(feature = "node")]
 mod node;
+#[cfg(feature = "node")]
+mod fleet;
 
+#[cfg(feature = "node")]
+pub use fleet::Fleet;
 pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
 #[cfg(feature = "node")]
 pub use node::Node;
@@ -57,6 +61,9 @@ pub enum Command {
     /// One process of a hall whose stages run on several hosts, over Zenoh.
     #[cfg(feature = "node")]
     Node(Node),
+    /// List the halls of a network with their nodes: who is there, what they use, and what is wrong.
+    #[cfg(feature = "node")]
+    Fleet(Fleet),
     /// Listen to the sensors of a site and say what is wrong with them, before the first person comes.
     Check(Check),
     /// Watch a recording in the browser as if it were live.

@@ -12,7 +12,7 @@ use super::live::{PageArgs, RecordArgs, positive};
 /// `node`
 #[derive(Debug, Args)]
 pub struct Node {
-    /// What this process does: sensor, track, forecast, cast, record, serve; several with commas.
+    /// What this process does: sensor, track, forecast, cast, record, serve, router (others meet at it); several with commas.
     #[arg(required_unless_present = "stages", value_name = "STAGE", value_delimiter = ',')]
     pub stage: Vec<Role>,
     /// The same.
@@ -41,6 +41,10 @@ pub struct Node {
     /// sensors' own.
     #[arg(long, value_name = "PORT", conflicts_with = "from")]
     pub port: Option<u16>,
+    /// Packets from these topics of ROS 2 in place of sockets, one for each sensor of the front end, as drivers publish them:
+    /// velodyne_msgs/VelodyneScan or umbracast_msgs/SensorPackets. The domain is that of [network.ros2], else 0.
+    #[arg(long, value_name = "TOPIC", value_delimiter = ',', conflicts_with_all = ["from", "port"])]
+    pub ros2: Vec<String>,
     /// Packets of this recording in place of sockets, at the pace they came, once front ends of all sensors and all stages
     /// are there; several front ends begin together. The node ends with it.
     #[arg(long, value_name = "INPUT")]

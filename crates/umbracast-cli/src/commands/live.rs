@@ -23,6 +23,7 @@ use umbracast_sim::sensor::Sensors;
 use crate::args::{self, Common, LogForm, RecordArgs};
 use crate::ending::Ending;
 use crate::input;
+use crate::outward::Outward;
 use crate::page::Page;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
@@ -50,7 +51,8 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     };
     let title = if args.demo { format!("{}, simulated", config.site.name) } else { config.site.name.clone() };
     let page = Page::open(&args.page, &config.site, &counters, clock, &title)?;
-    let live = Live::start(settings, page.listener())?;
+    let outward = Outward::of_site_file(args.site.site.as_deref(), &config.site)?;
+    let live = Live::start(settings, outward.beside(page.listener()))?;
     for (sensor, address) in config.site.sensors.iter().zip(live.receivers().bound()) {
         say::line(format_args!("{}: UDP port {}", sensor.name, address.port()));
     }
@@ -66,7 +68,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
         std::thread::sleep(TICK);
         events.look(&live);
         if read_again.as_ref().is_some_and(|again| again.swap(false, Ordering::Relaxed)) {
-            events.tell(reload(args, &mut config, &live, &page));
+            events.tell(reload(args, &mut config, &live, &page, &outward));
         }
         if !live.is_well() {
             // What there is shall be finished all the same.
@@ -83,7 +85,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
 }
 
 /// Reads the site file again and takes over what can be; whatever is wrong with it, the run goes on as it was.
-fn reload(args: &args::Live, config: &mut Config, live: &Live, page: &Page) -> Event {
+fn reload(args: &args::Live, config: &mut Config, live: &Live, page: &Page, outward: &Outward) -> Event {
     let stays =
         |told: String| Event::new(Level::Warn, "reload_failed", format!("{told}; all stays as it was"));
     let new = match setup::config(args.mode, args.site.site.as_deref()) {
@@ -95,6 +97,7 @@ fn reload(args: &args::Live, config: &mut Config, live: &Live, page: &Page) -> E
         return stays(format!("what differs needs a restart: {}", apart.join(", ")));
     }
     page.take_over(&new.site);
+    outward.take_over(&new.site);
     live.take_over(new.clone());
     *config = new;
     Event::new(

@@ -5,6 +5,8 @@ pub mod compare;
 pub mod config;
 pub mod coverage;
 pub mod evaluate;
+#[cfg(feature = "node")]
+pub mod fleet;
 pub mod demo;
 pub mod inspect;
 pub mod live;

@@ -16,7 +16,7 @@ use umbracast_live::receive::{Arrived, Door};
 use umbracast_live::run::{Counters, Listener};
 use umbracast_node::hall::Hall;
 use umbracast_node::keys::Keys;
-use umbracast_node::network::{self, Network};
+use umbracast_node::network::{self, Mode, Network};
 use umbracast_node::node::Summary;
 use umbracast_node::role::Role;
 use umbracast_node::share::{self, Shared};
@@ -26,6 +26,7 @@ use super::live;
 use crate::args::{self, Common};
 use crate::ending::Ending;
 use crate::input::{self, Input};
+use crate::outward::Outward;
 use crate::page::Page;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::{say, setup, signal};
@@ -37,7 +38,8 @@ const TELL_S: f64 = 1.0;
 /// Packets that are read ahead.
 const AHEAD: usize = 4096;
 /// What a process may do; the other roles are those of other programs.
-const STAGES: [Role; 6] = [Role::Sensor, Role::Track, Role::Forecast, Role::Cast, Role::Record, Role::Serve];
+const STAGES: [Role; 7] =
+    [Role::Sensor, Role::Track, Role::Forecast, Role::Cast, Role::Record, Role::Serve, Role::Router];
 
 /// Runs until the end is asked for, then says how it went.
 pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
@@ -45,7 +47,10 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let asked = signal::asked_to_end()?;
     let clock = HostClock::start();
     let given = args.site.site.as_deref().map(|path| setup::config(args.mode, Some(path))).transpose()?;
-    let network = network(args)?;
+    let mut network = network(args)?;
+    if stages.contains(&Role::Router) {
+        network.mode = Mode::Router;
+    }
     let name = match (&args.hall, &given) {
         (Some(hall), _) => network::chunk(hall).map_err(|e| e.within("--hall"))?,
         (None, Some(config)) => network.hall(&config.site)?,
@@ -62,6 +67,11 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
         true => Page::open(&args.page, &config.site, &counters, clock, &config.site.name)?,
         false => Page::default(),
     };
+    let session = hall.session().clone();
+    let outward = match stages.contains(&Role::Serve) {
+        true => Outward::of_network(&network, || Ok(session), &name, &config.site)?,
+        false => Outward::default(),
+    };
     let mut record = live::recorder(&args.record);
     if stages.contains(&Role::Record) && record.is_none() {
         return Err(Error::new("node record: expected --record DIR, found none"));
@@ -69,8 +79,8 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     record = record.filter(|_| stages.contains(&Role::Record) || stages.contains(&Role::Sensor));
     let settings = Settings {
         wait: network.wait(),
-        source: source(args, &config.site, &sensors)?,
-        listener: stages.contains(&Role::Serve).then(|| listener(&page, counters)),
+        source: source(args, &network, &config.site, &sensors)?,
+        listener: stages.contains(&Role::Serve).then(|| outward.beside(listener(&page, counters))),
         stages: stages.clone(),
         config: config.clone(),
         weights: Some(weights),
@@ -249,7 +259,17 @@ fn one_input(path: &Path, site: &Site) -> Result<Input, Error> {
 }
 
 /// Sockets, or a recording that is read ahead on a thread of its own.
-fn source(args: &args::Node, site: &Site, own: &[usize]) -> Result<Source, Error> {
+fn source(args: &args::Node, network: &Network, site: &Site, own: &[usize]) -> Result<Source, Error> {
+    if !args.ros2.is_empty() {
+        if args.ros2.len() != own.len() {
+            let (expected, found) = (own.len(), args.ros2.len());
+            return Err(Error::new(format!(
+                "--ros2: expected a topic for each of {expected} sensors, found {found}"
+            )));
+        }
+        let topics = own.iter().copied().zip(args.ros2.iter().cloned()).collect();
+        return Ok(Source::Ros2(network.ros2.map_or(0, |ros2| ros2.domain), topics));
+    }
     let Some(path) = &args.from else {
         let doors = live::doors(
             &Site { sensors: own.iter().map(|&s| site.sensors[s].clone()).collect(), ..site.clone() },

@@ -26,7 +26,9 @@ use crate::messages;
 mod db3;
 mod writer;
 
-pub use writer::{RecordingWriter, Results};
+pub use writer::RecordingWriter;
+
+pub use crate::results::Results;
 
 const CONFIG_TOPIC: &str = "/umbracast/config";
 /// How every SQLite file begins.

@@ -6,15 +6,13 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
-use umbracast::detect::Point;
 use umbracast::lidar::{Frame, Model, Packet};
 use umbracast::{Error, Site};
 
 use super::CONFIG_TOPIC;
 use crate::messages::{self, Schema};
-use crate::rows::{DetectionRow, LinkRow, PeopleLinkRow, PeopleRow, TrackRow};
-use crate::viewers;
-use crate::wire::{self, WireRow};
+use crate::results::{Message, Results};
+use crate::rows::{PeopleLinkRow, PeopleRow};
 
 /// A chunk of what goes on for hours, at most, bytes: a second of two HDL-32E. The index of the file, some 250 bytes a
 /// chunk, stays in memory until the file ends, so chunks should be few.
@@ -25,32 +23,12 @@ pub struct RecordingWriter {
     path: PathBuf,
     mcap: mcap::Writer<BufWriter<File>>,
     site: Site,
-    access_points: Vec<String>,
     clouds: bool,
     /// By sensor: the topic of its packets, and whether they are of a Velodyne's length.
     packets: Vec<(String, bool)>,
     channels: BTreeMap<String, u16>,
     sequence: u32,
     bytes: u64,
-}
-
-/// What a run made of one frame.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Results<'a> {
-    /// The frame's number.
-    pub frame: u64,
-    /// The frame's time; every position is given at it.
-    pub time_ns: i64,
-    /// When a live run published it, in the host's time; else the frame's time. Recordings are ordered by it.
-    pub logged_ns: i64,
-    /// Everybody seen.
-    pub detections: &'a [DetectionRow],
-    /// Everybody followed, with where they will be.
-    pub tracks: &'a [TrackRow],
-    /// Every link.
-    pub links: &'a [LinkRow],
-    /// Points that do not belong to the empty scene; none where nobody asked for them.
-    pub foreground: Option<&'a [Point]>,
 }
 
 impl RecordingWriter {
@@ -98,7 +76,6 @@ impl RecordingWriter {
             path: path.to_owned(),
             mcap,
             packets: packets.collect(),
-            access_points: site.access_points.iter().map(|ap| ap.name.clone()).collect(),
             site: site.clone(),
             clouds: false,
             channels: BTreeMap::new(),
@@ -171,25 +148,10 @@ impl RecordingWriter {
     /// # Errors
     /// A disk that is full or gone.
     pub fn write_results(&mut self, results: &Results) -> Result<(), Error> {
-        let &Results { time_ns, logged_ns, tracks, links, foreground, .. } = results;
-        self.write_rows(results, results.detections)?;
-        self.write_rows(results, tracks)?;
-        self.write_rows(results, links)?;
-        // Who plays a recording with `ros2 bag` sends `/tf_static` once, to nobody who asks later.
-        let poses = messages::transforms(&self.site, time_ns);
-        self.put("/tf", || messages::TRANSFORMS, logged_ns, &poses)?;
-        let markers = viewers::markers(time_ns, &self.site, tracks, links);
-        self.put(viewers::MARKERS_TOPIC, viewers::markers_schema, logged_ns, &markers)?;
-        let people = viewers::people(time_ns, tracks);
-        self.put(viewers::PEOPLE_TOPIC, viewers::people_schema, logged_ns, &people)?;
-        let Some(points) = foreground else { return Ok(()) };
-        let points = viewers::foreground(time_ns, points);
-        self.put(viewers::FOREGROUND_TOPIC, || messages::CLOUD, logged_ns, &points)
-    }
-
-    fn write_rows<R: WireRow>(&mut self, results: &Results, rows: &[R]) -> Result<(), Error> {
-        let message = wire::encode(results.time_ns, results.frame, rows, &self.access_points);
-        self.put(R::TOPIC, wire::schema::<R>, results.logged_ns, &message)
+        for Message { topic, schema, bytes } in results.messages(&self.site) {
+            self.put(topic, schema, results.logged_ns, &bytes)?;
+        }
+        Ok(())
     }
 
     /// A word, on a topic of its own.

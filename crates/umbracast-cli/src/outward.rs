@@ -1,0 +1,61 @@
+//! Who is told beside the page: ROS 2 and MQTT, where `[network]` of the site file says so. A build without nodes has neither.
+
+use std::path::Path;
+
+use umbracast::{Error, Site};
+use umbracast_live::run::Listener;
+
+/// Nobody, or those whom the site file names.
+#[derive(Default)]
+pub struct Outward {
+    #[cfg(feature = "node")]
+    told: Option<std::sync::Arc<umbracast_node::outward::Outward>>,
+}
+
+#[cfg(feature = "node")]
+impl Outward {
+    /// Opens what the site file asks for.
+    pub fn of_site_file(file: Option<&Path>, site: &Site) -> Result<Self, Error> {
+        use umbracast_node::network::Network;
+        let Some(file) = file else { return Ok(Self::default()) };
+        let network = Network::of_site_file(&crate::setup::read_text(file)?, file)?;
+        Self::of_network(&network, || network.open(), &network.hall(site).unwrap_or_default(), site)
+    }
+
+    /// The same of settings that are read already.
+    pub fn of_network(
+        network: &umbracast_node::network::Network,
+        session: impl FnOnce() -> Result<umbracast_node::Session, Error>,
+        hall: &str,
+        site: &Site,
+    ) -> Result<Self, Error> {
+        let told =
+            umbracast_node::outward::Outward::open(session, hall, site, network.ros2, network.mqtt.as_ref())?;
+        Ok(Self { told })
+    }
+
+    /// Who tells `listener` tells them too.
+    pub fn beside(&self, listener: Listener) -> Listener {
+        umbracast_node::outward::Outward::beside(self.told.clone(), listener)
+    }
+
+    /// Another site with the same sensors from the next frame on.
+    pub fn take_over(&self, site: &Site) {
+        if let Some(told) = &self.told {
+            told.take_over(site);
+        }
+    }
+}
+
+#[cfg(not(feature = "node"))]
+impl Outward {
+    pub fn of_site_file(_: Option<&Path>, _: &Site) -> Result<Self, Error> {
+        Ok(Self {})
+    }
+
+    pub fn beside(&self, listener: Listener) -> Listener {
+        listener
+    }
+
+    pub fn take_over(&self, _: &Site) {}
+}

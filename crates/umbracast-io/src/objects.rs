@@ -1,0 +1,149 @@
+//! Lists of objects from others' perception, in place of stage 1 up to the detections.
+//!
+//! A list is JSON, in the frame of the site:
+//!
+//! ```json
+//! { "time_ns": 1700000000100000000,
+//!   "objects": [ { "id": 17, "position_m": [3.1, 4.0, 0.0], "size_m": [0.4, 0.6, 1.7],
+//!                  "velocity_mps": [1.2, 0.1, 0.0], "heading_rad": 0.1, "sigma_m": 0.08 } ] }
+//! ```
+//!
+//! `position_m` is the point on the floor below the middle, `size_m` length, width and height. Velocity, heading and sigma (of
+//! x and of y) may be missing, and so may the third number of position and velocity. `id` and what else stands there is not
+//! read: who is who is decided by our tracker, which knows better how people walk and says how sure it is.
+
+use serde::Deserialize;
+use umbracast::detect::Detection;
+use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+
+/// What a list may hold: more is no list of one hall.
+const OBJECTS_MAX: usize = 4096;
+/// Farther than any hall reaches, metres.
+const FARTHEST_M: f64 = 1e4;
+/// Edges of what can be a person, alone or in a wheelchair, metres.
+const EDGE_M: std::ops::RangeInclusive<f64> = 0.05..=3.0;
+/// Objects are moved on to the frame's end by their velocity for so long at most, seconds.
+const MOVED_S: f64 = 0.5;
+/// Points that a person in free sight gives one HDL-32E at 10 m: a list does not tell how many there were.
+const POINTS: u32 = 60;
+
+/// A list as it was sent.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct ObjectList {
+    /// When it holds, in the time of the hall's sensors.
+    pub time_ns: i64,
+    /// Everybody and everything that was seen.
+    pub objects: Vec<Object>,
+}
+
+/// Somebody or something.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Object {
+    /// On the floor, below the middle: x, y and perhaps z.
+    pub position_m: Vec<f64>,
+    /// Length, width, height.
+    pub size_m: [f64; 3],
+    /// Perhaps: x, y and perhaps z.
+    #[serde(default)]
+    pub velocity_mps: Vec<f64>,
+    /// Of the length, counter-clockwise from +x.
+    #[serde(default)]
+    pub heading_rad: f64,
+    /// Standard deviation of x and of y, if the sender knows it.
+    #[serde(default)]
+    pub sigma_m: Option<f64>,
+}
+
+/// Reads a list; `None` where the bytes are something else.
+pub fn read(json: &[u8]) -> Option<ObjectList> {
+    let list: ObjectList = serde_json::from_slice(json).ok()?;
+    (list.objects.len() <= OBJECTS_MAX).then_some(list)
+}
+
+/// The detections of a list at a frame's end, and how many objects were none: of a size that no person has, or with
+/// numbers that cannot be.
+pub fn detections(list: &ObjectList, time_ns: i64) -> (Vec<Detection>, u64) {
+    let after_s = (time_ns.saturating_sub(list.time_ns) as f64 * 1e-9).clamp(-MOVED_S, MOVED_S);
+    let found: Vec<Detection> =
+        list.objects.iter().filter_map(|object| detection(object, after_s, time_ns)).collect();
+    let none = (list.objects.len() - found.len()) as u64;
+    (found, none)
+}
+
+fn detection(object: &Object, after_s: f64, time_ns: i64) -> Option<Detection> {
+    let position_m = plane(&object.position_m)?;
+    let velocity_mps =
+        if object.velocity_mps.is_empty() { DVec2::ZERO } else { plane(&object.velocity_mps)? };
+    let half_m = 0.5 * DVec3::from_array(object.size_m);
+    let known = object.heading_rad.is_finite() && object.sigma_m.is_none_or(|s| s > 0.0 && s < FARTHEST_M);
+    if !object.size_m.iter().all(|edge_m| EDGE_M.contains(edge_m)) || !known {
+        return None;
+    }
+    let position_m = position_m + after_s * velocity_mps;
+    let obb = Obb {
+        center_m: position_m.extend(half_m.z),
+        half_m,
+        site_from_box: DMat3::from_rotation_z(object.heading_rad),
+    };
+    let (sin, cos) = object.heading_rad.sin_cos();
+    let (sin, cos) = (sin.abs(), cos.abs());
+    let reach_m = DVec3::new(cos * half_m.x + sin * half_m.y, sin * half_m.x + cos * half_m.y, half_m.z);
+    Some(Detection {
+        position_m,
+        covariance_m2: object.sigma_m.map(|sigma_m| [[sigma_m.powi(2), 0.0], [0.0, sigma_m.powi(2)]]),
+        z_m: half_m.z,
+        time_ns,
+        points: POINTS,
+        full_body: true,
+        top_m: object.size_m[2],
+        limbs: None,
+        aabb: Aabb { min_m: obb.center_m - reach_m, max_m: obb.center_m + reach_m },
+        obb,
+    })
+}
+
+/// The first two of two or three numbers that can be.
+fn plane(values: &[f64]) -> Option<DVec2> {
+    let (&[x, y] | &[x, y, _]) = values else { return None };
+    (x.abs() < FARTHEST_M && y.abs() < FARTHEST_M).then_some(DVec2::new(x, y))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIST: &str = r#"{ "time_ns": 900, "vendor": "x", "objects": [
+        { "id": 17, "position_m": [3.0, 4.0, 0.0], "size_m": [0.4, 0.6, 1.7], "velocity_mps": [1.0, 0.0, 0.0],
+          "heading_rad": 1.5707963267948966, "sigma_m": 0.1 },
+        { "id": "car", "position_m": [9.0, 4.0], "size_m": [4.2, 1.8, 1.5] },
+        { "position_m": [5.0, 6.0], "size_m": [0.5, 0.5, 1.6] } ] }"#;
+
+    #[test]
+    fn people_of_a_list_are_detections_at_the_frames_end() {
+        let list = read(LIST.as_bytes()).unwrap();
+        let (found, none) = detections(&list, 200_000_900);
+        assert_eq!((found.len(), none), (2, 1), "a car is nobody");
+        let first = &found[0];
+        assert!(first.position_m.abs_diff_eq(DVec2::new(3.2, 4.0), 1e-9));
+        assert!(first.aabb.size_m().abs_diff_eq(DVec3::new(0.6, 0.4, 1.7), 1e-9), "turned by a right angle");
+        assert_eq!((first.covariance_m2.unwrap()[0][0], first.time_ns), (0.1 * 0.1, 200_000_900));
+        assert_eq!((found[1].covariance_m2, found[1].top_m), (None, 1.6));
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_are_left_out() {
+        let of = |object: &str| {
+            let list = read(format!("{{\"time_ns\": 0, \"objects\": [{object}]}}").as_bytes())?;
+            Some(detections(&list, i64::MAX))
+        };
+        for object in [
+            r#"{ "position_m": [1e300, 0.0], "size_m": [0.5, 0.5, 1.7] }"#,
+            r#"{ "position_m": [0.0], "size_m": [0.5, 0.5, 1.7] }"#,
+            r#"{ "position_m": [0.0, 0.0], "size_m": [0.5, 0.5, -1.7] }"#,
+            r#"{ "position_m": [0.0, 0.0], "size_m": [0.5, 0.5, 1.7], "sigma_m": -1.0 }"#,
+        ] {
+            assert_eq!(of(object), Some((Vec::new(), 1)), "{object}");
+        }
+        assert!(of("7").is_none() && read(b"\xff").is_none() && read(b"{}").is_none());
+    }
+}

@@ -1,0 +1,81 @@
+//! What a run made of one frame, and the messages that say it: recorded and published alike.
+
+use umbracast::Site;
+use umbracast::detect::Point;
+
+use crate::messages::{self, Schema};
+use crate::rows::{DetectionRow, LinkRow, TrackRow};
+use crate::viewers;
+use crate::wire::{self, WireRow};
+
+/// What a run made of one frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Results<'a> {
+    /// The frame's number.
+    pub frame: u64,
+    /// The frame's time; every position is given at it.
+    pub time_ns: i64,
+    /// When a live run published it, in the host's time; else the frame's time. Recordings are ordered by it.
+    pub logged_ns: i64,
+    /// Everybody seen.
+    pub detections: &'a [DetectionRow],
+    /// Everybody followed, with where they will be.
+    pub tracks: &'a [TrackRow],
+    /// Every link.
+    pub links: &'a [LinkRow],
+    /// Points that do not belong to the empty scene; none where nobody asked for them.
+    pub foreground: Option<&'a [Point]>,
+}
+
+/// What gives a message's type, for who needs it.
+pub type SchemaOf = fn() -> Schema;
+
+/// A message with the topic it goes to.
+#[derive(Debug, Clone)]
+pub struct Message {
+    /// As ROS 2 names it.
+    pub topic: &'static str,
+    /// Its type.
+    pub schema: SchemaOf,
+    /// Its CDR.
+    pub bytes: Vec<u8>,
+}
+
+/// The topics of [`Results::messages`] that every frame has, with their types.
+pub const TOPICS: [(&str, SchemaOf); 6] = [
+    (DetectionRow::TOPIC, wire::schema::<DetectionRow>),
+    (TrackRow::TOPIC, wire::schema::<TrackRow>),
+    (LinkRow::TOPIC, wire::schema::<LinkRow>),
+    ("/tf", transforms_schema),
+    (viewers::MARKERS_TOPIC, viewers::markers_schema),
+    (viewers::PEOPLE_TOPIC, viewers::people_schema),
+];
+
+impl Results<'_> {
+    /// The frame's messages in the order of [`TOPICS`], and the foreground behind them where somebody asked for it.
+    pub fn messages(&self, site: &Site) -> Vec<Message> {
+        let &Results { frame, time_ns, detections, tracks, links, foreground, .. } = self;
+        let access_points: Vec<String> = site.access_points.iter().map(|ap| ap.name.clone()).collect();
+        let every = [
+            wire::encode(time_ns, frame, detections, &access_points),
+            wire::encode(time_ns, frame, tracks, &access_points),
+            wire::encode(time_ns, frame, links, &access_points),
+            // Who plays a recording with `ros2 bag` sends `/tf_static` once, to nobody who asks later.
+            messages::transforms(site, time_ns),
+            viewers::markers(time_ns, site, tracks, links),
+            viewers::people(time_ns, tracks),
+        ];
+        let every =
+            TOPICS.into_iter().zip(every).map(|((topic, schema), bytes)| Message { topic, schema, bytes });
+        let points = foreground.map(|points| Message {
+            topic: viewers::FOREGROUND_TOPIC,
+            schema: || messages::CLOUD,
+            bytes: viewers::foreground(time_ns, points),
+        });
+        every.chain(points).collect()
+    }
+}
+
+fn transforms_schema() -> Schema {
+    messages::TRANSFORMS
+}

@@ -1,0 +1,91 @@
+//! What a hall tells those who speak other languages: topics of ROS 2, warnings over MQTT.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde::Deserialize;
+use umbracast::{Error, Site};
+use umbracast_io::results::Results;
+use umbracast_live::Published;
+use umbracast_live::run::Listener;
+use zenoh::Session;
+
+use crate::mqtt::{Mqtt, Sender};
+use crate::ros2::{Face, names};
+
+/// `[network.ros2]` of the site file.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ros2 {
+    /// `ROS_DOMAIN_ID`.
+    #[serde(default)]
+    pub domain: u32,
+    /// True where halls share a domain: every topic begins with the hall's name.
+    #[serde(default)]
+    pub namespace: bool,
+}
+
+/// Tells every frame. Shared by whoever tells it.
+pub struct Outward {
+    face: Option<Mutex<Face>>,
+    sender: Option<Sender>,
+}
+
+impl Outward {
+    /// Opens what is asked for; `None` where that is nothing. Only ROS 2 needs a session.
+    ///
+    /// # Errors
+    /// A session that cannot be opened, a hall that ROS 2 cannot name, a broker's name that is none.
+    pub fn open(
+        session: impl FnOnce() -> Result<Session, Error>,
+        hall: &str,
+        site: &Site,
+        ros2: Option<Ros2>,
+        mqtt: Option<&Mqtt>,
+    ) -> Result<Option<Arc<Self>>, Error> {
+        let face = |Ros2 { domain, namespace }| {
+            let namespace = if namespace { names::namespace(hall)? } else { String::new() };
+            Face::new(&session()?, domain, &namespace, site).map(Mutex::new)
+        };
+        let face = ros2.map(face).transpose().map_err(|e| e.within("network.ros2"))?;
+        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall)).transpose()?;
+        Ok((face.is_some() || sender.is_some()).then(|| Arc::new(Self { face, sender })))
+    }
+
+    /// Who tells `listener` tells this too.
+    pub fn beside(this: Option<Arc<Self>>, listener: Listener) -> Listener {
+        match this {
+            None => listener,
+            Some(this) => Box::new(move |published| {
+                listener(published);
+                this.tell(published);
+            }),
+        }
+    }
+
+    /// Another site with the same sensors from the next frame on.
+    pub fn take_over(&self, site: &Site) {
+        if let Some(face) = &self.face {
+            face.lock().unwrap_or_else(PoisonError::into_inner).take_over(site);
+        }
+    }
+
+    /// Tells a frame; waits for nobody.
+    fn tell(&self, published: &Published) {
+        if let Some(sender) = &self.sender {
+            published.events.iter().for_each(|event| sender.send(event));
+        }
+        let Some(face) = &self.face else { return };
+        let results = Results {
+            frame: published.frame,
+            time_ns: published.time_ns,
+            logged_ns: published.published_ns,
+            detections: &published.detections,
+            tracks: &published.tracks,
+            links: &published.links,
+            foreground: published.foreground.as_deref(),
+        };
+        let mut face = face.lock().unwrap_or_else(PoisonError::into_inner);
+        // An error is a session that was closed: then nobody is there to be told.
+        let _ = face.publish(&results);
+    }
+}

@@ -1,0 +1,109 @@
+//! What comes in place of sensors' packets: lists of another perception, and topics of ROS 2.
+
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use umbracast::geometry::DVec2;
+use umbracast::{Config, STEP_NS};
+use umbracast_io::nodes::{Followed, Foreground};
+use umbracast_io::{fields, messages};
+use umbracast_live::HostClock;
+use umbracast_node::hall::Hall;
+use umbracast_node::keys::Keys;
+use umbracast_node::role::Role;
+use umbracast_node::share::Shared;
+use umbracast_node::{Node, Settings, Source, ros2};
+use umbracast_sim::crowd::{Preset, Stroll};
+use umbracast_sim::scene::Scene;
+use zenoh::Wait;
+
+const SOON: Duration = Duration::from_secs(10);
+
+/// A hall of its own, which nobody else reaches.
+fn hall() -> Hall {
+    let mut config = zenoh::Config::default();
+    config.insert_json5("listen/endpoints", "[]").unwrap();
+    config.insert_json5("scouting/multicast/enabled", "false").unwrap();
+    Hall::new(zenoh::open(config).wait().unwrap(), Keys::new("lab"))
+}
+
+fn settings(stages: &[Role], config: &Config, source: Source) -> Settings {
+    Settings {
+        stages: stages.to_vec(),
+        config: config.clone(),
+        weights: None,
+        sensors: (0..config.site.sensors.len()).collect(),
+        source,
+        empty: Vec::new(),
+        wait: Duration::from_millis(100),
+        record: None,
+        listener: None,
+        shared: Shared::default(),
+        clock: HostClock::start(),
+    }
+}
+
+fn heard<M: fields::Message + Send + 'static>(hall: &Hall, key: &str) -> Receiver<M> {
+    let (sender, receiver) = channel();
+    let hear = move |sample: zenoh::sample::Sample| {
+        let message = fields::decode::<M>(&sample.payload().to_bytes()).expect("a message");
+        let _ = sender.send(message); // The test may be over.
+    };
+    hall.session().declare_subscriber(hall.keys().of(key)).callback(hear).background().wait().unwrap();
+    receiver
+}
+
+#[test]
+fn people_of_another_perception_are_followed_and_foreseen() {
+    let (hall, config) = (hall(), Config::default());
+    let tracks = heard::<Followed>(&hall, "tracks");
+    let stages = [Role::Track, Role::Forecast, Role::Cast];
+    let node = Node::start(hall.clone(), settings(&stages, &config, Source::Doors(Vec::new()))).unwrap();
+    let start_ns = 1_700_000_000_000_000_000;
+    let mut last = Followed::default();
+    for frame in 0..20_i64 {
+        let (time_ns, x_m) = (start_ns + frame * STEP_NS, 0.12 * frame as f64 - 1.0);
+        let list = serde_json::json!({ "time_ns": time_ns, "objects": [
+            { "id": 7, "position_m": [x_m, 0.5], "size_m": [0.3, 0.5, 1.75], "velocity_mps": [1.2, 0.0] },
+            { "id": 8, "position_m": [3.0, 3.0], "size_m": [4.0, 1.8, 1.5] },
+        ] });
+        hall.session().put(hall.keys().of("objects/vendor"), list.to_string()).wait().unwrap();
+        last = tracks.recv_timeout(SOON).expect("a frame");
+        assert_eq!(last.time_ns, time_ns);
+    }
+    let confirmed: Vec<_> = last.tracks.iter().filter(|track| track.confirmed).collect();
+    assert_eq!((confirmed.len(), last.forecasts.len()), (1, 1), "the car is nobody");
+    let apart_m = confirmed[0].position_m.distance(DVec2::new(0.12 * 19.0 - 1.0, 0.5));
+    assert!(apart_m < 0.2 && (confirmed[0].velocity_mps.x - 1.2).abs() < 0.3, "{:?}", confirmed[0]);
+    assert_eq!(last.health.points_invalid, 20, "one car a frame");
+    hall.session().put(hall.keys().of("objects/vendor"), "{}").wait().unwrap();
+    let summary = node.stop();
+    assert_eq!((summary.frames, summary.broken), (20, 1));
+}
+
+#[test]
+fn packets_of_drivers_give_foreground() {
+    let (hall, config) = (hall(), Config::default());
+    let topics = (0..config.site.sensors.len()).map(|s| (s, format!("/lidar_{s}/velodyne_packets")));
+    let topics: Vec<(usize, String)> = topics.collect();
+    let foreground = heard::<Foreground>(&hall, "sensor/*/foreground");
+    let source = Source::Ros2(3, topics.clone());
+    let node = Node::start(hall.clone(), settings(&[Role::Sensor], &config, source)).unwrap();
+    let driver = ros2::Node::new(hall.session(), 3, "", "velodyne_driver").unwrap();
+    let publisher = |topic: &(usize, String)| driver.publisher(&topic.1, &messages::SCAN).unwrap();
+    let mut publishers: Vec<ros2::Publisher> = topics.iter().map(publisher).collect();
+    let crowd = Stroll::new(Preset::Orca03, 3, 12.5, 7).leg(1);
+    let mut scene = Scene::new(crowd, &config.site, 7).unwrap();
+    while let Some(frame) = scene.next_frame() {
+        for (publisher, packets) in publishers.iter_mut().zip(&frame.packets) {
+            publisher.publish(1, messages::scan(frame.time_ns, "lidar", packets)).unwrap();
+        }
+    }
+    publishers[0].publish(1, b"no message".to_vec()).unwrap();
+    for frame in 1..8 {
+        let message = foreground.recv_timeout(SOON).expect("a frame");
+        assert_eq!((message.time_ns, message.views.len()), (frame * STEP_NS, publishers.len()));
+    }
+    let summary = node.stop();
+    assert_eq!((summary.broken, summary.health.is_clean()), (1, true), "{:?}", summary.health);
+}

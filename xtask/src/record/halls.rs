@@ -1,0 +1,43 @@
+//! Many halls: how many one host carries, what gives first, and what the deployment files make of three.
+
+use super::book::Book;
+use super::keep;
+use crate::tools::{Result, root};
+
+/// Seconds that each number of halls is looked at.
+const SECONDS: u64 = 30;
+const BUILD: &str = "cargo build --release --quiet --package umbracast-cli --features node";
+
+/// 1 to 64 halls of ten people, two sensors each: front ends simulated, everything behind them one process a hall.
+pub fn halls(book: &mut Book) -> Result<()> {
+    built_with_nodes(book)?;
+    let picture = book.scratch("halls.svg");
+    let run = |command: &str, picture: &str| {
+        format!(
+            "cargo run --release --quiet --package umbracast-node --example halls -- {command} {SECONDS} {picture} \
+             1 2 4 8 16 32 64 96"
+        )
+    };
+    book.command(&run("umbracast", "halls.svg"));
+    let command = book.umbracast().display().to_string();
+    let said = book.bash(&root(), &run(&command, &picture.display().to_string()))?;
+    book.line(&said);
+    keep(book, &picture, "halls.svg")
+}
+
+/// The deployment files as a container engine and a cluster would read them.
+pub fn deployed(book: &mut Book) -> Result<()> {
+    built_with_nodes(book)?;
+    for kind in ["compose", "kubernetes"] {
+        book.command(&format!("deploy/nodes/try.py umbracast {kind}"));
+        let said = book.bash(&root(), &format!("deploy/nodes/try.py \"$(command -v umbracast)\" {kind}"))?;
+        book.line(&said);
+    }
+    Ok(())
+}
+
+fn built_with_nodes(book: &mut Book) -> Result<()> {
+    book.command(BUILD);
+    let said = book.bash(&root(), BUILD)?;
+    if said.trim().is_empty() { Ok(()) } else { Err(said) }
+}
