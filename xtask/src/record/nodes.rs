@@ -14,7 +14,7 @@ pub fn nodes(book: &mut Book) -> Result<()> {
          cp {target}/release/umbracast {command}"
     );
     let said = book.bash(&root(), &build)?;
-    let faults = "cargo run --release --quiet --package umbracast-node --example faults --";
+    let faults = "cargo run --release --quiet --package umbracast-node --example node_faults --";
     book.command(&format!("{faults} /tmp/umbracast 600 30"));
     book.line(&said);
     let said = book.bash(&root(), &format!("{faults} {command} 600 30"))?;

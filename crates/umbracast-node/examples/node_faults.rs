@@ -1,6 +1,6 @@
 //! A hall in three network namespaces, as on three hosts: whether its results are those of one process, what the wire
 //! adds, and what happens when something fails. Needs root, `ip` and `python3`:
-//! `faults UMBRACAST SECONDS SECONDS`, with the command built with the feature `node`, the length of the comparison and
+//! `node_faults UMBRACAST SECONDS SECONDS`, with the command built with the feature `node`, the length of the comparison and
 //! that of each failure's run. `short`, behind them: a few failures, and an error where what must happen does not.
 
 use std::collections::{BTreeMap, BTreeSet};
