@@ -1,6 +1,6 @@
 //! Removes the points that belong to the empty scene.
 
-use super::sensor_model::{Clip, Learn, SensorModel, to_site, unorganised_point};
+use super::sensor_model::{Clip, Learn, Look, SensorModel, to_site, unorganised_point};
 use super::voxel::{VoxelMap, thin};
 use super::{Point, Prior};
 use crate::config::{BackgroundMethod, DetectConfig};
@@ -11,7 +11,7 @@ use crate::{Frame, Health, Site};
 /// Somebody who stands still must not be learned: nothing is within this distance of an expected person.
 const FREEZE_M: f64 = 0.5;
 /// Most foreground points kept of one frame: 100 people close to the sensors. Bounds the time of a frame.
-pub const POINTS_MAX: usize = 40_000;
+const POINTS_MAX: usize = 40_000;
 /// Voxels: hdl_people_tracking's edge and threshold.
 const VOXEL_M: f64 = 0.2;
 const VOXEL_POINTS_MIN: u8 = 2;
@@ -155,8 +155,7 @@ impl Background {
                 }
             }
         }
-        health.points_over_limit += points.len().saturating_sub(POINTS_MAX) as u64;
-        points.truncate(POINTS_MAX);
+        keep_most(points, health);
     }
 
     /// Adds a scan to the map until it has enough.
@@ -209,8 +208,14 @@ impl Background {
     /// One scan against its sensor's range image; what is new goes to `points`.
     fn scan(&mut self, scan: &Scan, learn: Option<Learn>, health: &mut Health, points: &mut Vec<Point>) {
         let Some(sensor) = self.sensors.get_mut(scan.sensor) else { return };
-        sensor.scan(scan, &self.clip, learn, self.known, health, points);
+        sensor.scan(Look { scan, clip: &self.clip, learn }, self.known, health, points);
     }
+}
+
+/// Gives up, and counts, the points beyond what a frame may have.
+pub fn keep_most(points: &mut Vec<Point>, health: &mut Health) {
+    health.points_over_limit += points.len().saturating_sub(POINTS_MAX) as u64;
+    points.truncate(POINTS_MAX);
 }
 
 /// An order that does not depend on how the points came.

@@ -22,7 +22,7 @@ mod doubled;
 
 pub use background::Background;
 #[doc(hidden)] // For who joins the foreground of several front ends.
-pub use background::POINTS_MAX;
+pub use background::keep_most;
 pub use doubled::doubled;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;

@@ -70,6 +70,15 @@ impl Learn<'_> {
     }
 }
 
+/// One scan, and what is asked of it.
+#[derive(Clone, Copy)]
+pub(super) struct Look<'a> {
+    pub(super) scan: &'a Scan,
+    pub(super) clip: &'a Clip,
+    /// `None`: nothing is learned of it.
+    pub(super) learn: Option<Learn<'a>>,
+}
+
 /// Where people can be: the hall is known, so what lies outside is a reflection.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clip {
@@ -106,45 +115,29 @@ impl SensorModel {
     }
 
     /// One scan; what is new goes to `points`. The scene is `known` once it was learned without people.
-    pub(super) fn scan(
-        &mut self,
-        scan: &Scan,
-        clip: &Clip,
-        learn: Option<Learn>,
-        known: bool,
-        health: &mut Health,
-        points: &mut Vec<Point>,
-    ) {
-        let ranges = match &scan.cloud {
+    pub(super) fn scan(&mut self, look: Look, known: bool, health: &mut Health, points: &mut Vec<Point>) {
+        let ranges = match &look.scan.cloud {
             Cloud::Organised(image) => {
-                self.organised(scan, image, clip, learn, health, points);
+                self.organised(look, image, health, points);
                 &mut self.ranges
             }
             Cloud::Unorganised(cloud) => {
-                self.unorganised(scan, cloud, clip, learn, health, points);
+                self.unorganised(look, cloud, health, points);
                 &mut self.cloud_ranges
             }
         };
-        if learn.is_some() {
+        if look.learn.is_some() {
             ranges.close_revolution(known);
         }
     }
 
-    fn organised(
-        &mut self,
-        scan: &Scan,
-        image: &RangeImage,
-        clip: &Clip,
-        learn: Option<Learn>,
-        health: &mut Health,
-        points: &mut Vec<Point>,
-    ) {
+    fn organised(&mut self, look: Look, image: &RangeImage, health: &mut Health, points: &mut Vec<Point>) {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has just said that it has what the function was compiled for.
-            return unsafe { self.organised_avx2(scan, image, clip, learn, health, points) };
+            return unsafe { self.organised_avx2(look, image, health, points) };
         }
-        self.organised_portably(scan, image, clip, learn, health, points);
+        self.organised_portably(look, image, health, points);
     }
 
     /// Once more for processors with wider registers; no instruction that rounds otherwise is used, so both give the same
@@ -153,26 +146,23 @@ impl SensorModel {
     #[target_feature(enable = "avx2")]
     fn organised_avx2(
         &mut self,
-        scan: &Scan,
+        look: Look,
         image: &RangeImage,
-        clip: &Clip,
-        learn: Option<Learn>,
         health: &mut Health,
         points: &mut Vec<Point>,
     ) {
-        self.organised_portably(scan, image, clip, learn, health, points);
+        self.organised_portably(look, image, health, points);
     }
 
     #[inline(always)]
     fn organised_portably(
         &mut self,
-        scan: &Scan,
+        look: Look,
         image: &RangeImage,
-        clip: &Clip,
-        learn: Option<Learn>,
         health: &mut Health,
         points: &mut Vec<Point>,
     ) {
+        let Look { scan, clip, learn } = look;
         let beams = image.beams.len();
         if beams == 0 {
             return;
@@ -229,13 +219,12 @@ impl SensorModel {
 
     fn unorganised(
         &mut self,
-        scan: &Scan,
+        look: Look,
         cloud: &[SensorPoint],
-        clip: &Clip,
-        learn: Option<Learn>,
         health: &mut Health,
         points: &mut Vec<Point>,
     ) {
+        let Look { scan, clip, learn } = look;
         self.sort_returns(cloud, learn.is_some_and(|learn| learn.on_the_way), health);
         for i in 0..self.returns.len() {
             let Return { elevation_bin, azimuth_cdeg, range_m, point } = self.returns[i];

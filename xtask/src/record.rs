@@ -3,7 +3,6 @@
 
 mod book;
 mod crowds;
-mod halls;
 mod house;
 mod locked;
 mod nodes;
@@ -54,8 +53,8 @@ const JOBS: [Job; 29] = [
     job("growth", "how long a step takes with more people and access points", Needs::Nothing, house::growth),
     job("live", "ten minutes live, three times over, the page open", Needs::Asking, house::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", Needs::Asking, nodes::nodes),
-    job("halls", "1 to 64 halls on one host", Needs::Asking, halls::halls),
-    job("deployed", "the files for containers and clusters, run here", Needs::Asking, halls::deployed),
+    job("halls", "1 to 64 halls on one host", Needs::Asking, nodes::halls),
+    job("deployed", "the files for containers and clusters, run here", Needs::Asking, nodes::deployed),
     job("faults", "a live run in which something fails", Needs::Nothing, house::faults),
     job("kills", "a recording run killed at twenty moments", Needs::Nothing, house::kills),
     job("same-bytes", "the same seed on one thread and on two", Needs::Nothing, house::same_bytes),

@@ -85,15 +85,8 @@ fn drawn(rows: &[Row]) -> String {
             x_label: x_label.to_owned(),
             x: (0.0, most(|p| p.0)),
             y: (0.0, 1.1 * most(|p| p.1)),
-            x_step: None,
-            y_step: None,
-            y_digits: 0,
-            y_names: Vec::new(),
-            y_log: false,
-            equal_axes: false,
             series,
-            shaded: Vec::new(),
-            notes: Vec::new(),
+            ..Panel::default()
         }
     };
     let panels = [

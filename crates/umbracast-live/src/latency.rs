@@ -63,6 +63,11 @@ impl Latencies {
         Duration::ZERO
     }
 
+    /// The same in milliseconds.
+    pub fn quantile_ms(&self, share: f64) -> f64 {
+        self.quantile(share).as_secs_f64() * 1e3
+    }
+
     /// How many took no longer than this, within the histogram's steps.
     pub fn within(&self, limit: Duration) -> u64 {
         let step = (limit.as_secs_f64() * 1e6).max(1.0).log10() * PER_DECADE;

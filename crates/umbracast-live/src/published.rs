@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use umbracast::detect::Point;
 use umbracast::{Frame, Health, Outcome, Site};
+use umbracast_io::results::Results;
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
 use umbracast_io::wire;
 
@@ -56,21 +57,30 @@ impl Published {
     pub fn of(outcome: &Outcome, frame: &Frame, sensors: usize, access_points: &Arc<[String]>) -> Self {
         let (mut tracks, mut links) = (Vec::new(), Vec::new());
         rows::of_outcome(0, outcome, &mut tracks, &mut links);
-        let every = outcome.foreground.len().div_ceil(POINTS_DRAWN).max(1);
-        let in_cm = |value_m: f64| (value_m * 100.0).round() as i16; // Saturates beyond 327 m.
         Self {
             frame: outcome.frame,
             time_ns: outcome.time_ns,
             detections: rows::detections(0, outcome).collect(),
             tracks,
             links,
-            points_cm: (outcome.foreground.iter().step_by(every))
-                .map(|point| point.position_m.to_array().map(in_cm))
-                .collect(),
+            points_cm: points_cm(&outcome.foreground),
             health: outcome.health,
             sensors: (0..sensors).map(|s| frame.scans.iter().any(|scan| scan.sensor == s)).collect(),
             access_points: access_points.clone(),
             ..Self::default()
+        }
+    }
+
+    /// As recordings and the topics of ROS 2 carry it.
+    pub fn results(&self) -> Results<'_> {
+        Results {
+            frame: self.frame,
+            time_ns: self.time_ns,
+            logged_ns: self.published_ns,
+            detections: &self.detections,
+            tracks: &self.tracks,
+            links: &self.links,
+            foreground: self.foreground.as_deref(),
         }
     }
 
@@ -97,6 +107,13 @@ impl Published {
         }
         value
     }
+}
+
+/// What is drawn of a frame's new points.
+pub fn points_cm(foreground: &[Point]) -> Vec<[i16; 3]> {
+    let every = foreground.len().div_ceil(POINTS_DRAWN).max(1);
+    let in_cm = |value_m: f64| (value_m * 100.0).round() as i16; // Saturates beyond 327 m.
+    foreground.iter().step_by(every).map(|point| point.position_m.to_array().map(in_cm)).collect()
 }
 
 /// The names of a site's access points, as every frame carries them.

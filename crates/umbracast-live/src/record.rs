@@ -10,7 +10,7 @@ use std::time::{Duration, SystemTime};
 use serde::Serialize;
 use umbracast::lidar::Packet;
 use umbracast::{Config, Error, STEP_NS};
-use umbracast_io::recording::{RecordingWriter, Results};
+use umbracast_io::recording::RecordingWriter;
 
 use crate::published::Published;
 use crate::queue::{Popped, Queue, WhenFull};
@@ -183,16 +183,7 @@ impl Files {
                 }
             }
             Item::Result(published) => {
-                let results = Results {
-                    frame: published.frame,
-                    time_ns: published.time_ns,
-                    logged_ns: published.published_ns,
-                    detections: &published.detections,
-                    tracks: &published.tracks,
-                    links: &published.links,
-                    foreground: published.foreground.as_deref(),
-                };
-                self.write(published.published_ns, 1, |writer| writer.write_results(&results));
+                self.write(published.published_ns, 1, |writer| writer.write_results(&published.results()));
             }
         }
     }

@@ -333,15 +333,9 @@ fn drawn(rows: &[Row]) -> Result<String, Error> {
             x_label: "halls".to_owned(),
             x: (0.0, halls),
             y: (0.0, 1.1 * top.max(f64::MIN_POSITIVE)),
-            x_step: None,
-            y_step: None,
             y_digits: 1,
-            y_names: Vec::new(),
-            y_log: false,
-            equal_axes: false,
             series,
-            shaded: Vec::new(),
-            notes: Vec::new(),
+            ..Panel::default()
         }
     };
     let cores = vec![

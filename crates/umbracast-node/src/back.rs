@@ -2,7 +2,6 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use umbracast::forecast::Weights;
@@ -25,6 +24,7 @@ use crate::join::{Join, Joined};
 use crate::lead::Lead;
 use crate::objects::Lists;
 use crate::role::Role;
+use crate::worker::Worker;
 
 /// Messages that wait for the stages: more than a second of four front ends.
 const WAITING: usize = 64;
@@ -38,7 +38,7 @@ const STATE_EVERY: u64 = 5;
 const SILENCE_NS: i64 = 1_000_000_000;
 
 /// What comes to the thread.
-enum Heard {
+pub(crate) enum Heard {
     Foreground(ZBytes),
     Followed(ZBytes),
     Priors(ZBytes),
@@ -75,8 +75,8 @@ pub struct Counted {
 
 /// A running row.
 pub struct Back {
-    queue: Arc<Queue<(Heard, i64)>>,
-    thread: Option<JoinHandle<()>>,
+    /// Its thread.
+    pub(crate) worker: Worker<(Heard, i64)>,
     /// What it counts.
     pub counted: Arc<Counted>,
     _subscribers: Vec<Subscriber<()>>,
@@ -100,7 +100,7 @@ impl Back {
         let counted = Arc::new(Counted::default());
         let chain = Chain::new(config, weights, row)?;
         let outlets = Outlets::new(hall, config, row)?;
-        let mut worker = Worker {
+        let mut stages = Stages {
             chain,
             outlets,
             join: Join::new(&config.site, wait),
@@ -133,9 +133,9 @@ impl Back {
                 let source = key.rsplit('/').next().unwrap_or_default().to_owned();
                 lists.push((Heard::Objects(source, bytes.clone()), clock.now_ns()));
             })?);
-            worker.take_up(hall);
+            stages.take_up(hall);
             if hall.nodes(Role::Track, ANSWER).iter().all(|id| id.ends_with(&hall.id())) {
-                worker.take_over();
+                stages.take_over();
             }
             let asked = queue.clone();
             queryable = Some(hall.answer(&hall.keys().of("state"), move |query| {
@@ -144,22 +144,8 @@ impl Back {
         } else {
             subscribers.push(hear(if row.forecast { "followed" } else { "tracks" }, Heard::Followed)?);
         }
-        let items = queue.clone();
-        let thread = std::thread::spawn(move || worker.run(&items));
-        Ok(Self { queue, thread: Some(thread), counted, _subscribers: subscribers, _queryable: queryable })
-    }
-
-    /// True while its thread works.
-    pub fn is_well(&self) -> bool {
-        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
-    }
-
-    /// Does what has come, and ends.
-    pub fn stop(&mut self) {
-        self.queue.close();
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+        let worker = Worker::start(queue, move |items| stages.run(items));
+        Ok(Self { worker, counted, _subscribers: subscribers, _queryable: queryable })
     }
 }
 
@@ -223,8 +209,8 @@ impl Outlets {
     }
 }
 
-/// The thread.
-struct Worker {
+/// What the thread has.
+struct Stages {
     chain: Chain,
     outlets: Outlets,
     join: Join,
@@ -238,7 +224,7 @@ struct Worker {
     counted: Arc<Counted>,
 }
 
-impl Worker {
+impl Stages {
     fn run(&mut self, queue: &Queue<(Heard, i64)>) {
         loop {
             match queue.pop_within(self.rest()) {

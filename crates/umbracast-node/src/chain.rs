@@ -2,7 +2,7 @@
 //! [`umbracast::Pipeline::step`], with a wire where the row ends.
 
 use umbracast::blockage::Caster;
-use umbracast::detect::{Clusterer, Measurer, POINTS_MAX, Prior};
+use umbracast::detect::{self, Clusterer, Measurer, Prior};
 use umbracast::forecast::{Forecaster, Weights};
 use umbracast::track::Tracker;
 use umbracast::{Config, Error, Outcome, STEP_NS};
@@ -128,8 +128,7 @@ impl Chain {
         (o.time_ns, o.frame) = (time_ns, frames_between(first_ns, time_ns));
         o.health = joined.health;
         o.foreground = joined.foreground;
-        o.health.points_over_limit += o.foreground.len().saturating_sub(POINTS_MAX) as u64;
-        o.foreground.truncate(POINTS_MAX);
+        detect::keep_most(&mut o.foreground, &mut o.health);
         tracker.priors(time_ns, &mut self.priors);
         match joined.detections {
             Some(detections) => o.detections = detections,

@@ -8,6 +8,7 @@ pub mod mqtt;
 pub mod outward;
 pub mod network;
 pub mod hall;
+pub mod worker;
 pub mod front;
 pub mod join;
 pub mod objects;

@@ -346,8 +346,8 @@ impl Node {
         let recording = self.recorder.as_ref().is_none_or(|recorder| recorder.is_well());
         front
             && recording
-            && self.backs.iter().all(Back::is_well)
-            && self.watch.as_ref().is_none_or(Watch::is_well)
+            && self.backs.iter().all(|back| back.worker.is_well())
+            && self.watch.as_ref().is_none_or(|watch| watch.worker.is_well())
     }
 
     /// How it goes.
@@ -388,7 +388,7 @@ impl Node {
     /// Tells the others how it goes; whoever runs the node calls it once a second.
     pub fn tell_health(&self, host: &str) {
         let summary = self.summary();
-        let ms = |of: &Latencies| [0.5, 0.99].map(|share| of.quantile(share).as_secs_f64() * 1e3);
+        let ms = |of: &Latencies| [0.5, 0.99].map(|share| of.quantile_ms(share));
         let (cpu_s, resident_bytes) = load().unwrap_or_default();
         let mut health = NodeHealth {
             time_ns: self.clock.now_ns(),
@@ -426,9 +426,9 @@ impl Node {
         for thread in [self.front.take(), self.fed.take()].into_iter().flatten() {
             let _ = thread.join(); // One that panicked is a bug; the others end all the same.
         }
-        self.backs.iter_mut().for_each(Back::stop);
+        self.backs.iter_mut().for_each(|back| back.worker.stop());
         if let Some(watch) = &mut self.watch {
-            watch.stop();
+            watch.worker.stop();
         }
         let mut summary = self.summary();
         self.watch = None; // It holds the recorder.

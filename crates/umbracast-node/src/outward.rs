@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::Deserialize;
 use umbracast::{Error, Site};
-use umbracast_io::results::Results;
 use umbracast_live::Published;
 use umbracast_live::run::Listener;
 use zenoh::Session;
@@ -75,17 +74,8 @@ impl Outward {
             published.events.iter().for_each(|event| sender.send(event));
         }
         let Some(face) = &self.face else { return };
-        let results = Results {
-            frame: published.frame,
-            time_ns: published.time_ns,
-            logged_ns: published.published_ns,
-            detections: &published.detections,
-            tracks: &published.tracks,
-            links: &published.links,
-            foreground: published.foreground.as_deref(),
-        };
         let mut face = face.lock().unwrap_or_else(PoisonError::into_inner);
         // An error is a session that was closed: then nobody is there to be told.
-        let _ = face.publish(&results);
+        let _ = face.publish(&published.results());
     }
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use umbracast::detect::Point;
@@ -19,6 +18,7 @@ use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Subscriber;
 
 use crate::hall::Hall;
+use crate::worker::Worker;
 
 /// Messages that wait to be put together.
 const WAITING: usize = 256;
@@ -27,13 +27,11 @@ const PATIENCE_NS: i64 = 200_000_000;
 /// Frames that wait for parts.
 const OPEN_MAX: usize = 32;
 const REST: Duration = Duration::from_millis(50);
-/// Points beyond this are drawn by nobody.
-const POINTS_DRAWN: usize = 4000;
 
 /// One that looks on.
 pub struct Watch {
-    queue: Arc<Queue<Part>>,
-    thread: Option<JoinHandle<()>>,
+    /// Its thread.
+    pub(crate) worker: Worker<Part>,
     /// Frames that were told.
     pub frames: Arc<AtomicU64>,
     /// Frames of which a part did not come.
@@ -41,7 +39,7 @@ pub struct Watch {
     _subscribers: Vec<Subscriber<()>>,
 }
 
-enum Part {
+pub(crate) enum Part {
     Links(ZBytes),
     Tracks(ZBytes),
     Detections(ZBytes),
@@ -97,22 +95,8 @@ impl Watch {
             frames: frames.clone(),
             incomplete: incomplete.clone(),
         };
-        let parts = queue.clone();
-        let thread = std::thread::spawn(move || gather.run(&parts));
-        Ok(Self { queue, thread: Some(thread), frames, incomplete, _subscribers: subscribers })
-    }
-
-    /// True while its thread works.
-    pub fn is_well(&self) -> bool {
-        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
-    }
-
-    /// Tells what has come, and ends.
-    pub fn stop(&mut self) {
-        self.queue.close();
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+        let worker = Worker::start(queue, move |parts| gather.run(parts));
+        Ok(Self { worker, frames, incomplete, _subscribers: subscribers })
     }
 }
 
@@ -218,8 +202,6 @@ impl Gather {
         let (links, followed) = (parts.links?, parts.tracks?);
         let mut foreground: Vec<Point> = parts.foreground.into_iter().flat_map(|part| part.points).collect();
         foreground.sort_by_key(|point| point.sensor);
-        let every = foreground.len().div_ceil(POINTS_DRAWN).max(1);
-        let in_cm = |value_m: f64| (value_m * 100.0).round() as i16; // Saturates beyond 327 m.
         let mut outcome = Outcome::default();
         (outcome.frame, outcome.time_ns) = (parts.frame, time_ns);
         (outcome.tracks, outcome.forecasts) = (followed.tracks, followed.forecasts);
@@ -238,7 +220,7 @@ impl Gather {
             tracks,
             links,
             events,
-            points_cm: foreground.iter().step_by(every).map(|p| p.position_m.to_array().map(in_cm)).collect(),
+            points_cm: published::points_cm(&foreground),
             foreground: self.points.then_some(foreground),
             health: followed.health,
             sensors: (0..self.sensors).map(|s| followed.sensors.contains(&(s as u32))).collect(),

@@ -201,7 +201,6 @@ fn demonstration(
 }
 
 fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Common) -> Ending {
-    let ms = |share: f64, of: &umbracast_live::latency::Latencies| of.quantile(share).as_secs_f64() * 1e3;
     let (latency, step) = (&summary.latencies, &summary.steps);
     let mut json = RunJson::new("live", watch)
         .with("packets", summary.packets)
@@ -210,11 +209,11 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
         .with("packets_of_strangers", summary.strangers)
         .with("frames", summary.frames)
         .with("frames_skipped", summary.frames_skipped)
-        .with("latency_ms_median", ms(0.5, latency))
-        .with("latency_ms_p99", ms(0.99, latency))
+        .with("latency_ms_median", latency.quantile_ms(0.5))
+        .with("latency_ms_p99", latency.quantile_ms(0.99))
         .with("latency_ms_max", latency.longest().as_secs_f64() * 1e3)
-        .with("step_ms_median", ms(0.5, step))
-        .with("step_ms_p99", ms(0.99, step))
+        .with("step_ms_median", step.quantile_ms(0.5))
+        .with("step_ms_p99", step.quantile_ms(0.99))
         .with("health", summary.health)
         .with("recorder", &summary.recorded);
     if let Some(sent) = sent {
@@ -225,8 +224,8 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
         summary.frames,
         summary.packets,
         watch.seconds(),
-        ms(0.5, latency),
-        ms(0.99, latency)
+        latency.quantile_ms(0.5),
+        latency.quantile_ms(0.99)
     );
     json.print(common, &text);
     let lost = [
@@ -236,9 +235,5 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
         (summary.frames_skipped, "frames skipped"),
         (summary.recorded.lost, "packets and results not recorded"),
     ];
-    let told: Vec<String> =
-        lost.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
-    let failing = summary.recorded.failing.iter().cloned();
-    let told: Vec<String> = told.into_iter().chain(failing).collect();
-    if told.is_empty() { Ending::Done } else { Ending::DataLost(told.join("; ")) }
+    Ending::of_losses(&lost, summary.recorded.failing.as_deref())
 }

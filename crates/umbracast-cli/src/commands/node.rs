@@ -297,7 +297,6 @@ fn source(args: &args::Node, network: &Network, site: &Site, own: &[usize]) -> R
 }
 
 fn tell(summary: &Summary, stages: &[&str], watch: &Stopwatch, common: &Common) -> Ending {
-    let ms = |share: f64, of: &umbracast_live::latency::Latencies| of.quantile(share).as_secs_f64() * 1e3;
     let (latency, wire) = (&summary.latency, &summary.wire);
     let (messages, bytes) = summary.published;
     RunJson::new("node", watch)
@@ -312,10 +311,10 @@ fn tell(summary: &Summary, stages: &[&str], watch: &Stopwatch, common: &Common) 
         .with("priors_late", summary.priors_late)
         .with("messages_published", messages)
         .with("bytes_published", bytes)
-        .with("latency_ms_median", ms(0.5, latency))
-        .with("latency_ms_p99", ms(0.99, latency))
-        .with("wire_ms_median", ms(0.5, wire))
-        .with("wire_ms_p99", ms(0.99, wire))
+        .with("latency_ms_median", latency.quantile_ms(0.5))
+        .with("latency_ms_p99", latency.quantile_ms(0.99))
+        .with("wire_ms_median", wire.quantile_ms(0.5))
+        .with("wire_ms_p99", wire.quantile_ms(0.99))
         .with("leads", summary.leads)
         .with("health", summary.health)
         .with("recorder", &summary.recorded)
@@ -336,9 +335,5 @@ fn tell(summary: &Summary, stages: &[&str], watch: &Stopwatch, common: &Common) 
         (summary.incomplete, "frames incomplete"),
         (summary.recorded.lost, "packets and results not recorded"),
     ];
-    let told: Vec<String> =
-        lost.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
-    let failing = summary.recorded.failing.iter().cloned();
-    let told: Vec<String> = told.into_iter().chain(failing).collect();
-    if told.is_empty() { Ending::Done } else { Ending::DataLost(told.join("; ")) }
+    Ending::of_losses(&lost, summary.recorded.failing.as_deref())
 }

@@ -137,14 +137,13 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     lost.extend(empty_handed.map(|(input, _)| {
         format!("{input}: expected frames of the site's sensors, found none; `umbracast inspect` says what it holds")
     }));
-    let ms = |share: f64| steps.quantile(share).as_secs_f64() * 1e3;
     let summary = RunJson::new("run", &watch)
         .with("mode", args.mode)
         .with("scenes", inputs.len())
         .with("frames", steps.count())
         .with("frame_numbers", frames.iter().map(Ranges::to_string).collect::<Vec<_>>())
-        .with("step_ms_median", ms(0.5))
-        .with("step_ms_p99", ms(0.99))
+        .with("step_ms_median", steps.quantile_ms(0.5))
+        .with("step_ms_p99", steps.quantile_ms(0.99))
         .with("detections", detected)
         .with("detections_doubled", doubled)
         .with("health", health)
@@ -155,8 +154,8 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         steps.count(),
         inputs.len(),
         args.out.display(),
-        ms(0.5),
-        ms(0.99)
+        steps.quantile_ms(0.5),
+        steps.quantile_ms(0.99)
     );
     summary.print(common, &text);
     if doubled as f64 > DOUBLED_SHARE_MAX * detected as f64 {

@@ -95,11 +95,6 @@ pub fn axes(title: &str, x_label: &str, y: (f64, f64)) -> Panel {
         x_step: Some(200.0),
         y_step: Some(if y.1 - y.0 < 0.55 { 0.1 } else { 0.2 }),
         y_digits: 1,
-        y_names: Vec::new(),
-        y_log: false,
-        equal_axes: false,
-        series: Vec::new(),
-        shaded: Vec::new(),
-        notes: Vec::new(),
+        ..Panel::default()
     }
 }

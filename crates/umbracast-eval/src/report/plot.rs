@@ -48,7 +48,7 @@ pub struct Series {
 }
 
 /// One pair of axes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Panel {
     /// Above it: what the y axis shows, with the unit, where it can be read without turning the head.
     pub title: String,
