@@ -105,6 +105,18 @@ impl Chain {
     }
 }
 
+/// Somebody who is expected there and stands.
+fn expected_at(position_m: DVec2) -> Prior {
+    Prior {
+        position_m,
+        velocity_mps: DVec2::ZERO,
+        position_sigma_m: 0.05,
+        height_m: 1.7,
+        confirmed: true,
+        is_furniture: false,
+    }
+}
+
 const PEOPLE_M: [DVec2; 4] =
     [DVec2::new(0.0, 0.0), DVec2::new(1.0, 3.0), DVec2::new(-2.0, -4.0), DVec2::new(2.0, -1.5)];
 
@@ -134,17 +146,19 @@ fn walkers_are_found_while_the_scene_is_learned() {
 }
 
 #[test]
-fn who_stands_at_the_start_is_seen_whole_once_they_walk() {
+fn who_stands_at_the_start_is_seen_at_once_and_whole_once_they_walk() {
     let config = config(Mode::Default);
     let (mut chain, mut knowing) = (Chain::new(&config), Chain::new(&config));
     knowing.background.learn_empty(&frame(&config, 0, &[]));
+    // Of the first revolution nothing is new.
+    let expected = PEOPLE_M.map(expected_at);
     for k in 0..8 {
-        chain.step(&frame(&config, k, &PEOPLE_M), &[]);
-        assert!(chain.detections.is_empty());
+        chain.step(&frame(&config, k, &PEOPLE_M), if k < 2 { &[] } else { &expected });
+        assert_eq!(chain.finds(&PEOPLE_M, 0.15), k > 0, "frame {k}: {:#?}", chain.detections);
     }
     for k in 8..12 {
         let walkers = PEOPLE_M.map(|p| p + DVec2::new(0.0, 0.1 * (k - 7) as f64));
-        chain.step(&frame(&config, k, &walkers), &[]);
+        chain.step(&frame(&config, k, &walkers), &walkers.map(expected_at));
         knowing.step(&frame(&config, k, &walkers), &[]);
     }
     let (seen, whole) = (chain.points.len(), knowing.points.len());
@@ -152,16 +166,30 @@ fn who_stands_at_the_start_is_seen_whole_once_they_walk() {
 }
 
 #[test]
+fn furniture_put_in_after_the_empty_scan_is_learned_and_forgotten_once_it_is_taken_away() {
+    let config = config(Mode::Default);
+    let (mut chain, thing, person) = (Chain::new(&config), PEOPLE_M[0], PEOPLE_M[1]);
+    chain.background.learn_empty(&frame(&config, 0, &[]));
+    let furniture = Prior { is_furniture: true, confirmed: false, ..expected_at(thing) };
+    let priors = [furniture, expected_at(person)];
+    for k in 0..10 {
+        chain.step(&frame(&config, k, &[thing, person]), &priors);
+    }
+    assert!(chain.finds(&[person], 0.15), "{:#?}", chain.detections);
+    // Taken away: after a second somebody who stands there is seen again.
+    for k in 10..25 {
+        chain.step(&frame(&config, k, &[person]), &[]);
+        assert!(chain.finds(&[person], 0.15), "{:#?}", chain.detections);
+    }
+    chain.step(&frame(&config, 25, &[thing, person]), &[]);
+    assert!(chain.finds(&[thing, person], 0.15), "{:#?}", chain.detections);
+}
+
+#[test]
 fn who_stands_still_is_learned_unless_expected_there() {
     let config = config(Mode::Default);
     let standing = [PEOPLE_M[0]];
-    let prior = Prior {
-        position_m: standing[0],
-        velocity_mps: DVec2::ZERO,
-        position_sigma_m: 0.05,
-        height_m: 1.7,
-        confirmed: true,
-    };
+    let prior = expected_at(standing[0]);
     for (priors, still_seen) in [(vec![prior], true), (vec![], false)] {
         let mut chain = Chain::new(&config);
         for k in 0..10 {

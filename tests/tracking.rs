@@ -41,6 +41,7 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         limbs: None,
         full_body: true,
         top_m: 1.7,
+        top_diagonal_m: 0.2,
         aabb,
         obb,
     }

@@ -1,5 +1,6 @@
 //! Removes the points that belong to the empty scene.
 
+use super::first_sight::of_people;
 use super::sensor_model::{Clip, Learn, Look, SensorModel, to_site, unorganised_point};
 use super::voxel::{VoxelMap, thin};
 use super::{Point, Prior};
@@ -8,10 +9,10 @@ use crate::geometry::DVec3;
 use crate::lidar::{Azimuths, Cloud, Scan};
 use crate::{Frame, Health, Site};
 
-/// Somebody who stands still must not be learned: nothing is within this distance of an expected person.
-const FREEZE_M: f64 = 0.5;
 /// Most foreground points kept of one frame: 100 people close to the sensors. Bounds the time of a frame.
 const POINTS_MAX: usize = 40_000;
+/// In so many frames it is looked who is there from the start: the first may be cut.
+const FIRST_FRAMES: u32 = 3;
 /// Voxels: hdl_people_tracking's edge and threshold.
 const VOXEL_M: f64 = 0.2;
 const VOXEL_POINTS_MIN: u8 = 2;
@@ -40,8 +41,10 @@ pub struct Background {
     thin_m: f64,
     sensors: Vec<SensorModel>,
     clip: Clip,
-    /// True once an empty frame was given: then nothing more is learned.
+    /// True once an empty frame was given: then no more is learned than what was put there.
     known: bool,
+    /// Frames since the start in which people were looked for; only where no empty frame was given.
+    frames: u32,
     map: Option<VoxelMap>,
     /// Scans that made the map.
     map_scans: u32,
@@ -73,6 +76,7 @@ impl Background {
                 highest_m: config.highest_m,
             },
             known: false,
+            frames: 0,
             map: None,
             map_scans: 0,
             keys: Vec::new(),
@@ -101,8 +105,7 @@ impl Background {
                 self.known = true;
                 let mut nothing = Vec::new();
                 for scan in &frame.scans {
-                    let learn = Learn { on_the_way: false, priors: &[], freeze_m: 0.0 };
-                    self.scan(scan, Some(learn), &mut Health::default(), &mut nothing);
+                    self.scan(scan, Learn::Empty, &mut Health::default(), &mut nothing);
                 }
             }
             BackgroundMethod::Voxels => {
@@ -114,7 +117,7 @@ impl Background {
     }
 
     /// The points that are new, in the site frame. Where no empty scan was learned, the background is learned
-    /// on the way, but not where a person is expected.
+    /// on the way, but not where a person is expected; where one was, only furniture that was put there since.
     ///
     /// ```
     /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
@@ -137,10 +140,13 @@ impl Background {
         points.clear();
         match self.method {
             BackgroundMethod::RangeImage => {
-                let learn = Learn { on_the_way: true, priors, freeze_m: FREEZE_M };
+                let learn = if self.known { Learn::Furniture(priors) } else { Learn::OnTheWay(priors) };
                 for scan in &frame.scans {
-                    let learn = (!self.known).then_some(learn);
                     self.scan(scan, learn, health, points);
+                }
+                if !self.known && self.frames < FIRST_FRAMES {
+                    self.frames += 1;
+                    self.forget_people(frame);
                 }
             }
             BackgroundMethod::Voxels => {
@@ -156,6 +162,25 @@ impl Background {
             }
         }
         keep_most(points, health);
+    }
+
+    /// Who stands there from the start is not the hall.
+    fn forget_people(&mut self, frame: &Frame) {
+        let mut returns = Vec::new();
+        for (i, scan) in frame.scans.iter().enumerate() {
+            if let Some(sensor) = self.sensors.get(scan.sensor) {
+                sensor.returns(i, scan, &mut returns);
+            }
+        }
+        let people = of_people(&returns);
+        for (i, scan) in frame.scans.iter().enumerate() {
+            let mut pixels: Vec<usize> = people.iter().filter(|r| r.scan == i).map(|r| r.pixel).collect();
+            pixels.sort_unstable();
+            pixels.dedup();
+            if let Some(sensor) = self.sensors.get_mut(scan.sensor).filter(|_| !pixels.is_empty()) {
+                sensor.forget(scan, &pixels);
+            }
+        }
     }
 
     /// Adds a scan to the map until it has enough.
@@ -206,7 +231,7 @@ impl Background {
     }
 
     /// One scan against its sensor's range image; what is new goes to `points`.
-    fn scan(&mut self, scan: &Scan, learn: Option<Learn>, health: &mut Health, points: &mut Vec<Point>) {
+    fn scan(&mut self, scan: &Scan, learn: Learn, health: &mut Health, points: &mut Vec<Point>) {
         let Some(sensor) = self.sensors.get_mut(scan.sensor) else { return };
         sensor.scan(Look { scan, clip: &self.clip, learn }, self.known, health, points);
     }

@@ -84,6 +84,7 @@ mod tests {
             position_sigma_m: 0.1,
             height_m: 1.7,
             confirmed: true,
+            is_furniture: false,
         }
     }
 

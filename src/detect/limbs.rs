@@ -71,6 +71,7 @@ mod tests {
         position_sigma_m: 0.1,
         height_m: 1.75,
         confirmed: true,
+        is_furniture: false,
     };
 
     /// A walker along y at a phase: feet under the hips, hands beside them, each a point, a swing apart.

@@ -15,6 +15,8 @@ pub const SHIFT_M: f64 = 0.1;
 /// Points that do not look like a person count where one is expected within this distance, half a stride: legs alone, or a
 /// head behind others, still tell where somebody known is.
 const EXPECTED_M: f64 = 0.55;
+/// From the top of a head to the chin.
+const HEAD_M: f64 = 0.2;
 /// A prior farther than this from a cluster does not tell where its person walks.
 const OWN_M: f64 = 0.5;
 /// A wheelchair is 1.3 m from corner to corner, and who sits in one reaches no higher than this.
@@ -136,14 +138,14 @@ impl Measurer {
         let within = |value: f64, [least, most]: [f64; 2]| value > least && value < most;
         let size_m = aabb.size_m();
         self.size.points.contains(&points)
-            && within(size_m.truncate().length(), self.size.diagonal_m)
+            && within(diagonal_m(aabb), self.size.diagonal_m)
             && within(size_m.z, self.size.extent_m)
             && within(aabb.max_m.z, self.size.top_m)
     }
 
     /// True for what may be a part of somebody who is expected there.
     fn is_expected(&self, aabb: &Aabb, priors: &[Prior]) -> bool {
-        let (length_m, middle_m) = (aabb.size_m().truncate().length(), aabb.center_m().truncate());
+        let (length_m, middle_m) = (diagonal_m(aabb), aabb.center_m().truncate());
         // A wheelchair is longer than a stride, and who sits in it lower than who walks.
         let longest_m = |prior: &Prior| match self.seated && prior.height_m < SEATED_HEIGHT_M {
             true => SEATED_DIAGONAL_MAX_M,
@@ -175,6 +177,7 @@ impl Measurer {
         };
         let who = nearest(mean_m.truncate(), priors);
         let limbs = who.and_then(|who| LimbCovariance::of(of(), position_m, who));
+        let of_top = of().map(|p| p.position_m).filter(|p| p.z >= aabb.max_m.z - HEAD_M);
         let axes = match self.position {
             PositionMethod::BoxCenter => ObbAxes::Eigenvectors,
             PositionMethod::ShiftedMean | PositionMethod::Fitted => ObbAxes::Yaw,
@@ -188,6 +191,7 @@ impl Measurer {
             points: cluster.len() as u32,
             full_body: true,
             top_m: aabb.max_m.z,
+            top_diagonal_m: diagonal_m(&Aabb::around(of_top)),
             aabb,
             obb: obb(of().map(|p| p.position_m), mean_m, axes),
         }
@@ -202,6 +206,11 @@ impl Measurer {
         let velocity_mps = nearest(mean_m, priors).map(|prior| prior.velocity_mps);
         AxisFeatures::new(seen, &self.sensors_m, SHIFT_M, velocity_mps)
     }
+}
+
+/// From corner to corner in plan view.
+fn diagonal_m(aabb: &Aabb) -> f64 {
+    aabb.size_m().truncate().length()
 }
 
 /// Who is known to walk here.
@@ -288,6 +297,7 @@ mod tests {
             position_sigma_m: 0.1,
             height_m,
             confirmed: true,
+            is_furniture: false,
         };
         let config = Config::default();
         let mut detections = Vec::new();

@@ -3,13 +3,14 @@
 //! Foreground: the points that do not belong to the empty scene, in the site frame. Clusters: groups of them in
 //! plan view, split and merged until each is one person. Detections: position and boxes of each.
 
+mod cluster;
+mod first_sight;
 mod range_model;
 mod sensor_model;
 mod voxel;
 mod background;
 #[doc(hidden)] // What the model of the body axis reads, for its fit.
 pub mod features;
-mod cluster;
 mod dp_means;
 mod guided;
 mod evidence;
@@ -73,6 +74,8 @@ pub struct Prior {
     pub height_m: f64,
     /// True once the track is confirmed.
     pub confirmed: bool,
+    /// True of what has been there for long and never walked: nobody, but something that was put there.
+    pub is_furniture: bool,
 }
 
 /// Points of one person: indices into the foreground, ascending.
@@ -103,6 +106,8 @@ pub struct Detection {
     pub full_body: bool,
     /// Highest point above the floor.
     pub top_m: f64,
+    /// Diagonal in plan view of what lies at most 0.2 m below the highest point: a head is small, a cupboard's top is not.
+    pub top_diagonal_m: f64,
     /// How arms and legs of a known walker lie.
     pub limbs: Option<LimbCovariance>,
     /// Box along the site's axes.

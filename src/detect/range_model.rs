@@ -8,6 +8,12 @@ const SHARE: f32 = 0.3;
 const START_REVOLUTIONS: f32 = 1.0;
 /// Revolutions after which what was learned weighs half: a minute at 10 Hz.
 const MEMORY_REVOLUTIONS: f32 = 600.0;
+/// What was put there after the empty scan is background once it came back so often,
+const FURNITURE_REVOLUTIONS: f32 = 6.0;
+/// and no longer once so many revolutions saw past it
+const FURNITURE_GONE: u8 = 10;
+/// by so many margins.
+const FURNITURE_SPREADS: f32 = 3.0;
 /// How many ranges a pixel remembers: an edge returns two, and one more passes by.
 const MODES: usize = 3;
 /// A mode's mean follows at least this fast: 1/50 a revolution.
@@ -36,6 +42,28 @@ struct Mode {
     seen: u32,
 }
 
+/// Revolutions in which a pixel was kept from learning, because somebody expected stood there.
+#[derive(Debug, Clone, Copy, Default)]
+struct Frozen {
+    /// Halved by forgetting.
+    revolutions: f32,
+    /// The last of them.
+    seen: u32,
+}
+
+/// What becomes of one return.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// It is remembered.
+    Learned,
+    /// It is somebody's: the revolution does not count for its pixel.
+    Somebodys,
+    /// It is remembered as something that was put there.
+    Furnitures,
+    /// Nothing.
+    Left,
+}
+
 /// Pixels of one row that may be a person: something clearly farther is on both sides.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
@@ -59,6 +87,7 @@ pub struct RangeModel {
     bins_per_cdeg: f32,
     rows: usize,
     modes: Vec<[Mode; MODES]>,
+    frozen: Vec<Frozen>,
     /// Nearest background of each pixel, before the margin; infinite where nothing stands, 0 while unknown.
     nearest_m: Vec<f32>,
     /// The same, less margin, over the neighbours in azimuth: a nearer return is new.
@@ -69,6 +98,10 @@ pub struct RangeModel {
     count: u32,
     /// True once it was learned without people.
     known: bool,
+    /// Of each pixel: 0 where no furniture was put since, else 1 more than the revolutions that saw past it.
+    furniture: Vec<u8>,
+    /// Pixels of which it is not 0.
+    furnished: usize,
     margin_m: f32,
 }
 
@@ -81,12 +114,15 @@ impl RangeModel {
             bins_per_cdeg: bins as f32 / 36_000.0,
             rows: 0,
             modes: Vec::new(),
+            frozen: Vec::new(),
             nearest_m: Vec::new(),
             limit_m: Vec::new(),
             revolutions: 0.0,
             margin_m: margin_m as f32,
             count: 1,
             known: false,
+            furniture: Vec::new(),
+            furnished: 0,
         }
     }
 
@@ -101,12 +137,18 @@ impl RangeModel {
             return;
         }
         let (old_rows, old) = (self.rows, std::mem::take(&mut self.modes));
+        let old_frozen = std::mem::replace(&mut self.frozen, vec![Frozen::default(); rows * self.bins]);
         self.rows = rows;
         self.modes = vec![[Mode::default(); MODES]; rows * self.bins];
         self.nearest_m = vec![0.0; rows * self.bins];
         self.limit_m = vec![0.0; rows * self.bins];
+        // Numbers of pixels change: what was put there is learned anew.
+        (self.furniture, self.furnished) = (vec![0; rows * self.bins], 0);
         if old_rows > 0 {
             for (new, old) in self.modes.chunks_exact_mut(rows).zip(old.chunks_exact(old_rows)) {
+                new[..old_rows].copy_from_slice(old);
+            }
+            for (new, old) in self.frozen.chunks_exact_mut(rows).zip(old_frozen.chunks_exact(old_rows)) {
                 new[..old_rows].copy_from_slice(old);
             }
             self.find_limits();
@@ -177,6 +219,17 @@ impl RangeModel {
         self.limit_m[pixel]
     }
 
+    /// Does with a return what was decided.
+    #[inline]
+    pub fn take(&mut self, pixel: usize, range_m: f32, verdict: Verdict) {
+        match verdict {
+            Verdict::Learned => self.observe(pixel, range_m),
+            Verdict::Somebodys => self.freeze(pixel),
+            Verdict::Furnitures => self.furnish(pixel, range_m),
+            Verdict::Left => {}
+        }
+    }
+
     /// Remembers one return.
     pub fn observe(&mut self, pixel: usize, range_m: f32) {
         let modes = &mut self.modes[pixel];
@@ -199,6 +252,92 @@ impl RangeModel {
         }
     }
 
+    /// True while anything that was put there since the empty scan is background.
+    #[inline]
+    pub fn has_furniture(&self) -> bool {
+        self.furnished > 0
+    }
+
+    /// Remembers a return of something that was put there; it is background once it came back often enough.
+    fn furnish(&mut self, pixel: usize, range_m: f32) {
+        self.observe(pixel, range_m);
+        let least = FURNITURE_REVOLUTIONS.min(SHARE * self.revolutions);
+        let near_m = nearest_m(&self.modes[pixel], least).unwrap_or(f32::INFINITY);
+        if near_m < self.nearest_m[pixel] {
+            self.furnished += usize::from(self.furniture[pixel] == 0);
+            self.furniture[pixel] = 1;
+            self.set_nearest(pixel, near_m);
+        }
+    }
+
+    /// A return from farther than the background. Where that is furniture, it has been taken away again once enough
+    /// revolutions saw past it.
+    #[inline]
+    pub fn see_past(&mut self, pixel: usize, range_m: f32) {
+        if self.furniture[pixel] == 0 {
+            return;
+        }
+        if range_m < self.nearest_m[pixel] + FURNITURE_SPREADS * self.margin_m {
+            self.furniture[pixel] = 1;
+            return;
+        }
+        self.furniture[pixel] += 1;
+        if self.furniture[pixel] > FURNITURE_GONE {
+            (self.furniture[pixel], self.furnished) = (0, self.furnished - 1);
+            let gone = |mode: &Mode| mode.range_m < range_m - self.margin_m;
+            let least = SHARE * self.revolutions;
+            self.modes[pixel].iter_mut().filter(|mode| gone(mode)).for_each(|mode| *mode = Mode::default());
+            self.set_nearest(pixel, nearest_m(&self.modes[pixel], least).unwrap_or(f32::INFINITY));
+        }
+    }
+
+    /// Another background for one pixel.
+    fn set_nearest(&mut self, pixel: usize, nearest_m: f32) {
+        self.nearest_m[pixel] = nearest_m;
+        let (bin, row) = (pixel / self.rows, pixel % self.rows);
+        let at = |off: usize| (bin + off) % self.bins * self.rows + row;
+        for off in [self.bins - 1, 0, 1] {
+            self.limit_m[at(off)] = self.limit_of([at(off), at(off + self.bins - 1), at(off + 1)]);
+        }
+    }
+
+    /// Forgets what is nearest in these pixels, which are sorted: it was somebody. What is beside each row of them is taken to
+    /// go on behind.
+    pub fn forget(&mut self, pixels: &[usize]) {
+        let is_theirs = |bin: usize, row: usize| pixels.binary_search(&(bin * self.rows + row)).is_ok();
+        let beside_m = |pixel: usize, step: usize| {
+            let (mut bin, row) = (pixel / self.rows, pixel % self.rows);
+            // Who stands beside the sensor may fill all of it.
+            for _ in 0..self.bins {
+                bin = (bin + step) % self.bins;
+                if !is_theirs(bin, row) {
+                    break;
+                }
+            }
+            self.nearest_m[bin * self.rows + row]
+        };
+        let behind_m: Vec<f32> =
+            pixels.iter().map(|&pixel| beside_m(pixel, self.bins - 1).min(beside_m(pixel, 1))).collect();
+        for (&pixel, range_m) in pixels.iter().zip(behind_m) {
+            let weight = if range_m.is_finite() { self.revolutions } else { 0.0 };
+            let behind = Mode { range_m, spread_m: 0.0, weight, seen: self.count };
+            self.modes[pixel] = [Mode::default(); MODES];
+            if weight > 0.0 {
+                self.modes[pixel][0] = behind;
+            }
+        }
+        self.find_limits();
+    }
+
+    /// Leaves a revolution out of a pixel's account: somebody who is expected there was seen. Otherwise what stands behind
+    /// would come back in ever fewer of the revolutions, until the one who stands is taken for it.
+    fn freeze(&mut self, pixel: usize) {
+        let frozen = &mut self.frozen[pixel];
+        if frozen.seen != self.count {
+            *frozen = Frozen { revolutions: frozen.revolutions + 1.0, seen: self.count };
+        }
+    }
+
     /// Closes a revolution that was observed and works out the limits anew. What was always empty counts as
     /// open once the scene is `known` or enough revolutions were seen.
     pub fn close_revolution(&mut self, known: bool) {
@@ -212,8 +351,14 @@ impl RangeModel {
         if self.revolutions > MEMORY_REVOLUTIONS {
             self.revolutions *= 0.5;
             self.modes.iter_mut().flatten().for_each(|mode| mode.weight *= 0.5);
+            self.frozen.iter_mut().for_each(|frozen| frozen.revolutions *= 0.5);
         }
         self.find_limits();
+    }
+
+    /// The same where nothing is learned but furniture.
+    pub fn close_known_revolution(&mut self) {
+        self.count = self.count.wrapping_add(1);
     }
 
     /// Who was there from the start and walks off is background to every pixel that saw a part of them twice.
@@ -298,19 +443,26 @@ impl RangeModel {
     fn find_limits(&mut self) {
         let unseen_m = if self.known || self.revolutions >= START_REVOLUTIONS { f32::INFINITY } else { 0.0 };
         // An empty scan is believed as it is; what walks by has to be outvoted.
-        let least = SHARE * self.revolutions;
-        let least = if self.known { least } else { least.max(self.revolutions.min(1.5)) };
-        for (nearest, modes) in self.nearest_m.iter_mut().zip(&self.modes) {
+        let least = |revolutions: f32| match self.known {
+            true => SHARE * revolutions,
+            false => (SHARE * revolutions).max(revolutions.min(1.5)),
+        };
+        for ((nearest, modes), frozen) in self.nearest_m.iter_mut().zip(&self.modes).zip(&self.frozen) {
+            let least = least(self.revolutions - frozen.revolutions);
             *nearest = nearest_m(modes, least).unwrap_or(unseen_m).min(unseen_m);
         }
         for bin in 0..self.bins {
-            // Edges jitter by one bin from revolution to revolution.
             let [own, left, right] = [0, self.bins - 1, 1].map(|off| (bin + off) % self.bins * self.rows);
             for row in 0..self.rows {
-                let around = [own, left, right].map(|first| self.nearest_m[first + row]);
-                self.limit_m[own + row] = around.into_iter().fold(f32::INFINITY, f32::min) - self.margin_m;
+                self.limit_m[own + row] = self.limit_of([own + row, left + row, right + row]);
             }
         }
+    }
+
+    /// Edges jitter by one bin from revolution to revolution, so the neighbours of a pixel count as well.
+    #[inline]
+    fn limit_of(&self, pixels: [usize; 3]) -> f32 {
+        pixels.map(|pixel| self.nearest_m[pixel]).into_iter().fold(f32::INFINITY, f32::min) - self.margin_m
     }
 }
 
@@ -328,109 +480,5 @@ fn nearest_m(modes: &[Mode; MODES], least: f32) -> Option<f32> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_azimuth_lies_in_its_bin_whatever_it_is() {
-        let model = RangeModel::new(0.05, 0.2);
-        for (azimuth_cdeg, bin) in [
-            (0.0, 0),
-            (19.9, 0),
-            (20.0, 1),
-            (35_999.0, 1799),
-            (36_000.0, 0),
-            (-0.5, 1799),
-            (-35_999.0, 0),
-            (71_999.0, 1799),
-            (f32::NAN, 1799),
-            (f32::INFINITY, 1799),
-            (1e30, 1799),
-            (-1e30, 0),
-        ] {
-            assert_eq!(model.bin(azimuth_cdeg), bin, "{azimuth_cdeg}");
-        }
-    }
-
-    #[test]
-    fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
-        let mut model = RangeModel::new(0.05, 1.0);
-        model.grow(ROWS);
-        (0..model.limit_m.len()).for_each(|pixel| model.limit_m[pixel] = 2.0 + (pixel * 7 % 13) as f32);
-        let columns = [
-            [500.0; ROWS],
-            [590.0, 595.0, 600.0, 605.0],
-            [35_990.0, 36_010.0, 35_900.0, 0.0],
-            [0.0, 500.0, 9e3, 2e4],
-        ];
-        for azimuths_cdeg in columns {
-            let mut pixels = [0; ROWS];
-            model.pixels(&azimuths_cdeg, &mut pixels);
-            let limits_m = pixels.map(|pixel| model.limit_m(pixel as usize));
-            assert!(!model.any_new(&pixels, &limits_m), "{azimuths_cdeg:?}");
-            assert!(!model.any_new(&pixels, &[0.0; ROWS]), "nothing came back");
-            for row in 0..ROWS {
-                for nearer_m in [limits_m[row] - 0.001, f32::NAN] {
-                    let mut ranges_m = limits_m;
-                    ranges_m[row] = nearer_m;
-                    assert!(model.any_new(&pixels, &ranges_m), "{azimuths_cdeg:?}, row {row}");
-                }
-            }
-        }
-    }
-
-    const ROWS: usize = 4;
-    const NEAR_M: f32 = 5.0;
-    const FAR_M: f32 = 10.0;
-
-    /// One revolution in bins of one degree: something at 5 m in bins `first..end`, a wall at 10 m around it.
-    fn look(model: &mut RangeModel, first: usize, end: usize) {
-        for bin in 0..model.bins {
-            let range_m = if (first..end).contains(&bin) { NEAR_M } else { FAR_M };
-            for row in 0..model.rows {
-                model.observe(bin * model.rows + row, range_m);
-            }
-        }
-        model.close_revolution(false);
-    }
-
-    fn learned(first: usize, end: usize) -> RangeModel {
-        let mut model = RangeModel::new(0.1, 1.0);
-        model.grow(ROWS);
-        for _ in 0..10 {
-            look(&mut model, first, end);
-        }
-        model
-    }
-
-    fn is_new(model: &RangeModel, bin: usize) -> bool {
-        (0..ROWS).all(|row| NEAR_M < model.limit_m(bin * ROWS + row))
-    }
-
-    #[test]
-    fn who_walks_off_is_forgotten_as_a_whole() {
-        let mut model = learned(100, 106);
-        assert!(!is_new(&model, 104));
-        for step in 1..=3 {
-            look(&mut model, 100 + step, 106 + step);
-        }
-        assert!(is_new(&model, 104));
-    }
-
-    #[test]
-    fn what_stays_is_not_forgotten_where_its_edge_goes() {
-        // A pillar whose edge is no longer hit, and a wall that a walker leaves.
-        for (first, end) in [(100, 106), (100, 180)] {
-            let mut model = learned(first, end);
-            for _ in 0..5 {
-                look(&mut model, first + 2, end);
-            }
-            assert!(!is_new(&model, first + 4), "{first}..{end}");
-        }
-        let mut wall = learned(100, 180);
-        for step in 1..=5 {
-            look(&mut wall, 100 + step, 180 + step);
-        }
-        assert!(!is_new(&wall, 140));
-    }
-}
+#[path = "range_model_tests.rs"]
+mod tests;

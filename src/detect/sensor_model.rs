@@ -1,6 +1,7 @@
 //! One sensor's view of the empty scene, pixel by pixel, and the returns that are nearer.
 
-use super::range_model::RangeModel;
+use super::first_sight::Return;
+use super::range_model::{RangeModel, Verdict};
 use super::{Point, Prior};
 use crate::Health;
 use crate::geometry::{DVec3, Pose};
@@ -19,6 +20,10 @@ const CLOUD_ELEVATION_BIN_DEG: f64 = 0.5;
 const MARGIN_SIGMAS: f64 = 5.0;
 /// and at least by this.
 const MARGIN_MIN_M: f64 = 0.05;
+/// Nothing is learned within this distance of an expected person.
+const FREEZE_M: f64 = 0.5;
+/// What is new within this distance of furniture's middle is a part of it: half a large table.
+const FURNITURE_M: f64 = 0.9;
 /// Lower points are the floor's.
 const LOWEST_M: f64 = 0.03;
 
@@ -32,7 +37,7 @@ pub(super) struct SensorModel {
     /// Row of each bin of elevation, for clouds whose beams are not known.
     row_of_elevation: Vec<Option<u16>>,
     elevation_bins_per_rad: f64,
-    returns: Vec<Return>,
+    returns: Vec<CloudReturn>,
     /// Of each beam: how long the head has turned on, and how far it looks to the right.
     turned: Vec<[f32; 2]>,
     /// Of each beam of the column that is looked at.
@@ -42,32 +47,57 @@ pub(super) struct SensorModel {
 
 /// A point of an unorganised cloud as the sensor saw it.
 #[derive(Debug, Clone, Copy)]
-struct Return {
+struct CloudReturn {
     elevation_bin: usize,
     azimuth_cdeg: f32,
     range_m: f32,
     point: SensorPoint,
 }
 
-/// What may be learned.
-#[derive(Clone, Copy)]
-pub(super) struct Learn<'a> {
-    /// Not from an empty scan. Then returns nearer than the sensor's range are learned too, though never new: behind
-    /// somebody beside the sensor the scene is unknown, not empty, and what appears there later is no person.
-    pub(super) on_the_way: bool,
-    /// Where somebody is expected nothing is learned.
-    pub(super) priors: &'a [Prior],
-    pub(super) freeze_m: f64,
+/// What is learned of a scan.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Learn<'a> {
+    /// Everything: nobody is there.
+    Empty,
+    /// Everything but where somebody is expected. Then returns nearer than the sensor's range are learned too, though
+    /// never new: behind somebody beside the sensor the scene is unknown, not empty, and what appears there later is no
+    /// person.
+    OnTheWay(&'a [Prior]),
+    /// The empty scene is known: only what was put there since.
+    Furniture(&'a [Prior]),
 }
 
 impl Learn<'_> {
-    fn is_frozen(&self, position_m: DVec3) -> bool {
-        let near = |prior: &Prior| {
-            let reach_m = self.freeze_m + prior.position_sigma_m.min(self.freeze_m);
-            prior.position_m.distance_squared(position_m.truncate()) < reach_m * reach_m
-        };
-        self.priors.iter().any(near)
+    fn is_all(self) -> bool {
+        !matches!(self, Self::Furniture(_))
     }
+
+    /// Of a return; `new_at_m` says where, if it is new and people can be there.
+    fn verdict(self, new_at_m: Option<DVec3>) -> Verdict {
+        match (self, new_at_m) {
+            (Self::OnTheWay(priors), Some(at_m)) if is_somebodys(priors, at_m) => Verdict::Somebodys,
+            (Self::Empty | Self::OnTheWay(_), _) => Verdict::Learned,
+            (Self::Furniture(priors), Some(at_m))
+                if is_furnitures(priors, at_m) && !is_somebodys(priors, at_m) =>
+            {
+                Verdict::Furnitures
+            }
+            (Self::Furniture(_), _) => Verdict::Left,
+        }
+    }
+}
+
+/// Somebody who stands still must not be learned.
+fn is_somebodys(priors: &[Prior], at_m: DVec3) -> bool {
+    priors.iter().any(|prior| {
+        let reach_m = FREEZE_M + prior.position_sigma_m.min(FREEZE_M);
+        !prior.is_furniture && prior.position_m.distance_squared(at_m.truncate()) < reach_m * reach_m
+    })
+}
+
+fn is_furnitures(priors: &[Prior], at_m: DVec3) -> bool {
+    let near = |prior: &Prior| prior.position_m.distance(at_m.truncate()) < FURNITURE_M;
+    priors.iter().any(|prior| prior.is_furniture && near(prior))
 }
 
 /// One scan, and what is asked of it.
@@ -75,8 +105,7 @@ impl Learn<'_> {
 pub(super) struct Look<'a> {
     pub(super) scan: &'a Scan,
     pub(super) clip: &'a Clip,
-    /// `None`: nothing is learned of it.
-    pub(super) learn: Option<Learn<'a>>,
+    pub(super) learn: Learn<'a>,
 }
 
 /// Where people can be: the hall is known, so what lies outside is a reflection.
@@ -126,8 +155,9 @@ impl SensorModel {
                 &mut self.cloud_ranges
             }
         };
-        if look.learn.is_some() {
-            ranges.close_revolution(known);
+        match look.learn {
+            Learn::Empty | Learn::OnTheWay(_) => ranges.close_revolution(known),
+            Learn::Furniture(_) => ranges.close_known_revolution(),
         }
     }
 
@@ -152,6 +182,42 @@ impl SensorModel {
         points: &mut Vec<Point>,
     ) {
         self.organised_portably(look, image, health, points);
+    }
+
+    /// The returns of a scan, the `scan`-th of its frame, with their pixels.
+    pub(super) fn returns(&self, scan: usize, of: &Scan, returns: &mut Vec<Return>) {
+        match &of.cloud {
+            Cloud::Organised(image) => {
+                let beams = image.beams.len();
+                for (i, &range_m) in image.range_m.iter().enumerate() {
+                    let (c, b) = (i / beams, i % beams);
+                    if range_m >= self.range_min_m && range_m <= self.range_max_m {
+                        let (column, beam) = (&image.columns[c], &image.beams[b]);
+                        let turned_cdeg = column.azimuth_rate_cdeg_per_ns * beam.turned_ns as f32;
+                        let pixel = self
+                            .ranges
+                            .pixel(b, column.azimuth_cdeg + turned_cdeg + beam.azimuth_offset_cdeg);
+                        let position_m = organised_point(of, image, c, b, range_m).position_m;
+                        returns.push(Return { scan, pixel, position_m });
+                    }
+                }
+            }
+            // The returns were sorted when the scan was learned.
+            Cloud::Unorganised(_) => returns.extend(self.returns.iter().filter_map(|r| {
+                let pixel = self
+                    .cloud_ranges
+                    .pixel(usize::from(self.row_of_elevation[r.elevation_bin]?), r.azimuth_cdeg);
+                Some(Return { scan, pixel, position_m: unorganised_point(of, &r.point).position_m })
+            })),
+        }
+    }
+
+    /// Forgets what those pixels saw last, which are sorted: it was somebody.
+    pub(super) fn forget(&mut self, of: &Scan, pixels: &[usize]) {
+        match &of.cloud {
+            Cloud::Organised(_) => self.ranges.forget(pixels),
+            Cloud::Unorganised(_) => self.cloud_ranges.forget(pixels),
+        }
     }
 
     #[inline(always)]
@@ -182,7 +248,7 @@ impl SensorModel {
             }
             ranges.pixels(azimuths_cdeg, pixels);
             // Nearly every column sees nothing but the hall.
-            if learn.is_none() && !ranges.any_new(pixels, ranges_m) {
+            if !learn.is_all() && !ranges.has_furniture() && !ranges.any_new(pixels, ranges_m) {
                 continue;
             }
             for (b, &range_m) in ranges_m.iter().enumerate() {
@@ -192,27 +258,26 @@ impl SensorModel {
                 let pixel = pixels[b] as usize;
                 // Written so that NaN is caught: it is neither beyond the limit nor in the range.
                 let background = range_m >= ranges.limit_m(pixel);
-                if background && learn.is_none() {
+                if background && !learn.is_all() {
+                    ranges.see_past(pixel, range_m);
                     continue;
                 }
                 if !(range_m >= range_min_m && range_m <= range_max_m) {
                     health.points_invalid += 1;
-                    if range_m > 0.0 && range_m < range_min_m && learn.is_some_and(|learn| learn.on_the_way) {
+                    if range_m > 0.0 && range_m < range_min_m && matches!(learn, Learn::OnTheWay(_)) {
                         ranges.observe(pixel, range_m);
                     }
                     continue;
                 }
-                let mut frozen = false;
+                let mut new_at_m = None;
                 if !background {
                     let point = organised_point(scan, image, c, b, range_m);
                     if clip.holds(point.position_m) {
                         points.push(point);
-                        frozen = learn.is_some_and(|learn| learn.is_frozen(point.position_m));
+                        new_at_m = Some(point.position_m);
                     }
                 }
-                if learn.is_some() && !frozen {
-                    ranges.observe(pixel, range_m);
-                }
+                ranges.take(pixel, range_m, learn.verdict(new_at_m));
             }
         }
     }
@@ -225,25 +290,28 @@ impl SensorModel {
         points: &mut Vec<Point>,
     ) {
         let Look { scan, clip, learn } = look;
-        self.sort_returns(cloud, learn.is_some_and(|learn| learn.on_the_way), health);
+        self.sort_returns(cloud, matches!(learn, Learn::OnTheWay(_)), health);
         for i in 0..self.returns.len() {
-            let Return { elevation_bin, azimuth_cdeg, range_m, point } = self.returns[i];
+            let CloudReturn { elevation_bin, azimuth_cdeg, range_m, point } = self.returns[i];
             // Beams sit between two bins of elevation, so both neighbours count as well.
             let rows = &self.row_of_elevation[elevation_bin.saturating_sub(1)..=elevation_bin + 1];
             let pixel = |row: u16| self.cloud_ranges.pixel(usize::from(row), azimuth_cdeg);
             let limits_m = rows.iter().flatten().map(|&row| self.cloud_ranges.limit_m(pixel(row)));
             let limit_m = limits_m.fold(f32::INFINITY, f32::min);
             let own = self.row_of_elevation[elevation_bin].map(pixel);
-            let mut frozen = false;
+            let mut new_at_m = None;
             if range_m < limit_m && range_m >= self.range_min_m {
                 let point = unorganised_point(scan, &point);
                 if clip.holds(point.position_m) {
                     points.push(point);
-                    frozen = learn.is_some_and(|learn| learn.is_frozen(point.position_m));
+                    new_at_m = Some(point.position_m);
                 }
             }
-            if let Some(own) = own.filter(|_| learn.is_some() && !frozen) {
-                self.cloud_ranges.observe(own, range_m);
+            let Some(own) = own else { continue };
+            if range_m >= limit_m && !learn.is_all() {
+                self.cloud_ranges.see_past(own, range_m);
+            } else {
+                self.cloud_ranges.take(own, range_m, learn.verdict(new_at_m));
             }
         }
     }
@@ -271,11 +339,11 @@ impl SensorModel {
                 self.cloud_ranges.grow(self.cloud_ranges.rows() + 1);
             }
             let azimuth_cdeg = (-y).atan2(x).to_degrees() * 100.0;
-            self.returns.push(Return { elevation_bin, azimuth_cdeg, range_m, point });
+            self.returns.push(CloudReturn { elevation_bin, azimuth_cdeg, range_m, point });
         }
         self.returns.sort_unstable_by(|a, b| {
-            let key = |r: &Return| (r.elevation_bin, r.point.time_ns, r.range_m.to_bits());
-            let place = |r: &Return| r.point.position_m.map(f32::to_bits);
+            let key = |r: &CloudReturn| (r.elevation_bin, r.point.time_ns, r.range_m.to_bits());
+            let place = |r: &CloudReturn| r.point.position_m.map(f32::to_bits);
             key(a).cmp(&key(b)).then_with(|| place(a).cmp(&place(b)))
         });
     }

@@ -59,8 +59,8 @@ pub struct Track {
     pub gait: GaitPhase,
     /// Points of this frame's detection; 0 while it coasts.
     pub points: u32,
-    /// False until the track has been seen often enough to be believed, and while it has been out of sight so long
-    /// that its position says little.
+    /// False until the track has been seen often enough to be believed, while it has been out of sight so long that its
+    /// position says little, and from when on it is taken for furniture, for it never walked.
     pub confirmed: bool,
     /// The person's box along the site's axes, at `position_m`.
     pub aabb: Aabb,

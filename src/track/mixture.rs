@@ -93,9 +93,10 @@ impl MixtureTracker {
 
     /// Last step's tracks predicted to `time_ns`.
     pub fn priors(&self, time_ns: i64, priors: &mut Vec<Prior>) {
-        let after_s = self.time_ns.map_or(0.0, |last_ns| seconds(last_ns, time_ns));
+        let last_ns = self.time_ns.unwrap_or(time_ns);
+        let after_s = seconds(last_ns, time_ns);
         priors.clear();
-        priors.extend(self.people.iter().map(|person| person.prior(&self.numbers, after_s)));
+        priors.extend(self.people.iter().map(|person| person.prior(&self.numbers, last_ns, after_s)));
     }
 
     /// Takes a frame's detections; `tracks` is every track alive at the frame's time, in order of `id`. A frame

@@ -17,6 +17,7 @@ mod height;
 #[doc(hidden)] // Extents, for the fit of its numbers.
 pub mod width;
 mod followed;
+mod origin;
 mod person;
 mod mixture;
 mod paper;

@@ -273,6 +273,7 @@ mod tests {
             limbs: None,
             full_body: true,
             top_m: 1.0,
+            top_diagonal_m: 0.2,
             aabb,
             obb: Obb::from_aabb(&aabb),
         };

@@ -8,6 +8,7 @@ use super::height::Height;
 use super::kalman::Filter;
 use super::limb_phase::LimbPhase;
 use super::numbers::Numbers;
+use super::origin::Origin;
 use super::remembered::{Remembered, Words};
 use super::visibility::{Body, BodyView};
 use super::width::BodyWidth;
@@ -38,6 +39,8 @@ const DUPLICATE_AFTER_S: f64 = 0.5;
 /// view ends the mean stays at its edge, frame after frame. None is added where half the height and half the returns of a
 /// body in free sight are.
 const HIDDEN_NOISE_M: f64 = 0.25;
+/// Furniture is known to the background once it is no longer found.
+const FURNITURE_GONE_S: f64 = 0.5;
 /// Mean standing height of adults in shoes.
 const HEIGHT_MEAN_M: f64 = 1.72;
 /// Time over which the width of a box is averaged.
@@ -57,7 +60,7 @@ pub(super) struct Person {
     pub(super) matches: u32,
     /// How long an elder track has stood in the same place.
     pub(super) doubled_s: f64,
-    born_ns: i64,
+    origin: Origin,
     last_match_ns: i64,
     points: u32,
     heading: Heading,
@@ -77,7 +80,7 @@ impl Remembered for Person {
         words.f64(&mut self.existence);
         words.u32(&mut self.matches);
         words.f64(&mut self.doubled_s);
-        words.i64(&mut self.born_ns);
+        self.origin.visit(words);
         words.i64(&mut self.last_match_ns);
         words.u32(&mut self.points);
         self.heading.visit(words);
@@ -111,7 +114,7 @@ impl Person {
             existence: EXISTENCE_AT_BIRTH,
             matches: 1,
             doubled_s: 0.0,
-            born_ns: time_ns,
+            origin: Origin::new(position_m, time_ns),
             last_match_ns: time_ns,
             points: 0,
             heading: Heading::ANY,
@@ -163,7 +166,8 @@ impl Person {
             || seconds(self.last_match_ns, time_ns) > numbers.coast_max_s
             || spread[0][0] + spread[1][1] >= POSITION_VARIANCE_MAX_M2
             || self.doubled_s > DUPLICATE_AFTER_S
-            || !self.confirmed && seconds(self.born_ns, time_ns) > CONFIRM_WITHIN_S
+            || self.origin.is_furniture(time_ns) && seconds(self.last_match_ns, time_ns) > FURNITURE_GONE_S
+            || !self.confirmed && self.origin.age_s(time_ns) > CONFIRM_WITHIN_S
     }
 
     /// The body that others may hide behind.
@@ -171,14 +175,15 @@ impl Person {
         Body { position_m, height_m: self.height.mean_m() }
     }
 
-    pub(super) fn prior(&self, numbers: &Numbers, after_s: f64) -> Prior {
+    pub(super) fn prior(&self, numbers: &Numbers, last_ns: i64, after_s: f64) -> Prior {
         let state = self.filter.state_after(numbers, after_s);
         Prior {
             position_m: state.position_m(),
             velocity_mps: state.velocity_mps(),
             position_sigma_m: largest_sigma(state.position_covariance()),
             height_m: self.height.mean_m(),
-            confirmed: self.confirmed,
+            confirmed: self.confirmed && !self.origin.is_furniture(last_ns),
+            is_furniture: self.origin.is_furniture(last_ns),
         }
     }
 
@@ -204,7 +209,9 @@ impl Person {
             width_scale_sigma,
             gait: self.limb_phase.phase(velocity_mps.length()),
             points: self.points,
-            confirmed: self.confirmed && largest_sigma(state.position_covariance()) < REPORTED_SIGMA_MAX_M,
+            confirmed: self.confirmed
+                && !self.origin.is_furniture(time_ns)
+                && largest_sigma(state.position_covariance()) < REPORTED_SIGMA_MAX_M,
             aabb,
             obb,
             observed,
@@ -214,7 +221,9 @@ impl Person {
     /// Learns what a detection says of the body's shape and gait.
     fn see(&mut self, numbers: &Numbers, detection: &Detection, view: &BodyView, step_s: f64) {
         self.points = detection.points;
-        let speed_mps = self.speed_mps();
+        let state = self.filter.state();
+        let speed_mps = state.velocity_mps().length();
+        self.origin.see(detection, state.position_m(), speed_mps);
         if let Some(limbs) = detection.limbs.as_ref().filter(|_| numbers.limb_phase) {
             self.limb_phase.see(limbs, speed_mps, self.height.mean_m());
         }
@@ -279,6 +288,7 @@ mod tests {
             limbs: None,
             full_body: true,
             top_m: HEIGHT_MEAN_M,
+            top_diagonal_m: 0.2,
             aabb,
             obb: Obb::from_aabb(&aabb),
         };

@@ -86,6 +86,7 @@ mod tests {
             limbs: None,
             full_body: true,
             top_m: 1.8,
+            top_diagonal_m: 0.2,
             aabb,
             obb: Obb::from_aabb(&aabb),
         };

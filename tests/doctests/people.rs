@@ -36,6 +36,7 @@ pub fn detection(x_m: f64, time_ns: i64) -> umbracast::detect::Detection {
         points: 40,
         full_body: true,
         top_m: 1.7,
+        top_diagonal_m: 0.2,
         limbs: None,
         aabb,
         obb: Obb::from_aabb(&aabb),

@@ -363,7 +363,14 @@ impl Message for Prior {
 
     fn empty() -> Self {
         let (position_m, velocity_mps) = (DVec2::ZERO, DVec2::ZERO);
-        Self { position_m, velocity_mps, position_sigma_m: 0.0, height_m: 0.0, confirmed: false }
+        Self {
+            position_m,
+            velocity_mps,
+            position_sigma_m: 0.0,
+            height_m: 0.0,
+            confirmed: false,
+            is_furniture: false,
+        }
     }
 
     fn visit(&mut self, f: &mut impl Fields) {
@@ -372,6 +379,7 @@ impl Message for Prior {
         f.f64("position_sigma_m", &mut self.position_sigma_m);
         f.f64("height_m", &mut self.height_m);
         f.bool("confirmed", &mut self.confirmed);
+        f.bool("is_furniture", &mut self.is_furniture);
     }
 }
 

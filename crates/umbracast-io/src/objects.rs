@@ -96,6 +96,7 @@ fn detection(object: &Object, after_s: f64, time_ns: i64) -> Option<Detection> {
         points: POINTS,
         full_body: true,
         top_m: object.size_m[2],
+        top_diagonal_m: 0.0, // Nobody says: what is listed is somebody.
         limbs: None,
         aabb: Aabb { min_m: obb.center_m - reach_m, max_m: obb.center_m + reach_m },
         obb,

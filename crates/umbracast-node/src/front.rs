@@ -24,8 +24,9 @@ pub struct Front {
     /// Place in the site of each sensor that the assembler knows.
     own: Vec<usize>,
     names: Vec<String>,
-    /// Whether the empty hall is known: then nobody need say where people are expected.
-    knows_empty: bool,
+    /// How long a frame waits for where people are expected. Not at all where the empty hall is known: then only furniture is
+    /// learned, which has time.
+    priors_wait: Duration,
     expected: Arc<Expected>,
     health: Health,
     /// Frames for which the priors did not come in time.
@@ -70,12 +71,13 @@ impl Front {
         let sensors = own.iter().map(|&s| config.site.sensors[s].clone()).collect();
         let mut background = Background::new(&config.detect, &config.site);
         empty.iter().for_each(|frame| background.learn_empty(frame));
+        let knows = !empty.is_empty() || config.detect.background == BackgroundMethod::Voxels;
         Ok(Self {
             assembler: Assembler::new(&Site { sensors, ..config.site.clone() })?,
             background,
             own: own.to_vec(),
             names: config.site.sensors.iter().map(|sensor| sensor.name.clone()).collect(),
-            knows_empty: !empty.is_empty() || config.detect.background == BackgroundMethod::Voxels,
+            priors_wait: if knows { Duration::ZERO } else { PRIORS_WAIT },
             expected,
             health: Health::default(),
             priors_late: 0,
@@ -117,7 +119,7 @@ impl Front {
 
     fn foreground(&mut self, frame: &Frame) -> Foreground {
         let closed_ns = self.clock.now_ns();
-        let priors = if self.knows_empty { Vec::new() } else { self.priors(frame.time_ns) };
+        let priors = self.priors(frame.time_ns);
         let begun_ns = self.clock.now_ns();
         let mut points = Vec::new();
         self.background.foreground(frame, &priors, &mut self.health, &mut points);
@@ -135,8 +137,8 @@ impl Front {
 
     /// Those for the frame, or the newest that there are; then that is counted.
     fn priors(&mut self, time_ns: i64) -> Vec<Prior> {
-        let (priors, in_time) = self.expected.at(time_ns, self.clock);
-        self.priors_late += u64::from(!in_time);
+        let (priors, in_time) = self.expected.at(time_ns, self.priors_wait, self.clock);
+        self.priors_late += u64::from(!in_time && !self.priors_wait.is_zero());
         priors
     }
 }
@@ -151,14 +153,14 @@ impl Expected {
     }
 
     /// Waits for the priors of a frame while a tracker is there; whether they came in time, or nobody was there.
-    fn at(&self, time_ns: i64, clock: HostClock) -> (Vec<Prior>, bool) {
+    fn at(&self, time_ns: i64, wait: Duration, clock: HostClock) -> (Vec<Prior>, bool) {
         let newest = self.newest.lock().unwrap_or_else(PoisonError::into_inner);
         let early = |newest: &mut Option<(Priors, i64)>| {
             newest.as_ref().is_some_and(|(priors, heard_ns)| {
                 priors.time_ns < time_ns && clock.now_ns() - heard_ns < TRACKER_SILENT_NS
             })
         };
-        let waited = self.heard.wait_timeout_while(newest, PRIORS_WAIT, early);
+        let waited = self.heard.wait_timeout_while(newest, wait, early);
         let (newest, _) = waited.unwrap_or_else(PoisonError::into_inner);
         match &*newest {
             Some((priors, _)) => (priors.priors.clone(), priors.time_ns == time_ns),

@@ -1,0 +1,130 @@
+//! What a range model learns, and forgets.
+
+use super::*;
+
+#[test]
+fn an_azimuth_lies_in_its_bin_whatever_it_is() {
+    let model = RangeModel::new(0.05, 0.2);
+    for (azimuth_cdeg, bin) in [
+        (0.0, 0),
+        (19.9, 0),
+        (20.0, 1),
+        (35_999.0, 1799),
+        (36_000.0, 0),
+        (-0.5, 1799),
+        (-35_999.0, 0),
+        (71_999.0, 1799),
+        (f32::NAN, 1799),
+        (f32::INFINITY, 1799),
+        (1e30, 1799),
+        (-1e30, 0),
+    ] {
+        assert_eq!(model.bin(azimuth_cdeg), bin, "{azimuth_cdeg}");
+    }
+}
+
+#[test]
+fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
+    let mut model = RangeModel::new(0.05, 1.0);
+    model.grow(ROWS);
+    (0..model.limit_m.len()).for_each(|pixel| model.limit_m[pixel] = 2.0 + (pixel * 7 % 13) as f32);
+    let columns = [
+        [500.0; ROWS],
+        [590.0, 595.0, 600.0, 605.0],
+        [35_990.0, 36_010.0, 35_900.0, 0.0],
+        [0.0, 500.0, 9e3, 2e4],
+    ];
+    for azimuths_cdeg in columns {
+        let mut pixels = [0; ROWS];
+        model.pixels(&azimuths_cdeg, &mut pixels);
+        let limits_m = pixels.map(|pixel| model.limit_m(pixel as usize));
+        assert!(!model.any_new(&pixels, &limits_m), "{azimuths_cdeg:?}");
+        assert!(!model.any_new(&pixels, &[0.0; ROWS]), "nothing came back");
+        for row in 0..ROWS {
+            for nearer_m in [limits_m[row] - 0.001, f32::NAN] {
+                let mut ranges_m = limits_m;
+                ranges_m[row] = nearer_m;
+                assert!(model.any_new(&pixels, &ranges_m), "{azimuths_cdeg:?}, row {row}");
+            }
+        }
+    }
+}
+
+#[test]
+fn who_comes_and_stands_where_somebody_is_expected_never_becomes_the_background() {
+    let mut model = RangeModel::new(0.05, 1.0);
+    model.grow(ROWS);
+    for _ in 0..40 {
+        look(&mut model, 0, 0);
+    }
+    // Two revolutions until somebody is expected there, then a minute and a half.
+    for revolution in 0..900 {
+        for bin in 0..model.bins {
+            for row in 0..ROWS {
+                let pixel = bin * ROWS + row;
+                match (10..14).contains(&bin) {
+                    true if revolution < 2 => model.observe(pixel, NEAR_M),
+                    true => model.freeze(pixel),
+                    false => model.observe(pixel, FAR_M),
+                }
+            }
+        }
+        model.close_revolution(false);
+        assert!(model.limit_m(12 * ROWS) > NEAR_M, "revolution {revolution}");
+    }
+}
+
+const ROWS: usize = 4;
+const NEAR_M: f32 = 5.0;
+const FAR_M: f32 = 10.0;
+
+/// One revolution in bins of one degree: something at 5 m in bins `first..end`, a wall at 10 m around it.
+fn look(model: &mut RangeModel, first: usize, end: usize) {
+    for bin in 0..model.bins {
+        let range_m = if (first..end).contains(&bin) { NEAR_M } else { FAR_M };
+        for row in 0..model.rows {
+            model.observe(bin * model.rows + row, range_m);
+        }
+    }
+    model.close_revolution(false);
+}
+
+fn learned(first: usize, end: usize) -> RangeModel {
+    let mut model = RangeModel::new(0.1, 1.0);
+    model.grow(ROWS);
+    for _ in 0..10 {
+        look(&mut model, first, end);
+    }
+    model
+}
+
+fn is_new(model: &RangeModel, bin: usize) -> bool {
+    (0..ROWS).all(|row| NEAR_M < model.limit_m(bin * ROWS + row))
+}
+
+#[test]
+fn who_walks_off_is_forgotten_as_a_whole() {
+    let mut model = learned(100, 106);
+    assert!(!is_new(&model, 104));
+    for step in 1..=3 {
+        look(&mut model, 100 + step, 106 + step);
+    }
+    assert!(is_new(&model, 104));
+}
+
+#[test]
+fn what_stays_is_not_forgotten_where_its_edge_goes() {
+    // A pillar whose edge is no longer hit, and a wall that a walker leaves.
+    for (first, end) in [(100, 106), (100, 180)] {
+        let mut model = learned(first, end);
+        for _ in 0..5 {
+            look(&mut model, first + 2, end);
+        }
+        assert!(!is_new(&model, first + 4), "{first}..{end}");
+    }
+    let mut wall = learned(100, 180);
+    for step in 1..=5 {
+        look(&mut wall, 100 + step, 180 + step);
+    }
+    assert!(!is_new(&wall, 140));
+}

@@ -1,0 +1,105 @@
+//! Whether a track is somebody, or something that was put there.
+
+use super::followed::seconds;
+use super::remembered::{Remembered, Words};
+use crate::detect::Detection;
+use crate::gait::WALKS_FROM_MPS;
+use crate::geometry::DVec2;
+
+/// Who has come so far from where the track began has walked: positions of furniture jump by less, as more or less of it
+/// is seen.
+const WALKED_M: f64 = 1.0;
+/// What has never walked is furniture after this long,
+const FURNITURE_AFTER_S: f64 = 4.0;
+/// and this, where it has the shape of somebody who stands: who is there from the start may look around for a while.
+const UPRIGHT_AFTER_S: f64 = 30.0;
+/// Who stands is higher, not as long in plan view, and has a head on top.
+const UPRIGHT_TOP_M: f64 = 1.3;
+const UPRIGHT_DIAGONAL_M: f64 = 0.9;
+const HEAD_DIAGONAL_M: f64 = 0.6;
+
+/// Where a track began, and what it has shown since.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Origin {
+    born_ns: i64,
+    position_m: DVec2,
+    walked: bool,
+    /// Detections that might be of somebody who stands, less those that might not.
+    upright: f64,
+}
+
+impl Remembered for Origin {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.i64(&mut self.born_ns);
+        words.vec2(&mut self.position_m);
+        words.bool(&mut self.walked);
+        words.f64(&mut self.upright);
+    }
+}
+
+impl Origin {
+    pub(super) fn new(position_m: DVec2, born_ns: i64) -> Self {
+        Self { born_ns, position_m, walked: false, upright: 0.0 }
+    }
+
+    pub(super) fn age_s(&self, time_ns: i64) -> f64 {
+        seconds(self.born_ns, time_ns)
+    }
+
+    /// A detection of the track, which is now here.
+    pub(super) fn see(&mut self, detection: &Detection, position_m: DVec2, speed_mps: f64) {
+        self.walked |= speed_mps > WALKS_FROM_MPS && position_m.distance(self.position_m) > WALKED_M;
+        let diagonal_m = detection.aabb.size_m().truncate().length();
+        let upright = detection.top_m > UPRIGHT_TOP_M
+            && diagonal_m < UPRIGHT_DIAGONAL_M
+            && detection.top_diagonal_m < HEAD_DIAGONAL_M;
+        self.upright += if upright { 1.0 } else { -1.0 };
+    }
+
+    /// True once it is taken for something that was put there.
+    pub(super) fn is_furniture(&self, time_ns: i64) -> bool {
+        let after_s = if self.upright > 0.0 { UPRIGHT_AFTER_S } else { FURNITURE_AFTER_S };
+        !self.walked && self.age_s(time_ns) > after_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Aabb, DVec3, Obb};
+
+    /// Seen ten times a second for `seconds`, with this height and these diagonals, going along x.
+    fn is_furniture(seconds: i64, top_m: f64, top_diagonal_m: f64, speed_mps: f64) -> bool {
+        let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.3, top_m) };
+        let mut origin = Origin::new(DVec2::ZERO, 0);
+        for k in 0..10 * seconds {
+            let position_m = DVec2::new(0.1 * k as f64 * speed_mps, 0.0);
+            let detection = Detection {
+                position_m,
+                covariance_m2: None,
+                z_m: 0.5 * top_m,
+                time_ns: k * crate::STEP_NS,
+                points: 40,
+                full_body: true,
+                top_m,
+                top_diagonal_m,
+                limbs: None,
+                aabb,
+                obb: Obb::from_aabb(&aabb),
+            };
+            origin.see(&detection, position_m, speed_mps);
+        }
+        origin.is_furniture(10 * seconds * crate::STEP_NS)
+    }
+
+    #[test]
+    fn what_never_walks_is_furniture_sooner_or_later() {
+        let (head, cupboard) = (0.25, 0.9);
+        assert_eq!([3, 5].map(|s| is_furniture(s, 0.8, head, 0.0)), [false, true], "a chair");
+        assert_eq!([3, 5].map(|s| is_furniture(s, 1.8, cupboard, 0.0)), [false, true], "a cupboard");
+        assert_eq!([29, 31].map(|s| is_furniture(s, 1.8, head, 0.0)), [false, true], "who stands, perhaps");
+        assert!(!is_furniture(300, 1.8, head, 0.5), "who walks");
+        // Somebody crouches and creeps: speed alone does not make a person, nor does a jump of the position.
+        assert!(is_furniture(5, 0.8, head, 0.15));
+    }
+}
