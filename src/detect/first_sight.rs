@@ -69,7 +69,7 @@ mod tests {
         let person = DVec3::new(0.5, 0.3, 1.7);
         let found = |things: &[Vec<Return>]| !of_people(&things.concat()).is_empty();
         let alone = thing(DVec2::new(5.0, 1.0), person);
-        assert!(found(&[alone.clone()]));
+        assert!(found(std::slice::from_ref(&alone)));
         assert!(found(&[alone.clone(), thing(DVec2::new(9.0, 1.0), DVec3::new(3.0, 0.1, 3.0))]));
         assert!(!found(&[alone, thing(DVec2::new(5.0, 1.3), DVec3::new(3.0, 0.1, 3.0))]), "beside a wall");
         for other in [[0.7, 0.7, 3.5], [1.6, 0.8, 0.75], [0.5, 0.5, 0.9], [1.6, 0.6, 2.0]] {
