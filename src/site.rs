@@ -141,6 +141,10 @@ pub struct Sensor {
     /// Which clock its points are timed by.
     #[serde(default, skip_serializing_if = "TimeSource::is_sensor")]
     pub time: TimeSource,
+    /// How far its times run ahead of those of the first sensor, milliseconds, as `umbracast calibrate` finds it: so
+    /// much is taken from them.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub clock_offset_ms: f64,
 }
 
 /// Which clock a sensor's points are timed by.
@@ -172,6 +176,10 @@ impl TimeSource {
     fn is_sensor(&self) -> bool {
         *self == Self::Sensor
     }
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 // What a site file need not say of a sensor: an HDL-32E as it is delivered, cut behind, as the default site has two.
@@ -207,6 +215,9 @@ pub struct Simulation {
     pub dropout: f64,
     /// Sensors that fall silent for good, by name: after how many seconds.
     pub lost_after_s: BTreeMap<String, f64>,
+    /// Sensors whose clock runs ahead of true time, by name: by how many milliseconds.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub clock_ahead_ms: BTreeMap<String, f64>,
 }
 
 /// Yaw, pitch and roll in degrees.

@@ -41,6 +41,8 @@ struct Simulated {
     noise: Noise,
     /// Packets that are not wholly within are not sent.
     powered_ns: Range<i64>,
+    /// Its clock before true time.
+    ahead_ns: i64,
     open: OpenPacket,
 }
 
@@ -122,6 +124,7 @@ impl Simulated {
             head,
             noise,
             powered_ns: 0..i64::MAX,
+            ahead_ns: site.simulation.clock_ahead_ms.get(&sensor.name).map_or(0, |ms| (ms * 1e6) as i64),
             open: OpenPacket::default(),
         })
     }
@@ -172,14 +175,15 @@ impl Simulated {
             && self.head.time_ns(first + self.head.packet_columns() - 1) < self.powered_ns.end
     }
 
-    /// Sends the open packet, at the time its last column fires.
+    /// Sends the open packet at the time its last column fires; what it says of the time is its clock's.
     fn close(&mut self) -> Option<Packet> {
         let OpenPacket { number, range_m, reflectivity } = std::mem::take(&mut self.open);
         if range_m.is_empty() || !self.is_powered(number) {
             return None;
         }
-        let columns = self.head.turn(number);
+        let mut columns = self.head.turn(number);
         let sent_ns = columns[columns.len() - 1].time_ns;
+        columns.iter_mut().for_each(|column| column.time_ns += self.ahead_ns);
         Some(packet::encode(&self.head.model, &columns, &range_m, &reflectivity, sent_ns))
     }
 }
