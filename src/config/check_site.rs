@@ -164,7 +164,8 @@ mod tests {
     use super::*;
     use crate::{Config, Mode};
 
-    const SITES: [&str; 3] = [
+    const SITES: [&str; 4] = [
+        include_str!("../../config/sites/hand-mounted.toml"),
         include_str!("../../config/sites/logictronix.toml"),
         include_str!("../../config/sites/ouster.toml"),
         include_str!("../../config/sites/lost-sensor.toml"),
