@@ -80,6 +80,8 @@ fn simulation(site: &Site) -> Result<(), Error> {
     let (lost, ahead) = (&site.simulation.lost_after_s, &site.simulation.clock_ahead_ms);
     let of = |key: &'static str, least, most| move |(name, &value)| (key, name, value, least, most);
     let lost = lost.iter().map(of("lost_after_s", 0.0, f64::INFINITY));
+    let slips = site.simulation.slip.iter().map(|(name, slip)| (name, &slip.after_s));
+    let lost = lost.chain(slips.map(of("slip", 0.0, f64::INFINITY)));
     for (key, name, value, least, most) in
         lost.chain(ahead.iter().map(of("clock_ahead_ms", -CLOCK_MS, CLOCK_MS)))
     {

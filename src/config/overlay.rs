@@ -52,7 +52,7 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 7] = [
+const OPTIONAL: [(&str, &str, &str); 8] = [
     ("site.sensors", "address", "a string"),
     ("site.sensors", "calibration", "a string"),
     ("site.sensors", "calibration_file", "a string"),
@@ -60,6 +60,7 @@ const OPTIONAL: [(&str, &str, &str); 7] = [
     ("site.sensors", "time", "a string"),
     ("site.sensors", "udp_port", "a whole number"),
     ("site.simulation", "clock_ahead_ms", "a table"),
+    ("site.simulation", "slip", "a table"),
 ];
 
 type Complain<'a> = &'a dyn Fn(usize, String) -> Error;

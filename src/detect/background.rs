@@ -42,6 +42,8 @@ pub struct Background {
     clip: Clip,
     /// True once an empty frame was given: then nothing more is learned.
     known: bool,
+    /// Sensors that hang elsewhere than when it was given: they learn on the way.
+    forgotten: Vec<bool>,
     map: Option<VoxelMap>,
     /// Scans that made the map.
     map_scans: u32,
@@ -73,6 +75,7 @@ impl Background {
                 highest_m: config.highest_m,
             },
             known: false,
+            forgotten: vec![false; site.sensors.len()],
             map: None,
             map_scans: 0,
             keys: Vec::new(),
@@ -139,7 +142,8 @@ impl Background {
             BackgroundMethod::RangeImage => {
                 let learn = Learn { on_the_way: true, priors, freeze_m: FREEZE_M };
                 for scan in &frame.scans {
-                    let learn = (!self.known).then_some(learn);
+                    let forgotten = self.forgotten.get(scan.sensor).copied().unwrap_or_default();
+                    let learn = (!self.known || forgotten).then_some(learn);
                     self.scan(scan, learn, health, points);
                 }
             }
@@ -157,6 +161,16 @@ impl Background {
         }
         health.points_over_limit += points.len().saturating_sub(POINTS_MAX) as u64;
         points.truncate(POINTS_MAX);
+    }
+
+    /// Forgets what a sensor has learned, for it hangs elsewhere now: it learns anew, on the way.
+    #[doc(hidden)] // Of `mounting`.
+    pub fn forget(&mut self, sensor: usize) {
+        if let (Some(model), Some(forgotten)) = (self.sensors.get_mut(sensor), self.forgotten.get_mut(sensor))
+        {
+            model.forget();
+            *forgotten = true;
+        }
     }
 
     /// Adds a scan to the map until it has enough.
@@ -209,7 +223,8 @@ impl Background {
     /// One scan against its sensor's range image; what is new goes to `points`.
     fn scan(&mut self, scan: &Scan, learn: Option<Learn>, health: &mut Health, points: &mut Vec<Point>) {
         let Some(sensor) = self.sensors.get_mut(scan.sensor) else { return };
-        sensor.scan(scan, &self.clip, learn, self.known, health, points);
+        let known = self.known && !self.forgotten[scan.sensor];
+        sensor.scan(scan, &self.clip, learn, known, health, points);
     }
 }
 

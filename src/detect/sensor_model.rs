@@ -105,6 +105,13 @@ impl SensorModel {
         }
     }
 
+    /// Knows nothing again.
+    pub(super) fn forget(&mut self) {
+        self.ranges = self.ranges.forgotten();
+        self.cloud_ranges = self.cloud_ranges.forgotten();
+        self.row_of_elevation.fill(None);
+    }
+
     /// One scan; what is new goes to `points`. The scene is `known` once it was learned without people.
     pub(super) fn scan(
         &mut self,
