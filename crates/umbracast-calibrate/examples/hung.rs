@@ -39,25 +39,27 @@ struct Case {
     walls: bool,
 }
 
-const CASES: [Case; 7] = [
+const CASES: [Case; 9] = [
     Case { name: "ten walkers", people: 10, clock_ms: 0.0, far: false, empty: true, walls: true },
     Case { name: "ten, clock 20 ms", people: 10, clock_ms: 20.0, far: false, empty: true, walls: true },
     Case { name: "ten, clock 50 ms", people: 10, clock_ms: 50.0, far: false, empty: true, walls: true },
     Case { name: "ten, no empty scan", people: 10, clock_ms: 0.0, far: false, empty: false, walls: true },
     Case { name: "ten, walls unknown", people: 10, clock_ms: 0.0, far: false, empty: true, walls: false },
     Case { name: "two walkers", people: 2, clock_ms: 0.0, far: false, empty: true, walls: true },
+    Case { name: "two, walls unknown", people: 2, clock_ms: 0.0, far: false, empty: true, walls: false },
     Case { name: "30 m apart", people: 10, clock_ms: 0.0, far: true, empty: true, walls: true },
+    Case { name: "30 m, walls unknown", people: 10, clock_ms: 0.0, far: true, empty: true, walls: false },
 ];
 
-/// How far one found sensor is from the truth; between the sensors, what people alone tell.
-struct Error1 {
+/// How far one found sensor is from the truth, and both from one another: only that is told where no walls are known.
+struct Off {
     angle_deg: f64,
     place_m: f64,
     between_deg: f64,
     between_m: f64,
     clock_ms: f64,
     /// Errors in their own standard deviations: yaw, x, y, clock.
-    sigmas: [f64; 4],
+    sigmas: [Option<f64>; 4],
 }
 
 fn main() -> Result<(), Error> {
@@ -77,18 +79,20 @@ fn main() -> Result<(), Error> {
         for seed in first..first + scenes {
             errors.extend(scene(case, seed)?);
         }
-        let of = |pick: fn(&Error1) -> f64| {
+        let of = |pick: fn(&Off) -> f64| {
             let mean = errors.iter().map(pick).sum::<f64>() / errors.len() as f64;
             (mean, errors.iter().map(pick).fold(0.0, f64::max))
         };
         let text = |(mean, worst): (f64, f64), digits: usize| format!("{mean:.digits$} ({worst:.digits$})");
-        let sigma =
-            |k: usize| (errors.iter().map(|e| e.sigmas[k].powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
+        let sigma = |k: usize| {
+            let told: Vec<f64> = errors.iter().filter_map(|off| off.sigmas[k]).collect();
+            (told.iter().map(|off| off * off).sum::<f64>() / told.len().max(1) as f64).sqrt()
+        };
         println!(
             "{:20} {:>15} {:>15} {:>17} {:>17} {:>15} {:>6.1}{:4.1}{:4.1}{:4.1}",
             case.name,
-            text(of(|e| e.angle_deg), 3),
-            text(of(|e| 100.0 * e.place_m), 2),
+            if case.walls { text(of(|e| e.angle_deg), 3) } else { "-".to_owned() },
+            if case.walls { text(of(|e| 100.0 * e.place_m), 2) } else { "-".to_owned() },
             text(of(|e| e.between_deg), 3),
             text(of(|e| 100.0 * e.between_m), 2),
             text(of(|e| e.clock_ms), 2),
@@ -101,7 +105,7 @@ fn main() -> Result<(), Error> {
     Ok(())
 }
 
-fn scene(case: &Case, seed: u64) -> Result<Vec<Error1>, Error> {
+fn scene(case: &Case, seed: u64) -> Result<Vec<Off>, Error> {
     let mut truth = Config::default().site;
     if case.far {
         far(&mut truth);
@@ -118,11 +122,6 @@ fn scene(case: &Case, seed: u64) -> Result<Vec<Error1>, Error> {
         given.furniture.clear();
     }
     let found = calibrated(case, &truth, &given, seed)?;
-    if std::env::var_os("VERBOSE").is_some() {
-        println!("{found:#?}", found = found.told);
-        found.sensors.iter().for_each(|s| println!("{s:?}"));
-        println!("joint {} apart {:.3} {:?}", found.joint_sightings, found.apart_m, found.weak);
-    }
     Ok(errors(case, &truth, &found))
 }
 
@@ -180,51 +179,7 @@ fn calibrated(case: &Case, truth: &Site, given: &Site, seed: u64) -> Result<Cali
         empty.iter().for_each(|frame| walkers.learn_empty(frame));
     }
     recorded.iter().for_each(|frame| walkers.take(frame));
-    let found = walkers.finish()?;
-    if std::env::var_os("VERBOSE").is_some() {
-        for (s, seen) in found.seen.iter().enumerate() {
-            let pose = &truth.sensors[s];
-            let plan = umbracast_calibrate::Plan {
-                yaw_rad: pose.rotation_deg.yaw.to_radians(),
-                at_m: umbracast::geometry::DVec2::new(pose.position_m[0], pose.position_m[1]),
-            };
-            let mut bins = vec![(0.0, 0.0, 0.0, 0.0); 8];
-            for sighting in seen.ways.iter().flatten() {
-                let away = sighting.position_m.normalize();
-                let p = plan.point(sighting.position_m);
-                let off = scene
-                    .walkers()
-                    .iter()
-                    .filter_map(|w| w.state_at(sighting.time_ns))
-                    .map(|state| p - state.position_m)
-                    .min_by(|a, b| a.length().total_cmp(&b.length()))
-                    .unwrap();
-                if off.length() > 0.5 {
-                    continue;
-                }
-                let range = (sighting.position_m.length() / 4.0) as usize;
-                let v = sighting.velocity_mps.dot(away);
-                for k in [range.min(5), if v > 0.0 { 6 } else { 7 }] {
-                    let along = off.dot(plan.direction(away));
-                    bins[k].0 += 1.0;
-                    bins[k].1 += along;
-                    bins[k].2 += off.dot(plan.direction(away.perp()));
-                    bins[k].3 += off.length_squared();
-                }
-            }
-            println!("sensor {s} by range 4 m, then walking away, toward: n, cm away, cm left, rms cm");
-            bins.iter().for_each(|b| {
-                println!(
-                    "  {:6} {:6.2} {:6.2} {:6.2}",
-                    b.0,
-                    100.0 * b.1 / b.0,
-                    100.0 * b.2 / b.0,
-                    100.0 * (b.3 / b.0).sqrt()
-                )
-            });
-        }
-    }
-    Ok(found)
+    walkers.finish()
 }
 
 fn frames(site: &Site, packets: impl Iterator<Item = Vec<Vec<Packet>>>) -> Result<Vec<Frame>, Error> {
@@ -243,7 +198,7 @@ fn frames(site: &Site, packets: impl Iterator<Item = Vec<Vec<Packet>>>) -> Resul
     Ok(frames)
 }
 
-fn errors(case: &Case, truth: &Site, found: &Calibration) -> Vec<Error1> {
+fn errors(case: &Case, truth: &Site, found: &Calibration) -> Vec<Off> {
     let turned_deg = |a: DMat3, b: DMat3| {
         let turn = a.transpose() * b;
         (0.5 * (turn.x_axis.x + turn.y_axis.y + turn.z_axis.z - 1.0)).clamp(-1.0, 1.0).acos().to_degrees()
@@ -265,8 +220,8 @@ fn errors(case: &Case, truth: &Site, found: &Calibration) -> Vec<Error1> {
             .rem_euclid(360.0)
             - 180.0;
         let clock_ms = found.sensors[s].clock_offset_ms - if s == 1 { case.clock_ms } else { 0.0 };
-        let by = |off: f64, sigma: Option<f64>| sigma.map_or(0.0, |sigma| off / sigma);
-        Error1 {
+        let by = |off: f64, sigma: Option<f64>| sigma.filter(|_| case.walls).map(|sigma| off / sigma);
+        Off {
             angle_deg: turned_deg(is.rotation, of.rotation),
             place_m: off.length(),
             between_deg: turned_deg(found_between.rotation, true_between.rotation),
