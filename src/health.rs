@@ -37,6 +37,9 @@ pub struct Health {
     /// Frames in which so many people could come in each other's way that fewer samples were cast than the configuration
     /// says: nobody was left out, probabilities are coarser.
     pub frames_with_fewer_samples: u64,
+    /// Times that a sensor was found to hang elsewhere than it was thought to, by the floor and the walls it sees. Its pose is
+    /// put right while the program runs; `umbracast calibrate` puts it right in the site file.
+    pub sensors_moved: u64,
 }
 
 impl Health {
@@ -72,5 +75,6 @@ impl Health {
         self.frames_out_of_order += other.frames_out_of_order;
         self.points_over_limit += other.points_over_limit;
         self.frames_with_fewer_samples += other.frames_with_fewer_samples;
+        self.sensors_moved += other.sensors_moved;
     }
 }

@@ -37,6 +37,8 @@ pub mod health;
 pub mod site;
 pub mod lidar;
 pub mod config;
+#[doc(hidden)] // For who calls the stages one by one, as `Pipeline` does.
+pub mod mounting;
 #[doc(hidden)] // What walking bodies have in common, for tracks, casts and their scores; users meet `track::GaitPhase`.
 pub mod gait;
 pub mod detect;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
@@ -141,6 +141,10 @@ pub struct Sensor {
     /// Which clock its points are timed by.
     #[serde(default, skip_serializing_if = "TimeSource::is_sensor")]
     pub time: TimeSource,
+    /// How far its times run ahead of those of the first sensor, milliseconds, as `umbracast calibrate` finds it: so
+    /// much is taken from them.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub clock_offset_ms: f64,
 }
 
 /// Which clock a sensor's points are timed by.
@@ -172,6 +176,10 @@ impl TimeSource {
     fn is_sensor(&self) -> bool {
         *self == Self::Sensor
     }
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 // What a site file need not say of a sensor: an HDL-32E as it is delivered, cut behind, as the default site has two.
@@ -207,6 +215,57 @@ pub struct Simulation {
     pub dropout: f64,
     /// Sensors that fall silent for good, by name: after how many seconds.
     pub lost_after_s: BTreeMap<String, f64>,
+    /// Sensors whose clock runs ahead of true time, by name: by how many milliseconds.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub clock_ahead_ms: BTreeMap<String, f64>,
+    /// Sensors that hang elsewhere than the site says, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub slip: BTreeMap<String, Slip>,
+}
+
+/// How a simulated sensor comes to hang elsewhere.
+///
+/// ```
+/// use umbracast::{Config, Mode};
+///
+/// let file = "[site.simulation]\nslip = { lidar_west = { after_s = 10.0, turned_deg = [0.0, 1.0, 0.0] } }";
+/// let site = Config::with_overlay(Mode::Default, file, "slip.toml")?.site;
+/// assert_eq!(site.simulation.slip["lidar_west"].shifted_m, [0.0; 3]);
+/// # Ok::<(), umbracast::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Slip {
+    /// When it slips; 0: it never hung right.
+    pub after_s: f64,
+    /// About the site's x, y and z axes, as one turn about the sum of them.
+    #[serde(default)]
+    pub turned_deg: [f64; 3],
+    /// Along the site's axes.
+    #[serde(default)]
+    pub shifted_m: [f64; 3],
+}
+
+impl Slip {
+    /// Where a sensor hangs afterwards.
+    ///
+    /// ```
+    /// use umbracast::{geometry::Pose, site::Slip};
+    ///
+    /// let slip = Slip { after_s: 0.0, turned_deg: [0.0; 3], shifted_m: [0.0, 0.0, -0.1] };
+    /// assert_eq!(slip.slipped(&Pose::IDENTITY).translation_m.z, -0.1);
+    /// ```
+    pub fn slipped(&self, site_from_sensor: &Pose) -> Pose {
+        let turn = DVec3::from_array(self.turned_deg.map(f64::to_radians));
+        let rotation = match turn.length() {
+            0.0 => DMat3::IDENTITY,
+            angle => DMat3::from_axis_angle(turn / angle, angle),
+        };
+        Pose {
+            rotation: rotation * site_from_sensor.rotation,
+            translation_m: site_from_sensor.translation_m + DVec3::from_array(self.shifted_m),
+        }
+    }
 }
 
 /// Yaw, pitch and roll in degrees.

@@ -6,6 +6,8 @@ use crate::{Error, Site};
 
 /// No hall is longer; a longer one is in another unit.
 const HALL_MAX_M: f64 = 1000.0;
+/// A clock that is further ahead is not set: that is the assembler's to put right.
+const CLOCK_MS: f64 = 1000.0;
 
 /// Refuses the first value that cannot be, with its key, the name of its sensor or access point, what was expected
 /// and what was found.
@@ -46,6 +48,7 @@ fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
     within(&key("rotation_deg.yaw"), turn.yaw, -360.0, 360.0)?;
     within(&key("rotation_deg.pitch"), turn.pitch, -90.0, 90.0)?;
     within(&key("rotation_deg.roll"), turn.roll, -180.0, 180.0)?;
+    within(&key("clock_offset_ms"), sensor.clock_offset_ms, -CLOCK_MS, CLOCK_MS)?;
     within(&key("rate_hz"), sensor.rate_hz, 1.0, 50.0)?;
     within(&key("cut_deg"), sensor.cut_deg, 0.0, 360.0)?;
     within(&key("range_min_m"), sensor.range_min_m, 0.0, HALL_MAX_M)?;
@@ -74,13 +77,20 @@ fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
 
 fn simulation(site: &Site) -> Result<(), Error> {
     within("site.simulation.dropout", site.simulation.dropout, 0.0, 1.0)?;
-    for (name, &after_s) in &site.simulation.lost_after_s {
-        let key = format!("site.simulation.lost_after_s.{name}");
+    let (lost, ahead) = (&site.simulation.lost_after_s, &site.simulation.clock_ahead_ms);
+    let of = |key: &'static str, least, most| move |(name, &value)| (key, name, value, least, most);
+    let lost = lost.iter().map(of("lost_after_s", 0.0, f64::INFINITY));
+    let slips = site.simulation.slip.iter().map(|(name, slip)| (name, &slip.after_s));
+    let lost = lost.chain(slips.map(of("slip", 0.0, f64::INFINITY)));
+    for (key, name, value, least, most) in
+        lost.chain(ahead.iter().map(of("clock_ahead_ms", -CLOCK_MS, CLOCK_MS)))
+    {
+        let key = format!("site.simulation.{key}.{name}");
         if !site.sensors.iter().any(|sensor| sensor.name == *name) {
             let known: Vec<&str> = site.sensors.iter().map(|sensor| &*sensor.name).collect();
             return Err(Error::new(format!("{key}: expected one of {}, found {name}", known.join(", "))));
         }
-        within(&key, after_s, 0.0, f64::INFINITY)?;
+        within(&key, value, least, most)?;
     }
     Ok(())
 }
@@ -156,7 +166,8 @@ mod tests {
     use super::*;
     use crate::{Config, Mode};
 
-    const SITES: [&str; 3] = [
+    const SITES: [&str; 4] = [
+        include_str!("../../config/sites/hand-mounted.toml"),
         include_str!("../../config/sites/logictronix.toml"),
         include_str!("../../config/sites/ouster.toml"),
         include_str!("../../config/sites/lost-sensor.toml"),
@@ -173,7 +184,7 @@ mod tests {
     #[test]
     fn what_cannot_be_is_refused_with_key_name_expected_and_found() {
         type Change = fn(&mut Site);
-        let wrong: [(Change, &str); 29] = [
+        let wrong: [(Change, &str); 31] = [
             (|s| s.hall.height_m = 0.0, "site.hall.height_m: expected more than 0 and 1000 at most, found 0"),
             (|s| s.hall.width_m = f64::NAN, "site.hall.width_m: expected more than 0"),
             (|s| s.sensors.clear(), "site.sensors: expected one or more, found none"),
@@ -245,6 +256,14 @@ mod tests {
             (
                 |s| s.simulation.lost_after_s = [("door".to_owned(), 3.0)].into(),
                 "site.simulation.lost_after_s.door: expected one of lidar_east, lidar_west, found door",
+            ),
+            (
+                |s| s.simulation.clock_ahead_ms = [("door".to_owned(), 3.0)].into(),
+                "site.simulation.clock_ahead_ms.door: expected one of lidar_east, lidar_west, found door",
+            ),
+            (
+                |s| s.sensors[1].clock_offset_ms = f64::NAN,
+                "site.sensors.lidar_west.clock_offset_ms: expected -1000 to 1000, found NaN",
             ),
             (|s| s.access_points[1].position_m[2] = 12.0, "site.access_points.centre.position_m, z"),
             (|s| s.access_points[0].position_m[1] = -30.0, "site.access_points.side.position_m, y"),

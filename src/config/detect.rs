@@ -18,6 +18,8 @@ pub struct DetectConfig {
     pub thin_m: f64,
     /// Points higher than this above the floor are nobody's.
     pub highest_m: f64,
+    /// Whether floor and walls put the poses of sensors right.
+    pub follow_sensors: bool,
     /// How points become people.
     pub clusters: ClusterMethod,
     /// Where a person stands, given the points.

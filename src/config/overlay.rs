@@ -52,12 +52,15 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 5] = [
+const OPTIONAL: [(&str, &str, &str); 8] = [
     ("site.sensors", "address", "a string"),
     ("site.sensors", "calibration", "a string"),
     ("site.sensors", "calibration_file", "a string"),
+    ("site.sensors", "clock_offset_ms", "a number"),
     ("site.sensors", "time", "a string"),
     ("site.sensors", "udp_port", "a whole number"),
+    ("site.simulation", "clock_ahead_ms", "a table"),
+    ("site.simulation", "slip", "a table"),
 ];
 
 type Complain<'a> = &'a dyn Fn(usize, String) -> Error;
@@ -72,7 +75,8 @@ fn check_table(found: &DeTable<'_>, known: &Table, path: &str, complain: Complai
         let Some(expected) = known.get(name.as_ref()) else {
             let optional = || OPTIONAL.iter().filter(|(place, ..)| *place == path);
             if let Some((_, _, expected)) = optional().find(|(_, key, _)| key == name) {
-                if kind(value.get_ref()) == *expected {
+                let whole = kind(value.get_ref()) == "a whole number" && *expected == "a number";
+                if kind(value.get_ref()) == *expected || whole {
                     continue;
                 }
                 let found = kind(value.get_ref());

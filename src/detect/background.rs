@@ -11,8 +11,6 @@ use crate::{Frame, Health, Site};
 
 /// Most foreground points kept of one frame: 100 people close to the sensors. Bounds the time of a frame.
 const POINTS_MAX: usize = 40_000;
-/// In so many frames it is looked who is there from the start: the first may be cut.
-const FIRST_FRAMES: u32 = 3;
 /// Voxels: hdl_people_tracking's edge and threshold.
 const VOXEL_M: f64 = 0.2;
 const VOXEL_POINTS_MIN: u8 = 2;
@@ -41,10 +39,6 @@ pub struct Background {
     thin_m: f64,
     sensors: Vec<SensorModel>,
     clip: Clip,
-    /// True once an empty frame was given: then no more is learned than what was put there.
-    known: bool,
-    /// Frames since the start in which people were looked for; only where no empty frame was given.
-    frames: u32,
     map: Option<VoxelMap>,
     /// Scans that made the map.
     map_scans: u32,
@@ -75,8 +69,6 @@ impl Background {
                 half_width_m: site.hall.width_m * 0.5,
                 highest_m: config.highest_m,
             },
-            known: false,
-            frames: 0,
             map: None,
             map_scans: 0,
             keys: Vec::new(),
@@ -102,7 +94,7 @@ impl Background {
     pub fn learn_empty(&mut self, frame: &Frame) {
         match self.method {
             BackgroundMethod::RangeImage => {
-                self.known = true;
+                self.sensors.iter_mut().for_each(SensorModel::know);
                 let mut nothing = Vec::new();
                 for scan in &frame.scans {
                     self.scan(scan, Learn::Empty, &mut Health::default(), &mut nothing);
@@ -140,14 +132,12 @@ impl Background {
         points.clear();
         match self.method {
             BackgroundMethod::RangeImage => {
-                let learn = if self.known { Learn::Furniture(priors) } else { Learn::OnTheWay(priors) };
                 for scan in &frame.scans {
+                    let known = self.sensors.get(scan.sensor).is_some_and(SensorModel::is_known);
+                    let learn = if known { Learn::Furniture(priors) } else { Learn::OnTheWay(priors) };
                     self.scan(scan, learn, health, points);
                 }
-                if !self.known && self.frames < FIRST_FRAMES {
-                    self.frames += 1;
-                    self.forget_people(frame);
-                }
+                self.forget_people(frame);
             }
             BackgroundMethod::Voxels => {
                 self.all_points(frame, health, points);
@@ -164,13 +154,24 @@ impl Background {
         keep_most(points, health);
     }
 
-    /// Who stands there from the start is not the hall.
+    /// Forgets what a sensor has learned, for it hangs elsewhere now: it learns anew, on the way.
+    #[doc(hidden)] // Of `mounting`.
+    pub fn forget(&mut self, sensor: usize) {
+        if let Some(model) = self.sensors.get_mut(sensor) {
+            model.forget();
+        }
+    }
+
+    /// Who stands there when a sensor begins to learn is not the hall.
     fn forget_people(&mut self, frame: &Frame) {
         let mut returns = Vec::new();
         for (i, scan) in frame.scans.iter().enumerate() {
-            if let Some(sensor) = self.sensors.get(scan.sensor) {
+            if let Some(sensor) = self.sensors.get(scan.sensor).filter(|sensor| sensor.begins()) {
                 sensor.returns(i, scan, &mut returns);
             }
+        }
+        if returns.is_empty() {
+            return;
         }
         let people = of_people(&returns);
         for (i, scan) in frame.scans.iter().enumerate() {
@@ -178,7 +179,7 @@ impl Background {
             pixels.sort_unstable();
             pixels.dedup();
             if let Some(sensor) = self.sensors.get_mut(scan.sensor).filter(|_| !pixels.is_empty()) {
-                sensor.forget(scan, &pixels);
+                sensor.forget_pixels(scan, &pixels);
             }
         }
     }
@@ -233,7 +234,7 @@ impl Background {
     /// One scan against its sensor's range image; what is new goes to `points`.
     fn scan(&mut self, scan: &Scan, learn: Learn, health: &mut Health, points: &mut Vec<Point>) {
         let Some(sensor) = self.sensors.get_mut(scan.sensor) else { return };
-        sensor.scan(Look { scan, clip: &self.clip, learn }, self.known, health, points);
+        sensor.scan(Look { scan, clip: &self.clip, learn }, health, points);
     }
 }
 

@@ -126,6 +126,11 @@ impl RangeModel {
         }
     }
 
+    /// One of the same make that knows nothing.
+    pub fn forgotten(&self) -> Self {
+        Self::new(f64::from(self.margin_m), 360.0 / self.bins as f64)
+    }
+
     /// How many rows there are.
     pub fn rows(&self) -> usize {
         self.rows

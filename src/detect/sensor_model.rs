@@ -24,6 +24,8 @@ const MARGIN_MIN_M: f64 = 0.05;
 const FREEZE_M: f64 = 0.5;
 /// What is new within this distance of furniture's middle is a part of it: half a large table.
 const FURNITURE_M: f64 = 0.9;
+/// In so many frames it is looked who is there from the start.
+const FIRST_FRAMES: u32 = 3;
 /// Lower points are the floor's.
 const LOWEST_M: f64 = 0.03;
 
@@ -37,6 +39,10 @@ pub(super) struct SensorModel {
     /// Row of each bin of elevation, for clouds whose beams are not known.
     row_of_elevation: Vec<Option<u16>>,
     elevation_bins_per_rad: f64,
+    /// True once the empty scene was shown.
+    known: bool,
+    /// Since the start.
+    frames: u32,
     returns: Vec<CloudReturn>,
     /// Of each beam: how long the head has turned on, and how far it looks to the right.
     turned: Vec<[f32; 2]>,
@@ -136,6 +142,8 @@ impl SensorModel {
             cloud_ranges: RangeModel::new(margin_m, CLOUD_AZIMUTH_BIN_DEG),
             row_of_elevation: vec![None; (180.0 / CLOUD_ELEVATION_BIN_DEG) as usize + 3],
             elevation_bins_per_rad: 1.0_f64.to_degrees() / CLOUD_ELEVATION_BIN_DEG,
+            known: false,
+            frames: 0,
             returns: Vec::new(),
             turned: Vec::new(),
             azimuths_cdeg: Vec::new(),
@@ -143,8 +151,32 @@ impl SensorModel {
         }
     }
 
-    /// One scan; what is new goes to `points`. The scene is `known` once it was learned without people.
-    pub(super) fn scan(&mut self, look: Look, known: bool, health: &mut Health, points: &mut Vec<Point>) {
+    /// Knows nothing again.
+    pub(super) fn forget(&mut self) {
+        self.ranges = self.ranges.forgotten();
+        self.cloud_ranges = self.cloud_ranges.forgotten();
+        self.row_of_elevation.fill(None);
+        (self.known, self.frames) = (false, 0);
+    }
+
+    /// Is shown the empty scene: from now on no more is learned than what was put there.
+    pub(super) fn know(&mut self) {
+        self.known = true;
+    }
+
+    pub(super) fn is_known(&self) -> bool {
+        self.known
+    }
+
+    /// True in the first frames from which the scene is learned, of which the very first may be cut.
+    pub(super) fn begins(&self) -> bool {
+        !self.known && self.frames <= FIRST_FRAMES
+    }
+
+    /// One scan; what is new goes to `points`.
+    pub(super) fn scan(&mut self, look: Look, health: &mut Health, points: &mut Vec<Point>) {
+        self.frames = self.frames.saturating_add(1);
+        let known = self.known;
         let ranges = match &look.scan.cloud {
             Cloud::Organised(image) => {
                 self.organised(look, image, health, points);
@@ -213,7 +245,7 @@ impl SensorModel {
     }
 
     /// Forgets what those pixels saw last, which are sorted: it was somebody.
-    pub(super) fn forget(&mut self, of: &Scan, pixels: &[usize]) {
+    pub(super) fn forget_pixels(&mut self, of: &Scan, pixels: &[usize]) {
         match &of.cloud {
             Cloud::Organised(_) => self.ranges.forget(pixels),
             Cloud::Unorganised(_) => self.cloud_ranges.forget(pixels),

@@ -77,6 +77,8 @@ struct Intake {
     model: Option<Model>,
     site_from_sensor: Pose,
     valid_range_m: RangeInclusive<f32>,
+    /// So far its times, and those at which its packets come, are ahead of the other sensors'.
+    ahead_ns: i64,
     /// From its own clock to the time of the frames.
     clock: Clock,
     /// Whether frames wait for it.
@@ -110,6 +112,7 @@ impl Assembler {
                 model,
                 site_from_sensor: sensor.site_from_sensor(),
                 valid_range_m: sensor.range_min_m as f32..=sensor.range_max_m as f32,
+                ahead_ns: (sensor.clock_offset_ms * 1e6).round() as i64,
                 clock: Clock::new(sensor.time),
             })
         };
@@ -147,15 +150,18 @@ impl Assembler {
         };
         let columns = &mut self.columns;
         columns.clear();
+        let ahead_ns = self.sensors[sensor].ahead_ns;
+        let received_ns = packet.time_ns.saturating_sub(ahead_ns);
         decode(&model, packet, health, |column, range_m, reflectivity| {
-            columns.push(column, range_m, reflectivity)
+            let time_ns = column.time_ns.saturating_sub(ahead_ns);
+            columns.push(Column { time_ns, ..column }, range_m, reflectivity)
         });
         let (Some(first), Some(last)) = (columns.column.first(), columns.column.last()) else { return };
 
         let intake = &mut self.sensors[sensor];
         let own_ns = (first.time_ns, last.time_ns);
         let (shift_ns, jumped) =
-            intake.clock.settle(own_ns, packet.time_ns, self.now, &mut self.shared_shift_ns);
+            intake.clock.settle(own_ns, received_ns, self.now, &mut self.shared_shift_ns);
         health.clock_jumps += u64::from(jumped);
         let first_ns = first.time_ns.saturating_add(shift_ns);
         let last_ns = last.time_ns.saturating_add(shift_ns);
@@ -177,7 +183,7 @@ impl Assembler {
         intake.clock.shift_ns = shift_ns;
         intake.clock.newest_ns = intake.clock.newest_ns.max(Some(last_ns));
         if !jumped {
-            self.now = Some((first_ns, packet.time_ns));
+            self.now = Some((first_ns, received_ns));
         }
         self.store(sensor, &model, health);
         self.close_ready(health);

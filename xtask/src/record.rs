@@ -2,6 +2,7 @@
 //! begins with the command it comes from and the commit it was made from.
 
 mod book;
+mod calibrate;
 mod crowds;
 mod house;
 mod living;
@@ -49,6 +50,7 @@ const JOBS: [Job; 30] = [
     job("walkers", "16 real walkers, ten draws of bodies, error budget and oracles", Needs::Data, crowds::walkers),
     job("circle-antipode", "8 and 16 real walkers, every mode", Needs::Data, scores::antipode),
     job("forecasts", "the residual beside a constant velocity", Needs::Data, crowds::forecasts),
+    job("calibrate", "sensors that hang elsewhere than the file says, found again", Needs::Nothing, calibrate::calibrate),
     job("logictronix", "real people before a real VLP-16", Needs::Data, crowds::logictronix),
     job("speed", "how long a frame takes, in every mode", Needs::Nothing, house::speed),
     job("growth", "how long a step takes with more people and access points", Needs::Nothing, house::growth),

@@ -40,6 +40,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "node")]
         Command::Fleet(args) => commands::fleet::run(&args, &cli.common),
         Command::Check(args) => commands::check::run(&args, &cli.common),
+        Command::Calibrate(args) => commands::calibrate::run(&args, &cli.common),
         Command::View(args) => commands::view::run(&args, &cli.common),
         Command::Replay(args) => commands::replay::run(&args, &cli.common),
         Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),

@@ -302,6 +302,7 @@ impl Message for Health {
         f.u64("frames_out_of_order", &mut self.frames_out_of_order);
         f.u64("points_over_limit", &mut self.points_over_limit);
         f.u64("frames_with_fewer_samples", &mut self.frames_with_fewer_samples);
+        f.u64("sensors_moved", &mut self.sensors_moved);
     }
 }
 

@@ -6,6 +6,7 @@ use std::time::Duration;
 use umbracast::config::BackgroundMethod;
 use umbracast::detect::{Background, Prior};
 use umbracast::lidar::{Assembler, Views};
+use umbracast::mounting::Mountings;
 use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_io::nodes::{Foreground, Priors};
 use umbracast_live::HostClock;
@@ -20,6 +21,7 @@ const TRACKER_SILENT_NS: i64 = 1_000_000_000;
 #[derive(Debug)]
 pub struct Front {
     assembler: Assembler,
+    mountings: Option<Mountings>,
     background: Background,
     /// Place in the site of each sensor that the assembler knows.
     own: Vec<usize>,
@@ -69,17 +71,23 @@ impl Front {
             )));
         }
         let sensors = own.iter().map(|&s| config.site.sensors[s].clone()).collect();
+        let mut mountings = config.detect.follow_sensors.then(|| Mountings::new(&config.site));
         let mut background = Background::new(&config.detect, &config.site);
-        empty.iter().for_each(|frame| background.learn_empty(frame));
+        let mut health = Health::default();
+        for frame in empty {
+            let followed = mountings.as_mut().and_then(|m| m.follow(frame, &mut health));
+            background.learn_empty(followed.as_ref().unwrap_or(frame));
+        }
         let knows = !empty.is_empty() || config.detect.background == BackgroundMethod::Voxels;
         Ok(Self {
             assembler: Assembler::new(&Site { sensors, ..config.site.clone() })?,
+            mountings,
             background,
             own: own.to_vec(),
             names: config.site.sensors.iter().map(|sensor| sensor.name.clone()).collect(),
             priors_wait: if knows { Duration::ZERO } else { PRIORS_WAIT },
             expected,
-            health: Health::default(),
+            health,
             priors_late: 0,
             clock,
         })
@@ -121,6 +129,9 @@ impl Front {
         let closed_ns = self.clock.now_ns();
         let priors = self.priors(frame.time_ns);
         let begun_ns = self.clock.now_ns();
+        let followed = self.mountings.as_mut().and_then(|m| m.follow(frame, &mut self.health));
+        let frame = followed.as_ref().unwrap_or(frame);
+        self.mountings.iter().flat_map(Mountings::moved).for_each(|&sensor| self.background.forget(sensor));
         let mut points = Vec::new();
         self.background.foreground(frame, &priors, &mut self.health, &mut points);
         Foreground {

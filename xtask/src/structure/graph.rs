@@ -7,12 +7,13 @@ use super::modules::{Module, Name, of_package};
 use crate::tools::Result;
 
 /// The packages in the order of the data; `lib.rs` or `main.rs` is the first file of each.
-const PACKAGES: [(&str, &str); 8] = [
+const PACKAGES: [(&str, &str); 9] = [
     ("umbracast", "src"),
     ("umbracast-sim", "crates/umbracast-sim/src"),
     ("umbracast-io", "crates/umbracast-io/src"),
     ("umbracast-eval", "crates/umbracast-eval/src"),
     ("umbracast-train", "crates/umbracast-train/src"),
+    ("umbracast-calibrate", "crates/umbracast-calibrate/src"),
     ("umbracast-live", "crates/umbracast-live/src"),
     ("umbracast-node", "crates/umbracast-node/src"),
     ("umbracast-cli", "crates/umbracast-cli/src"),

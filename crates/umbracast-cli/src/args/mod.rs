@@ -10,11 +10,13 @@ use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::Preset;
 
 mod live;
+mod calibrate;
 #[cfg(feature = "node")]
 mod node;
 #[cfg(feature = "node")]
 mod fleet;
 
+pub use calibrate::Calibrate;
 #[cfg(feature = "node")]
 pub use fleet::Fleet;
 pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
@@ -66,6 +68,8 @@ pub enum Command {
     Fleet(Fleet),
     /// Listen to the sensors of a site and say what is wrong with them, before the first person comes.
     Check(Check),
+    /// Find where the sensors of a site hang, from a recording in which people walk.
+    Calibrate(Calibrate),
     /// Watch a recording in the browser as if it were live.
     View(View),
     /// Send the packets of recordings again, at the pace they came.
@@ -180,6 +184,9 @@ pub struct Simulate {
     pub site: SiteArgs,
     #[command(flatten)]
     pub crowd: CrowdArgs,
+    /// Nobody arrives: people walk to and fro across the circle for so many seconds.
+    #[arg(long, value_name = "S", conflicts_with = "trajectories", value_parser = clap::value_parser!(u32).range(1..))]
+    pub stroll: Option<u32>,
     /// How many scenes.
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: u32,

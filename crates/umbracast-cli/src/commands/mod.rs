@@ -1,6 +1,7 @@
 //! One module a command.
 
 pub mod ablate;
+pub mod calibrate;
 pub mod compare;
 pub mod config;
 pub mod coverage;

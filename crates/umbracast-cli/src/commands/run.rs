@@ -164,6 +164,13 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
              expected `position_m` and `rotation_deg` of each sensor as it hangs"
         ));
     }
+    if health.sensors_moved > 0 {
+        lost.push(format!(
+            "sensors_moved: {}: sensors hang elsewhere than the site file says, by the floor and the walls they see; their poses \
+             were put right, `umbracast calibrate` does so for good",
+            health.sensors_moved
+        ));
+    }
     if !lost.is_empty() {
         return Ok(Ending::DataLost(lost.join("; ")));
     }

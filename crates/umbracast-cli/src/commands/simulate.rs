@@ -8,6 +8,7 @@ use umbracast_eval::run::chain::{self, EMPTY_FRAMES, SceneSpec};
 use umbracast_eval::score::scene::SceneTruth;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables::TableWriter;
+use umbracast_sim::crowd::strolling;
 use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
 
@@ -28,10 +29,16 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     let config = setup::config(Mode::Default, args.site.site.as_deref())?;
     let seed = args.crowd.seed.unwrap_or(TEST_SEED);
     let (preset, count) = (args.crowd.preset, args.scenes as usize);
-    let drawn = match args.trajectories.is_empty() {
+    let mut drawn = match args.trajectories.is_empty() {
         true => (chain::drawn_scenes(&[preset], count, args.crowd.people, seed), Vec::new()),
         false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed)?,
     };
+    if let Some(seconds) = args.stroll {
+        for scene in &mut drawn.0 {
+            let crowd = strolling(preset, args.crowd.people, chain::CIRCLE_M, scene.seed, seconds.into());
+            scene.people = chain::People::Replayed(crowd);
+        }
+    }
     let (scenes, mut told) = crowds::dressed(drawn, &args.bodies)?;
     told.extend(crowds::through_walls(&scenes, &config.site));
     let watch = Stopwatch::start();

@@ -2,7 +2,6 @@
 //! whose clock is apart, who looks elsewhere.
 
 mod listen;
-mod floor;
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
@@ -13,6 +12,7 @@ use umbracast::lidar::packet::decode;
 use umbracast::lidar::{Assembler, Cloud, Frame, Model, Packet, sensor_models};
 use umbracast::site::{Sensor, TimeSource};
 use umbracast::{Error, Health, Site};
+use umbracast_calibrate::floor;
 
 pub use self::listen::{Ears, Heard};
 use crate::receive::Door;

@@ -41,6 +41,10 @@ struct Simulated {
     noise: Noise,
     /// Packets that are not wholly within are not sent.
     powered_ns: Range<i64>,
+    /// From this time on it hangs elsewhere: what it sees of the hall then, and of people.
+    slipped: Option<(i64, Arc<HallImage>, Painter)>,
+    /// Its clock before true time.
+    ahead_ns: i64,
     open: OpenPacket,
 }
 
@@ -116,12 +120,19 @@ impl Simulated {
         }
         let site_from_sensor = sensor.site_from_sensor();
         let head = Head::new(model, sensor);
+        let slipped = site.simulation.slip.get(&sensor.name).map(|slip| {
+            let pose = slip.slipped(&site_from_sensor);
+            let hall = Arc::new(HallImage::trace(site, &head.model, &pose));
+            ((slip.after_s * 1e9) as i64, hall, Painter::new(&pose, &head))
+        });
         Ok(Self {
             hall: Arc::new(HallImage::trace(site, &head.model, &site_from_sensor)),
             painter: Painter::new(&site_from_sensor, &head),
             head,
             noise,
             powered_ns: 0..i64::MAX,
+            slipped,
+            ahead_ns: site.simulation.clock_ahead_ms.get(&sensor.name).map_or(0, |ms| (ms * 1e6) as i64),
             open: OpenPacket::default(),
         })
     }
@@ -134,9 +145,15 @@ impl Simulated {
 
     /// What is really there.
     fn look(&mut self, index: u64, walkers: &[Walker]) -> View {
-        let mut view = View::of_hall(&self.hall, &self.head, index);
+        let (hall, painter) = match &mut self.slipped {
+            Some((after_ns, hall, painter)) if index as i64 * umbracast::STEP_NS >= *after_ns => {
+                (hall, painter)
+            }
+            _ => (&mut self.hall, &mut self.painter),
+        };
+        let mut view = View::of_hall(hall, &self.head, index);
         for (person, walker) in walkers.iter().enumerate() {
-            self.painter.draw(walker, person as u32, &mut view);
+            painter.draw(walker, person as u32, &mut view);
         }
         view
     }
@@ -172,14 +189,15 @@ impl Simulated {
             && self.head.time_ns(first + self.head.packet_columns() - 1) < self.powered_ns.end
     }
 
-    /// Sends the open packet, at the time its last column fires.
+    /// Sends the open packet at the time its last column fires; what it says of the time is its clock's.
     fn close(&mut self) -> Option<Packet> {
         let OpenPacket { number, range_m, reflectivity } = std::mem::take(&mut self.open);
         if range_m.is_empty() || !self.is_powered(number) {
             return None;
         }
-        let columns = self.head.turn(number);
+        let mut columns = self.head.turn(number);
         let sent_ns = columns[columns.len() - 1].time_ns;
+        columns.iter_mut().for_each(|column| column.time_ns += self.ahead_ns);
         Some(packet::encode(&self.head.model, &columns, &range_m, &reflectivity, sent_ns))
     }
 }

@@ -1,0 +1,126 @@
+//! `calibrate`: where the sensors of a site hang, from people who walk, the floor and the walls.
+
+use std::path::Path;
+
+use umbracast::{Config, Error, Frame, Health, Mode};
+use umbracast_calibrate::{Calibration, Frame as Held, Survey, write_into};
+
+use crate::args::{Calibrate, Common};
+use crate::ending::Ending;
+use crate::input::{self, Input};
+use crate::run_json::{RunJson, Stopwatch};
+use crate::setup;
+
+mod picture;
+
+/// Without an empty scan, what lies still is looked for in every so many-th frame.
+const EVERY: u64 = 10;
+
+/// Looks at the recording twice: at what lies still, then at the people.
+pub fn run(args: &Calibrate, common: &Common) -> Result<Ending, Error> {
+    let inputs = input::scenes(&args.recording)?;
+    let mut config = setup::config(Mode::Default, args.site.site.as_deref())?;
+    if args.site.site.is_none() {
+        config.site = input::recorded_site(&inputs)?.unwrap_or(config.site);
+    }
+    let inputs = input::of_site(inputs, &config.site)?;
+    let [recording] = &inputs[..] else {
+        let found = inputs.len();
+        return Err(Error::new(format!("expected one scene, found {found}")));
+    };
+    let watch = Stopwatch::start();
+    let (mut health, mut lost) = (Health::default(), Vec::new());
+    let found = found(args, recording, &config, &mut health, &mut lost)?;
+    let text = args.site.site.as_deref().map_or(Ok(String::new()), setup::read_text)?;
+    setup::write(&args.out, write_into(&text, &config.site, &found)?)?;
+    let picture = args.picture.clone().unwrap_or_else(|| args.out.with_extension("svg"));
+    setup::write(&picture, picture::svg(&config.site, &found)?)?;
+    RunJson::new("calibrate", &watch)
+        .with("sensors", &found.sensors)
+        .with("joint_sightings", found.joint_sightings)
+        .with("apart_m", found.apart_m)
+        .with("weak", &found.weak)
+        .with("told", &found.told)
+        .with("health", health)
+        .with("lost", &lost)
+        .print(common, &told(&found, args, &picture));
+    Ok(if lost.is_empty() { Ending::Done } else { Ending::DataLost(lost.join("; ")) })
+}
+
+fn found(
+    args: &Calibrate,
+    recording: &Input,
+    config: &Config,
+    health: &mut Health,
+    lost: &mut Vec<String>,
+) -> Result<Calibration, Error> {
+    let given = args.empty.clone().or_else(|| input::empty_beside(recording)).filter(|_| !args.no_empty);
+    let mut empty = Vec::new();
+    if let Some(path) = given {
+        let (frames, told) = input::empty_frames(&path, config, health)?;
+        lost.extend(told);
+        empty = frames;
+    }
+    let mut survey = Survey::new(&config.site);
+    empty.iter().for_each(|frame| survey.take(frame));
+    if empty.is_empty() {
+        recording.frames(&config.site, &mut Health::default(), |frame: &Frame| {
+            if frame.index.is_multiple_of(EVERY) {
+                survey.take(frame);
+            }
+            Ok(())
+        })?;
+    }
+    let mut walkers = survey.level();
+    empty.iter().for_each(|frame| walkers.learn_empty(frame));
+    let told = recording.frames(&config.site, health, |frame| {
+        walkers.take(frame);
+        Ok(())
+    })?;
+    lost.extend(told);
+    walkers.finish()
+}
+
+/// A line a sensor, then what holds them all and what is least known.
+fn told(found: &Calibration, args: &Calibrate, picture: &Path) -> String {
+    let mut lines = Vec::new();
+    for of in &found.sensors {
+        let number = |value: f64, sigma: Option<f64>, digits: usize| match sigma {
+            Some(sigma) => format!("{value:.digits$} +- {sigma:.digits$}"),
+            None => format!("{value:.digits$} (as given)"),
+        };
+        let ([x, y, z], turn, sigma) = (of.position_m, of.rotation_deg, &of.sigma);
+        lines.push(format!("{}: moved {:.3} m, turned {:.2} deg", of.sensor, of.moved_m, of.turned_deg));
+        lines.push(format!(
+            "  x {} m, y {} m, z {} m",
+            number(x, sigma.x_m, 3),
+            number(y, sigma.y_m, 3),
+            number(z, sigma.z_m, 3)
+        ));
+        lines.push(format!(
+            "  yaw {} deg, pitch {} deg, roll {} deg, clock {} ms",
+            number(turn.yaw, sigma.yaw_deg, 3),
+            number(turn.pitch, sigma.pitch_deg, 3),
+            number(turn.roll, sigma.roll_deg, 3),
+            number(of.clock_offset_ms, sigma.clock_ms, 1)
+        ));
+        let with =
+            if of.with.is_empty() { "alone".to_owned() } else { format!("with {}", of.with.join(", ")) };
+        let held = match of.frame {
+            Held::Walls => "walls",
+            Held::SiteFile => "the site file",
+        };
+        lines.push(format!("  {} ways of people, {with}; frame held by {held}", of.people));
+    }
+    if found.joint_sightings > 0 {
+        let apart_cm = 100.0 * found.apart_m;
+        lines.push(format!("{} joint sightings, {apart_cm:.1} cm apart", found.joint_sightings));
+    }
+    for weak in &found.weak {
+        let of: Vec<String> = weak.of.iter().map(|(name, share)| format!("{share:+.2} {name}")).collect();
+        lines.push(format!("least known: {:.1} mm along {}", 1e3 * weak.sigma_m, of.join(", ")));
+    }
+    lines.extend(found.told.iter().cloned());
+    lines.push(format!("written: {}, {}", args.out.display(), picture.display()));
+    lines.join("\n")
+}

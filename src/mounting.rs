@@ -1,0 +1,336 @@
+//! Whether sensors still hang where the site file says, by the floor and the walls they see; where not, their pose is
+//! corrected.
+//!
+//! Some times a second a part of each sensor's returns is laid on the floor, the ceiling and the walls of the hall by least
+//! squares, the site file's pose being what is expected. How far each surface stands from where the file has it is unknown
+//! too, so a wall tells how a sensor is turned, and of where it hangs only as much as walls are known. Nothing is changed for
+//! less than [`TURN_RAD`] and [`SHIFT_M`], nor where the hall is not the file's.
+
+use crate::geometry::{DMat3, DVec3, Pose};
+use crate::lidar::{Cloud, Frame, RangeImage, Scan};
+use crate::site::Hall;
+use crate::{Health, Site};
+
+/// Every so many-th frame is looked at,
+const EVERY: u32 = 5;
+/// and about so many returns of it.
+const RETURNS: usize = 1500;
+/// What a return is taken to be of a surface by, round after round, metres.
+const GATES_M: [f64; 8] = [0.8, 0.8, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1];
+/// One standard deviation of a return; more returns of a surface than so many tell no more of how it is turned.
+const RETURN_M: f64 = 0.04;
+const RETURNS_MAX: f64 = 200.0;
+/// Of the floor and of walls against the site file: the one is level, of the others somebody has read a plan.
+const FLOOR_M: f64 = 0.01;
+const WALL_M: f64 = 0.05;
+/// Of the site file's pose: what somebody who measured is off by.
+const FILE_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
+const FILE_M: f64 = 0.03;
+/// The hall is the file's where such a share of the returns lies on its surfaces, and so many on the floor.
+const SHARE_MIN: f64 = 0.5;
+const FLOOR_MIN: usize = 40;
+/// Less than this stays as it is: 0.15 degrees are 4 cm at 15 m, as much as a person's position errs.
+pub const TURN_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
+/// The same of a place.
+pub const SHIFT_M: f64 = 0.02;
+/// Two looks that follow one another and find this much the same are believed, radians and metres.
+const SAME_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
+const SAME_M: f64 = 0.01;
+
+/// A turn about the sensor, along the site's axes, and a shift.
+type Six = [f64; 6];
+
+/// Follows how every sensor hangs.
+#[derive(Debug, Clone)]
+pub struct Mountings {
+    surfaces: [Surface; 6],
+    sensors: Vec<Mounting>,
+    frames: u32,
+    moved: Vec<usize>,
+}
+
+/// A plane: points on it have `normal . p = off_m`.
+#[derive(Debug, Clone, Copy)]
+struct Surface {
+    normal: DVec3,
+    off_m: f64,
+    sigma_m: f64,
+}
+
+/// One sensor.
+#[derive(Debug, Clone)]
+struct Mounting {
+    given: Pose,
+    /// What is taken to be the difference from `given`.
+    used: Six,
+    /// Another one that was found once: until the next look the sensor is not believed.
+    doubted: Option<Six>,
+    /// Whether it was found to hang right, or put right, before.
+    settled: bool,
+}
+
+impl Mountings {
+    /// Of a site's sensors, which hang as it says until they are seen not to.
+    pub fn new(site: &Site) -> Self {
+        let mounting = |sensor: &crate::site::Sensor| Mounting {
+            given: sensor.site_from_sensor(),
+            used: [0.0; 6],
+            doubted: None,
+            settled: false,
+        };
+        Self {
+            surfaces: surfaces(&site.hall),
+            sensors: site.sensors.iter().map(mounting).collect(),
+            frames: 0,
+            moved: Vec::new(),
+        }
+    }
+
+    /// Looks at a frame. Gives it with poses put right and without the scans of sensors that are in doubt; none where all
+    /// hang as the site says.
+    pub fn follow(&mut self, frame: &Frame, health: &mut Health) -> Option<Frame> {
+        self.moved.clear();
+        let look = self.frames.is_multiple_of(EVERY);
+        self.frames = self.frames.wrapping_add(1);
+        if look {
+            for scan in &frame.scans {
+                self.look(scan, health);
+            }
+        }
+        let as_given = |mounting: &Mounting| mounting.used == [0.0; 6] && mounting.doubted.is_none();
+        if self.sensors.iter().all(as_given) {
+            return None;
+        }
+        let known =
+            |scan: &&Scan| self.sensors.get(scan.sensor).is_none_or(|mounting| mounting.doubted.is_none());
+        let put_right = |scan: &Scan| {
+            let site_from_sensor = match self.sensors.get(scan.sensor) {
+                Some(mounting) if mounting.used != [0.0; 6] => corrected(&mounting.given, &mounting.used),
+                _ => scan.site_from_sensor,
+            };
+            Scan { site_from_sensor, ..scan.clone() }
+        };
+        let scans = frame.scans.iter().filter(known).map(put_right).collect();
+        Some(Frame { scans, ..*frame })
+    }
+
+    /// Sensors that were found in the last frame to have moved since they were believed: what they have learned of the hall
+    /// is no more.
+    pub fn moved(&self) -> &[usize] {
+        &self.moved
+    }
+
+    fn look(&mut self, scan: &Scan, health: &mut Health) {
+        let (Some(mounting), Cloud::Organised(image)) = (self.sensors.get_mut(scan.sensor), &scan.cloud)
+        else {
+            return;
+        };
+        let points_m = sampled(image, self.frames);
+        let before = mounting.doubted.take();
+        let Some(found) = fitted(&points_m, &mounting.given, &mounting.used, &self.surfaces) else { return };
+        let near = |a: &Six, b: &Six, turn_rad: f64, shift_m: f64| {
+            let off = |axes: std::ops::Range<usize>| axes.map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+            off(0..3) < turn_rad && off(3..6) < shift_m
+        };
+        match before {
+            _ if near(&found, &mounting.used, TURN_RAD, SHIFT_M) => mounting.settled = true,
+            None => mounting.doubted = Some(found),
+            Some(before) if near(&found, &before, SAME_RAD, SAME_M) => {
+                mounting.used = found;
+                health.sensors_moved += 1;
+                if mounting.settled {
+                    self.moved.push(scan.sensor);
+                }
+                mounting.settled = true;
+            }
+            // What trembles is seen every other time, which is better than not at all.
+            Some(_) => {}
+        }
+    }
+}
+
+/// The hall's floor, ceiling and walls, each looking in.
+fn surfaces(hall: &Hall) -> [Surface; 6] {
+    let wall = |normal: DVec3, size_m: f64| Surface { normal, off_m: -0.5 * size_m, sigma_m: WALL_M };
+    [
+        Surface { normal: DVec3::Z, off_m: 0.0, sigma_m: FLOOR_M },
+        Surface { normal: -DVec3::Z, off_m: -hall.height_m, sigma_m: WALL_M },
+        wall(DVec3::X, hall.length_m),
+        wall(-DVec3::X, hall.length_m),
+        wall(DVec3::Y, hall.width_m),
+        wall(-DVec3::Y, hall.width_m),
+    ]
+}
+
+/// Some of the returns of a revolution, others each time, in the sensor's frame.
+fn sampled(image: &RangeImage, turn: u32) -> Vec<DVec3> {
+    let beams = image.beams.len().max(1);
+    let every = (image.columns.len() * beams).div_ceil(RETURNS).max(1);
+    let columns = (turn as usize % every..image.columns.len()).step_by(every);
+    let rays = columns.flat_map(|c| (0..beams).map(move |b| (c, b)));
+    let ranges = rays.filter_map(|(c, b)| Some((c, b, *image.range_m.get(c * beams + b)?)));
+    ranges.filter(|ray| ray.2 > 0.0).map(|(c, b, range_m)| image.point_m(c, b, f64::from(range_m))).collect()
+}
+
+fn corrected(given: &Pose, by: &Six) -> Pose {
+    let turn = DVec3::new(by[0], by[1], by[2]);
+    let angle = turn.length();
+    let rotation = if angle > 0.0 { DMat3::from_axis_angle(turn / angle, angle) } else { DMat3::IDENTITY };
+    Pose {
+        rotation: rotation * given.rotation,
+        translation_m: given.translation_m + DVec3::new(by[3], by[4], by[5]),
+    }
+}
+
+/// The difference from `given` that lays returns on surfaces; `None` where these are not the hall's.
+fn fitted(points_m: &[DVec3], given: &Pose, start: &Six, surfaces: &[Surface; 6]) -> Option<Six> {
+    let mut by = *start;
+    let mut on = (0, 0);
+    for gate_m in GATES_M {
+        let pose = corrected(given, &by);
+        let mut sums = [Sums::default(); 6];
+        on = (0, 0);
+        for point in points_m {
+            let at_m = pose.point(*point);
+            let off = |surface: &Surface| surface.normal.dot(at_m) - surface.off_m;
+            let offs = surfaces.iter().map(off).enumerate();
+            let Some((s, off_m)) = offs.min_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) else { continue };
+            if off_m.abs() < gate_m {
+                let (arm_m, normal) = (at_m - pose.translation_m, surfaces[s].normal);
+                let turn = arm_m.cross(normal);
+                sums[s].add(&[turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], off_m);
+                on = (on.0 + 1, on.1 + usize::from(s == 0));
+            }
+        }
+        let step = solved(&sums, &by, surfaces)?;
+        by.iter_mut().zip(step).for_each(|(by, step)| *by += step);
+    }
+    (on.0 as f64 >= SHARE_MIN * points_m.len() as f64 && on.1 >= FLOOR_MIN).then_some(by)
+}
+
+/// Of one surface: how its residuals change with the six, summed up.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    count: f64,
+    slopes: Six,
+    residuals: f64,
+    squares: [Six; 6],
+    products: Six,
+}
+
+impl Sums {
+    fn add(&mut self, slopes: &Six, residual_m: f64) {
+        self.count += 1.0;
+        self.residuals += residual_m;
+        for i in 0..6 {
+            self.slopes[i] += slopes[i];
+            self.products[i] += slopes[i] * residual_m;
+            for j in 0..6 {
+                self.squares[i][j] += slopes[i] * slopes[j];
+            }
+        }
+    }
+}
+
+/// The step of the normal equations, each surface's own distance left out of them (Schur's complement).
+fn solved(sums: &[Sums; 6], by: &Six, surfaces: &[Surface; 6]) -> Option<Six> {
+    let (mut matrix, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
+    for i in 0..6 {
+        let weight = if i < 3 { FILE_RAD.powi(-2) } else { FILE_M.powi(-2) };
+        matrix[i][i] = weight;
+        right[i] = -weight * by[i];
+    }
+    for (sums, surface) in sums.iter().zip(surfaces).filter(|(sums, _)| sums.count > 0.0) {
+        let weight = (RETURNS_MAX / sums.count).min(1.0) / (RETURN_M * RETURN_M);
+        let own = weight / (sums.count + 1.0 / (weight * surface.sigma_m * surface.sigma_m));
+        for i in 0..6 {
+            right[i] -= weight * sums.products[i] - own * sums.slopes[i] * sums.residuals;
+            for j in 0..6 {
+                matrix[i][j] += weight * sums.squares[i][j] - own * sums.slopes[i] * sums.slopes[j];
+            }
+        }
+    }
+    cholesky(matrix, right)
+}
+
+/// Solves a positive definite system.
+fn cholesky(mut a: [Six; 6], mut x: Six) -> Option<Six> {
+    for i in 0..6 {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| a[i][k] * a[j][k]).sum();
+            let left = a[i][j] - sum;
+            if i == j && left <= 0.0 {
+                return None;
+            }
+            a[i][j] = if i == j { left.sqrt() } else { left / a[j][j] };
+        }
+        x[i] = (x[i] - (0..i).map(|k| a[i][k] * x[k]).sum::<f64>()) / a[i][i];
+    }
+    for i in (0..6).rev() {
+        x[i] = (x[i] - (i + 1..6).map(|k| a[k][i] * x[k]).sum::<f64>()) / a[i][i];
+    }
+    Some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+
+    /// Returns of the default hall from a sensor that hangs at `pose`, some of them of people.
+    fn returns(pose: &Pose, hall: &Hall) -> Vec<DVec3> {
+        let back = pose.inverse();
+        let surfaces = surfaces(hall);
+        let ray = |k: usize| {
+            let (azimuth, elevation) = (k as f64 * 2.399_963, -0.5 + 0.7 * (k as f64 * 0.618_034).fract());
+            let ahead =
+                DVec3::new(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin());
+            let direction = pose.direction(ahead);
+            let range = surfaces.iter().filter_map(|s| {
+                let slope = s.normal.dot(direction);
+                (slope < -1e-9).then(|| (s.off_m - s.normal.dot(pose.translation_m)) / slope)
+            });
+            let range_m = range.fold(f64::INFINITY, f64::min) * if k.is_multiple_of(9) { 0.7 } else { 1.0 };
+            let noise_m = 0.02 * ((k as f64 * 7.77).sin() + (k as f64 * 3.33).cos());
+            back.point(pose.translation_m + direction * (range_m + noise_m))
+        };
+        (0..RETURNS).map(ray).collect()
+    }
+
+    fn found(turn_deg: DVec3, shift_m: DVec3, hall: &Hall) -> Option<Six> {
+        let site = Config::default().site;
+        let given = site.sensors[0].site_from_sensor();
+        let turn = turn_deg * std::f64::consts::PI / 180.0;
+        let truth = corrected(&given, &[turn.x, turn.y, turn.z, shift_m.x, shift_m.y, shift_m.z]);
+        fitted(&returns(&truth, hall), &given, &[0.0; 6], &surfaces(&site.hall))
+    }
+
+    #[test]
+    fn a_sensor_that_is_turned_is_found_to_be_and_one_that_hangs_right_is_left() {
+        let hall = Config::default().site.hall;
+        for turn_deg in
+            [DVec3::new(0.5, -0.3, 0.4), DVec3::new(0.0, 1.0, 0.0), DVec3::new(-0.4, 0.2, 1.0), DVec3::ZERO]
+        {
+            let found = found(turn_deg, DVec3::new(0.01, 0.0, -0.01), &hall).unwrap();
+            let turned = DVec3::new(found[0], found[1], found[2]) * 180.0 / std::f64::consts::PI;
+            assert!(turned.distance(turn_deg) < 0.05, "{turned} for {turn_deg}");
+            assert!(found[3..].iter().all(|m| m.abs() < 0.02), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn another_hall_tells_nothing() {
+        let hall = Hall { length_m: 60.0, width_m: 50.0, height_m: 14.0 };
+        assert_eq!(found(DVec3::ZERO, DVec3::ZERO, &hall), None);
+    }
+
+    /// A wall that stands 6 cm off is no reason to move a sensor by 6 cm, nor to turn it.
+    #[test]
+    fn a_wall_that_stands_elsewhere_moves_a_sensor_less_than_itself() {
+        let hall = Config::default().site.hall;
+        let found =
+            found(DVec3::ZERO, DVec3::ZERO, &Hall { length_m: hall.length_m + 0.12, ..hall }).unwrap();
+        assert!(found[..3].iter().all(|turn| turn.abs() < TURN_RAD), "{found:?}");
+        assert!(found[3].abs() < 0.03, "{found:?}");
+    }
+}

@@ -1,0 +1,44 @@
+//! Sensors that hang elsewhere than the site file says: found again, and what that is worth.
+
+use super::book::Book;
+use crate::tools::{Result, argument, root};
+
+const EXAMPLE: &str = "cargo run --release --quiet --package umbracast-calibrate --example hung -- 200000 20";
+const BY_EYE: &str = "config/sites/hand-mounted.toml";
+
+/// Errors over 20 scenes of each kind; then F1 with the true poses, with those of a file that is off, and with those that
+/// were found from a minute of walkers.
+pub fn calibrate(book: &mut Book) -> Result<()> {
+    book.command(EXAMPLE);
+    let said = book.bash(&root(), EXAMPLE)?;
+    book.line(&said);
+    let [scenes, walk, found] = ["scenes", "walk", "calibrated.toml"].map(|name| book.scratch(name));
+    book.umbracast_says([
+        "simulate".into(),
+        "--scenes".into(),
+        "20".into(),
+        "--out".into(),
+        argument(&scenes),
+    ])?;
+    let walks = ["simulate", "--stroll", "60", "--seed", "201000", "--out"].map(Into::into);
+    book.umbracast_says(walks.into_iter().chain([argument(&walk)]))?;
+    let words = [
+        "calibrate".into(),
+        argument(&walk),
+        "--site".into(),
+        BY_EYE.into(),
+        "--out".into(),
+        argument(&found),
+    ];
+    book.umbracast_says(words)?;
+    for (name, site) in
+        [("exact", None), ("by-eye", Some(BY_EYE.into())), ("calibrated", Some(argument(&found)))]
+    {
+        let out = book.scratch(&format!("run-{name}"));
+        let words = ["run".into(), argument(&scenes), "--out".into(), argument(&out)];
+        let site = site.into_iter().flat_map(|site| ["--site".into(), site]);
+        book.umbracast_says(words.into_iter().chain(site))?;
+        book.score(name, [argument(&out), "--truth".into(), argument(&scenes)])?;
+    }
+    book.compare()
+}
