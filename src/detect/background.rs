@@ -67,11 +67,7 @@ impl Background {
             method: config.background,
             thin_m: config.thin_m,
             sensors: site.sensors.iter().map(SensorModel::new).collect(),
-            clip: Clip {
-                half_length_m: site.hall.length_m * 0.5,
-                half_width_m: site.hall.width_m * 0.5,
-                highest_m: config.highest_m,
-            },
+            clip: Clip { hall: site.hall.clone(), highest_m: config.highest_m },
             known: false,
             map: None,
             map_scans: 0,
@@ -202,7 +198,7 @@ impl Background {
             }
         }
         if self.thin_m > 0.0 {
-            thin(points, self.thin_m, &mut self.keys, &mut self.thinned);
+            thin(points, self.thin_m, self.clip.hall.middle_m(), &mut self.keys, &mut self.thinned);
         }
     }
 

@@ -36,7 +36,7 @@ pub struct Published {
     /// What changed of the links.
     pub events: Vec<Event>,
     /// New points, site frame, centimetres.
-    pub points_cm: Vec<[i16; 3]>,
+    pub points_cm: Vec<[i32; 3]>,
     /// All of them as they are, where they are recorded.
     pub foreground: Option<Vec<Point>>,
     /// Of assembler and stages since the start.
@@ -57,7 +57,7 @@ impl Published {
         let (mut tracks, mut links) = (Vec::new(), Vec::new());
         rows::of_outcome(0, outcome, &mut tracks, &mut links);
         let every = outcome.foreground.len().div_ceil(POINTS_DRAWN).max(1);
-        let in_cm = |value_m: f64| (value_m * 100.0).round() as i16; // Saturates beyond 327 m.
+        let in_cm = |value_m: f64| (value_m * 100.0).round() as i32; // A map in UTM fits in.
         Self {
             frame: outcome.frame,
             time_ns: outcome.time_ns,

@@ -219,7 +219,7 @@ impl Gather {
         let mut foreground: Vec<Point> = parts.foreground.into_iter().flat_map(|part| part.points).collect();
         foreground.sort_by_key(|point| point.sensor);
         let every = foreground.len().div_ceil(POINTS_DRAWN).max(1);
-        let in_cm = |value_m: f64| (value_m * 100.0).round() as i16; // Saturates beyond 327 m.
+        let in_cm = |value_m: f64| (value_m * 100.0).round() as i32; // A map in UTM fits in.
         let mut outcome = Outcome::default();
         (outcome.frame, outcome.time_ns) = (parts.frame, time_ns);
         (outcome.tracks, outcome.forecasts) = (followed.tracks, followed.forecasts);

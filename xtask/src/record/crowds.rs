@@ -7,7 +7,7 @@ use super::book::Book;
 use crate::tools::{Result, argument};
 
 /// How recorded walkers of the circle antipode experiment are read.
-const ANTIPODE: [&str; 5] = ["--unit", "cm", "--fps", "25", "--trajectories"];
+const ANTIPODE: [&str; 6] = ["--centre", "--unit", "cm", "--fps", "25", "--trajectories"];
 
 /// Where sensors hang, how many sensors there are, how many people walk and how.
 pub fn sites(book: &mut Book) -> Result<()> {
@@ -35,11 +35,11 @@ pub fn people(book: &mut Book) -> Result<()> {
     recorded(book, "antipode", &ANTIPODE, &walkers)?;
     // Of the bottlenecks the part in which people wait and push through; the corridor's people trained the residual,
     // as did other clips of the crowd in the street.
-    let middle = ["--seconds", "20", "--trajectories"];
+    let middle = ["--centre", "--seconds", "20", "--trajectories"];
     recorded(book, "bottleneck", &middle, &["pedpy/030_c_56_h0.txt", "pedpy/040_c_56_h-.txt"])?;
     recorded(book, "trained-on", &middle, &["pedpy/traj_UNI_CORR_500_01.txt"])?;
     let street = ["1A", "1C", "2F"].map(|name| format!("madras/Topview_{name}.csv"));
-    recorded(book, "madras", &["--trajectories"], &street)?;
+    recorded(book, "madras", &["--centre", "--trajectories"], &street)?;
     book.compare()
 }
 
