@@ -66,8 +66,8 @@ impl Things {
             let reaches = |wall: &&[DVec2; 2]| {
                 let along = (wall[1] - wall[0]).normalize_or_zero();
                 let [start, end] = [start_m, end_m].map(|at| along.perp_dot(at - wall[0]));
-                // The outline goes counter-clockwise: left of every wall is the hall.
-                start > -HUNG_M && end < disc.radius_m && meet(**wall, [start_m, end_m], disc.radius_m)
+                let same_side = (start > HUNG_M && end > disc.radius_m) || (start < -HUNG_M && end < -disc.radius_m);
+                !same_side && meet(**wall, [start_m, end_m], disc.radius_m)
             };
             self.near_walls.extend(self.walls.iter().filter(reaches).map(|wall| wall.map(local)));
         }

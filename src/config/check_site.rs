@@ -177,7 +177,10 @@ mod tests {
     use super::*;
     use crate::{Config, Mode};
 
-    const SITES: [&str; 3] = [
+    const SITES: [&str; 6] = [
+        include_str!("../../config/sites/corridor.toml"),
+        include_str!("../../config/sites/hexagon.toml"),
+        include_str!("../../config/sites/l-hall.toml"),
         include_str!("../../config/sites/logictronix.toml"),
         include_str!("../../config/sites/ouster.toml"),
         include_str!("../../config/sites/lost-sensor.toml"),

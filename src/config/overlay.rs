@@ -52,12 +52,15 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 5] = [
+const OPTIONAL: [(&str, &str, &str); 8] = [
+    ("site.hall", "outline_m", "an array"),
     ("site.sensors", "address", "a string"),
     ("site.sensors", "calibration", "a string"),
     ("site.sensors", "calibration_file", "a string"),
     ("site.sensors", "time", "a string"),
     ("site.sensors", "udp_port", "a whole number"),
+    ("site.simulation", "entrances_m", "an array"),
+    ("site.simulation", "places_m", "an array"),
 ];
 
 type Complain<'a> = &'a dyn Fn(usize, String) -> Error;
