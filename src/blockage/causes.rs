@@ -1,6 +1,7 @@
 //! Links that are blocked by others, by the owner's own body, by the hall, and by any of them: in the same samples, for
 //! what blocks hangs together. Whom others hide in a sample is known already; the owner and the hall are asked here.
 
+use super::Chance;
 use super::crossing::{Crossing, Part};
 use super::figure::Figure;
 use super::lanes::WORD;
@@ -8,7 +9,6 @@ use super::rays::Rays;
 use super::shadows::Meeting;
 use super::things::Things;
 use super::trajectories::{MOMENTS, Trajectories};
-use super::Chance;
 use crate::STEPS;
 
 /// When each sample of a link is first blocked: a bit by step and word; step 0 is now, and apart from what comes later.

@@ -261,6 +261,7 @@ impl Sampler {
         let (asks_own, Aim { ue, ap_m, person: number }) = (!aim.ue.is_on_axis(), aim);
         if asks_own {
             self.people[number].walk(&self.figure, &self.draws);
+            self.people[number].face_as_owner(&self.draws);
         }
         let (person, reach_m) = (&self.people[number], ue.forward_m.abs() + ue.left_m.abs());
         let disc = Disc { radius_m: person.second.radius_m + reach_m, ..person.second };
@@ -269,7 +270,11 @@ impl Sampler {
         let known = Known { others: &self.link.firsts, samples: self.samples, person, number };
         let aim = |rays: &mut Rays, step: usize| rays.aim(ap_m, ue, person, step, 0..words);
         let (crossing, rays) = (&mut self.crossing, &mut self.rays);
-        self.causes.of(&known, &self.figure, things, asks_own, crossing, rays, aim)
+        let causes = self.causes.of(&known, &self.figure, things, asks_own, crossing, rays, aim);
+        if asks_own {
+            self.people[number].face_as_blocker();
+        }
+        causes
     }
 
     /// What these words of samples show of a link at a step. `rest` are the link's meetings from that step on; those of

@@ -74,8 +74,7 @@ fn causes(
 ) -> [u16; 2] {
     let (person, mut bits) = (&sampler.people[q], [0; 2]);
     for step in 0..MOMENTS {
-        let posture =
-            person.posture(&sampler.draws[&person.track], numbers.body.arms.still_share, step, k);
+        let posture = person.posture(&sampler.draws[&person.track], numbers.body.arms.still_share, step, k);
         let ue_m = ue.on_body(posture.position_m, posture.ahead.to_angle(), posture.height_m);
         if !ue.is_on_axis() {
             bits[0] |= u16::from(blocks(&numbers.body, &posture, ap_m, ue_m)) << step;
@@ -145,7 +144,9 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
     }
     let mut by_hall = 0;
     for (samples, ue) in [(128, config.site.ue), (70, ear)] {
-        let numbers = Numbers { samples, ..Numbers::new(&config.blockage) };
+        let numbers = Numbers::new(&config.blockage);
+        let own_heading_sigma_rad = numbers.heading_sigma_rad;
+        let numbers = Numbers { samples, own_heading_sigma_rad, ..numbers };
         let tracks: Vec<Track> = (0..14).map(|id| somebody(id, &mut random)).collect();
         let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
         let mut sampler = Sampler::new(&numbers, &site);

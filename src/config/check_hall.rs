@@ -69,9 +69,7 @@ fn folds_back(before: DVec2, corner: DVec2, after: DVec2) -> bool {
 /// Whether two edges touch.
 fn cross([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> bool {
     let side = |from: DVec2, to: DVec2, p: DVec2| (to - from).perp_dot(p - from);
-    let on = |from: DVec2, to: DVec2, p: DVec2| {
-        side(from, to, p) == 0.0 && (p - from).dot(p - to) <= 0.0
-    };
+    let on = |from: DVec2, to: DVec2, p: DVec2| side(from, to, p) == 0.0 && (p - from).dot(p - to) <= 0.0;
     let apart = |x: f64, y: f64| (x > 0.0) != (y > 0.0) && x != 0.0 && y != 0.0;
     (apart(side(a, b, c), side(a, b, d)) && apart(side(c, d, a), side(c, d, b)))
         || on(a, b, c)
@@ -106,13 +104,19 @@ mod tests {
     fn what_is_no_floor_is_refused_with_its_place() {
         let wrong: [(&[[f64; 2]], &str); 7] = [
             (&[[0.0, 0.0], [4.0, 0.0]], "site.hall.outline_m: expected 3 corners or more, found 2"),
-            (&[[0.0, 0.0], [4.0, 0.0], [4.0, 0.0], [0.0, 4.0]], "site.hall.outline_m: expected corners apart"),
+            (
+                &[[0.0, 0.0], [4.0, 0.0], [4.0, 0.0], [0.0, 4.0]],
+                "site.hall.outline_m: expected corners apart",
+            ),
             (
                 &[[0.0, 0.0], [4.0, 4.0], [4.0, 0.0], [0.0, 4.0]],
                 "site.hall.outline_m: expected edges that meet at corners alone, found the edge from corner 2 to 3 on \
                  the edge from corner 0 to 1",
             ),
-            (&[[0.0, 0.0], [4.0, 0.0], [2.0, 0.0], [2.0, 4.0]], "site.hall.outline_m: expected edges that meet"),
+            (
+                &[[0.0, 0.0], [4.0, 0.0], [2.0, 0.0], [2.0, 4.0]],
+                "site.hall.outline_m: expected edges that meet",
+            ),
             (&[[0.0, 0.0], [0.3, 0.0], [0.3, 0.3]], "site.hall.outline_m: expected a floor of 0.25 m^2"),
             (&[[0.0, 0.0], [4.0, f64::NAN], [2.0, 4.0]], "site.hall.outline_m[1], y: expected"),
             (&[[0.0, 0.0], [4000.0, 0.0], [2.0, 4.0]], "site.hall.outline_m, along x: expected"),

@@ -1,8 +1,8 @@
 //! A site that cannot be: what stands outside the hall, angles and shares out of their range, unknown models.
 
-use crate::lidar::{Model, sensor_model, sensor_models};
 use super::check_hall::check_hall;
 use crate::geometry::DVec2;
+use crate::lidar::{Model, sensor_model, sensor_models};
 use crate::site::{AccessPoint, Furniture, Pillar, Sensor, Ue};
 use crate::{Error, Site};
 
@@ -148,7 +148,9 @@ fn on_floor(key: &str, [x_m, y_m]: [f64; 2], site: &Site) -> Result<(), Error> {
     within(&format!("{key}, y (within the hall)"), y_m, least.y, most.y)?;
     match site.hall.contains(DVec2::new(x_m, y_m)) {
         true => Ok(()),
-        false => Err(Error::new(format!("{key}: expected a place within site.hall.outline_m, found {x_m}, {y_m}"))),
+        false => {
+            Err(Error::new(format!("{key}: expected a place within site.hall.outline_m, found {x_m}, {y_m}")))
+        }
     }
 }
 

@@ -100,9 +100,7 @@ pub fn through_walls(scenes: &[SceneSpec], site: &Site) -> Vec<String> {
     let in_pillar = |at: DVec2| {
         site.pillars.iter().any(|pillar| at.distance(DVec2::from_array(pillar.position_m)) < pillar.radius_m)
     };
-    let in_furniture = |at: DVec2| {
-        site.furniture.iter().any(|piece| from_piece_m(piece, at) < 0.0)
-    };
+    let in_furniture = |at: DVec2| site.furniture.iter().any(|piece| from_piece_m(piece, at) < 0.0);
     let told = |scene: &SceneSpec| {
         let crowd = scene.crowd();
         let count = |hits: &dyn Fn(DVec2) -> bool| {

@@ -25,6 +25,29 @@ pub fn sites(book: &mut Book) -> Result<()> {
     book.compare()
 }
 
+/// Halls of other shapes with devices in the right hand: links blocked by others, by their owners, by the hall, and by any
+/// of them.
+pub fn shapes(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record shapes");
+    for site in ["l-hall", "hexagon", "corridor"] {
+        let file = format!("config/sites/{site}.toml");
+        let words = ["evaluate", "--mode", "default", "--scenes", "10", "--preset", "orca-03,mixed", "--site", &file];
+        let said = book.quietly(&words.map(OsString::from))?;
+        book.line(&format!("{site}: 20 scenes of 10 people, half of them orca-03, half mixed"));
+        let mut shown = false;
+        let stage1 = ["all      MOTA", "all      switches", "all      position"];
+        for line in said.lines() {
+            shown = (shown || line.starts_with("Blockage by cause")) && !line.is_empty();
+            let others = line.contains(" 300 ms  default  ") && !shown;
+            if shown || others || stage1.iter().any(|start| line.starts_with(start)) {
+                book.line(line);
+            }
+        }
+        book.line("");
+    }
+    Ok(())
+}
+
 /// Other bodies and real people beside the ORCA row.
 pub fn people(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record people");

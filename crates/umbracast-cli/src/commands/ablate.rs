@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use umbracast::config::Mechanism;
+use umbracast::geometry::DVec2;
 use umbracast::{Config, Error, Health, Mode};
 use umbracast_eval::run::ablate::{self, DataSet, Source};
-use umbracast::geometry::DVec2;
 use umbracast_eval::run::chain::{SceneSpec, drawn_scenes};
 use umbracast_eval::score::labels;
 use umbracast_io::trajectories::Unit;

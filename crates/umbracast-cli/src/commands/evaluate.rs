@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use umbracast::forecast::Weights;
+use umbracast::geometry::DVec2;
 use umbracast::site::AccessPoint;
 use umbracast::{Config, Error, Health, Mode};
 use umbracast_eval::report::{self, Context, Kept};
-use umbracast::geometry::DVec2;
 use umbracast_eval::run::chain::{self, Spec};
 use umbracast_eval::run::pooled::{self, Scores, pool};
 use umbracast_eval::run::scene_score::{ModeRun, SceneScore, score_scene};

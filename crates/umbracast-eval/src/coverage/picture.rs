@@ -77,7 +77,8 @@ impl Plan {
 
     /// Pixels to the right and down.
     fn at(&self, position_m: DVec2) -> (f64, f64) {
-        let from_corner = DVec2::new(position_m.x - self.least_m.x, self.most_m.y - position_m.y) * self.scale;
+        let from_corner =
+            DVec2::new(position_m.x - self.least_m.x, self.most_m.y - position_m.y) * self.scale;
         (MARGIN.0 + from_corner.x, MARGIN.1 + from_corner.y)
     }
 

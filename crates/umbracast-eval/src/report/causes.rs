@@ -10,7 +10,16 @@ const WINDOWS: [usize; 3] = [1, 3, 9];
 /// Every mode and access point where a device is hidden by its owner or by the hall; without rows where none is.
 pub fn causes(group: &Group) -> Table {
     let header = [
-        "access point", "window", "mode", "blocked by", "base rate", "precision", "recall", "F1", "onset F1", "ECE",
+        "access point",
+        "window",
+        "mode",
+        "blocked by",
+        "base rate",
+        "precision",
+        "recall",
+        "F1",
+        "onset F1",
+        "ECE",
     ];
     let mut table = Table::new("Blockage by cause", 4, &header);
     let figure = |value: Option<f64>, digits| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));

@@ -267,6 +267,11 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
                 });
             }
         }
+        // Where nothing but others blocks, anything is no news.
+        let [own, hall, any] = Predictor::CAUSES.map(|(cause, _)| cause.name());
+        if !links.iter().any(|of: &LinkScores| of.predictor == own || of.predictor == hall) {
+            links.retain(|of| of.predictor != any);
+        }
         modes = (0..first.modes.len()).map(|m| mode_scores(&bootstrap, scenes, m)).collect();
         let pooled = sum(scenes.iter().map(|scene| &scene.constant_velocity));
         constant_velocity_m = (1..=STEPS).map(|h| pooled.mean_m(h)).collect();

@@ -69,7 +69,9 @@ pub fn instances_of(truth: &TruthIndex, cause: Cause) -> Vec<Instance> {
     let mut all = Vec::new();
     for &access_point in &truth.access_points {
         for &person in &truth.persons {
-            all.extend(truth.frames.iter().filter_map(|&frame| instance(truth, cause, access_point, person, frame)));
+            all.extend(
+                truth.frames.iter().filter_map(|&frame| instance(truth, cause, access_point, person, frame)),
+            );
         }
     }
     all

@@ -47,9 +47,8 @@ impl Floor {
         let (zero_m, size_m) = (site.hall.middle_m(), most_m - least_m);
         let cell_m = CELL_M.max((size_m.x * size_m.y / MOST_CELLS).sqrt());
         let size = (size_m / cell_m).ceil().as_ivec2().max(IVec2::ONE);
-        let middle_m = |column: i32, row: i32| {
-            least_m + (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * cell_m
-        };
+        let middle_m =
+            |column: i32, row: i32| least_m + (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * cell_m;
         let cells = (0..size.y).flat_map(|row| (0..size.x).map(move |column| (column, row)));
         let clear_m = cells.map(|(column, row)| clearance_m(site, middle_m(column, row)) as f32).collect();
         let local = |at: &[f64; 2]| (DVec2::from_array(*at) - zero_m).as_vec2();
@@ -84,7 +83,8 @@ impl Floor {
         for (key, local_m, site_m) in lists {
             for (at, found) in local_m.iter().zip(site_m) {
                 if self.clear_at(*at) < radius_m {
-                    let told = format!("expected {radius_m} m of free floor round each, found less at {found:?}");
+                    let told =
+                        format!("expected {radius_m} m of free floor round each, found less at {found:?}");
                     return refuse(key, told);
                 }
                 if self.way(first, *at, radius_m).is_none() {

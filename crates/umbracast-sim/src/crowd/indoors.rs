@@ -114,11 +114,8 @@ fn parties(preset: Preset, people: usize, floor: &Floor, rng: &mut Pcg64) -> Vec
     if places.is_empty() {
         places = floor.places(ELBOW_M + ASIDE_M);
     }
-    let beside: Vec<Vec2> = places
-        .iter()
-        .copied()
-        .filter(|at| floor.clear_at(*at) <= largest_m + ASIDE_M + STANDS_M)
-        .collect();
+    let beside: Vec<Vec2> =
+        places.iter().copied().filter(|at| floor.clear_at(*at) <= largest_m + ASIDE_M + STANDS_M).collect();
     let (mut starts, mut goals, mut queue) = (Vec::new(), Vec::new(), vec![0; floor.places_m.len()]);
     let mut entered_s = vec![0.0; floor.entrances_m.len()];
     let mut parties = Vec::new();
@@ -386,7 +383,8 @@ mod tests {
         site.simulation.entrances_m = vec![[1017.0, -1997.0], [1003.5, -1983.0]];
         site.simulation.places_m = vec![[1002.0, -1997.0]];
         let crowd = drawn(Preset::Mixed, 12, &Ground::of(&site, 12.5).unwrap(), 200_001);
-        let door = |at: &DVec2| site.simulation.entrances_m.iter().any(|e| at.distance(DVec2::from_array(*e)) < 1.3);
+        let door =
+            |at: &DVec2| site.simulation.entrances_m.iter().any(|e| at.distance(DVec2::from_array(*e)) < 1.3);
         assert!(crowd.trajectories.iter().all(|way| way.positions_m.last().is_some_and(door)));
         assert!(crowd.trajectories.iter().any(|way| way.start_ns > 0 && door(&way.positions_m[0])));
     }
