@@ -6,7 +6,7 @@
 //! too, so a wall tells how a sensor is turned, and of where it hangs only as much as walls are known. Nothing is changed for
 //! less than [`TURN_RAD`] and [`SHIFT_M`], nor where the hall is not the file's.
 
-use crate::geometry::{DMat3, DVec3, Pose};
+use crate::geometry::{DMat3, DVec2, DVec3, Pose};
 use crate::lidar::{Cloud, Frame, RangeImage, Scan};
 use crate::site::Hall;
 use crate::{Health, Site};
@@ -43,7 +43,8 @@ type Six = [f64; 6];
 /// Follows how every sensor hangs.
 #[derive(Debug, Clone)]
 pub struct Mountings {
-    surfaces: [Surface; 6],
+    /// The floor first.
+    surfaces: Vec<Surface>,
     sensors: Vec<Mounting>,
     frames: u32,
     moved: Vec<usize>,
@@ -150,16 +151,15 @@ impl Mountings {
 }
 
 /// The hall's floor, ceiling and walls, each looking in.
-fn surfaces(hall: &Hall) -> [Surface; 6] {
-    let wall = |normal: DVec3, size_m: f64| Surface { normal, off_m: -0.5 * size_m, sigma_m: WALL_M };
-    [
-        Surface { normal: DVec3::Z, off_m: 0.0, sigma_m: FLOOR_M },
-        Surface { normal: -DVec3::Z, off_m: -hall.height_m, sigma_m: WALL_M },
-        wall(DVec3::X, hall.length_m),
-        wall(-DVec3::X, hall.length_m),
-        wall(DVec3::Y, hall.width_m),
-        wall(-DVec3::Y, hall.width_m),
-    ]
+fn surfaces(hall: &Hall) -> Vec<Surface> {
+    let floor = Surface { normal: DVec3::Z, off_m: 0.0, sigma_m: FLOOR_M };
+    let ceiling = Surface { normal: -DVec3::Z, off_m: -hall.height_m, sigma_m: WALL_M };
+    // Counter-clockwise the hall lies to the left.
+    let wall = |[from, to]: [DVec2; 2]| {
+        let normal = (to - from).normalize_or(DVec2::X).perp();
+        Surface { normal: normal.extend(0.0), off_m: normal.dot(from), sigma_m: WALL_M }
+    };
+    [floor, ceiling].into_iter().chain(hall.walls().map(wall)).collect()
 }
 
 /// Some of the returns of a revolution, others each time, in the sensor's frame.
@@ -183,12 +183,13 @@ fn corrected(given: &Pose, by: &Six) -> Pose {
 }
 
 /// The difference from `given` that lays returns on surfaces; `None` where these are not the hall's.
-fn fitted(points_m: &[DVec3], given: &Pose, start: &Six, surfaces: &[Surface; 6]) -> Option<Six> {
+fn fitted(points_m: &[DVec3], given: &Pose, start: &Six, surfaces: &[Surface]) -> Option<Six> {
     let mut by = *start;
     let mut on = (0, 0);
+    let mut sums = vec![Sums::default(); surfaces.len()];
     for gate_m in GATES_M {
         let pose = corrected(given, &by);
-        let mut sums = [Sums::default(); 6];
+        sums.fill(Sums::default());
         on = (0, 0);
         for point in points_m {
             let at_m = pose.point(*point);
@@ -233,7 +234,7 @@ impl Sums {
 }
 
 /// The step of the normal equations, each surface's own distance left out of them (Schur's complement).
-fn solved(sums: &[Sums; 6], by: &Six, surfaces: &[Surface; 6]) -> Option<Six> {
+fn solved(sums: &[Sums], by: &Six, surfaces: &[Surface]) -> Option<Six> {
     let (mut matrix, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
     for i in 0..6 {
         let weight = if i < 3 { FILE_RAD.powi(-2) } else { FILE_M.powi(-2) };
@@ -320,7 +321,7 @@ mod tests {
 
     #[test]
     fn another_hall_tells_nothing() {
-        let hall = Hall { length_m: 60.0, width_m: 50.0, height_m: 14.0 };
+        let hall = Hall { length_m: 60.0, width_m: 50.0, height_m: 14.0, ..Config::default().site.hall };
         assert_eq!(found(DVec3::ZERO, DVec3::ZERO, &hall), None);
     }
 

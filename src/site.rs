@@ -1,12 +1,17 @@
 //! Where everything stands: hall, sensors, access points, and where on a body the UE is. SI units, site frame,
 //! z up, floor at z = 0. Read from the `site` part of a configuration file; see `config/default.toml`.
 
+mod hall;
+
 use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
+
+pub use hall::Hall;
+pub(crate) use hall::doubled_area_m2;
 
 /// The place that is watched.
 ///
@@ -33,23 +38,6 @@ pub struct Site {
     pub ue: Ue,
     /// What only a simulator reads.
     pub simulation: Simulation,
-}
-
-/// A rectangular room centred on the origin.
-///
-/// ```
-/// let site = umbracast::Config::default().site;
-/// assert_eq!((site.hall.length_m, site.hall.height_m), (34.0, 10.0));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Hall {
-    /// Along x, metres.
-    pub length_m: f64,
-    /// Along y, metres.
-    pub width_m: f64,
-    /// Floor to ceiling, metres.
-    pub height_m: f64,
 }
 
 /// A round pillar.
@@ -202,7 +190,7 @@ fn noise_m() -> f64 {
     0.02
 }
 
-/// How simulated sensors fail.
+/// How simulated sensors fail, and where simulated people come from.
 ///
 /// ```
 /// let site = umbracast::Config::default().site;
@@ -213,6 +201,12 @@ fn noise_m() -> f64 {
 pub struct Simulation {
     /// Share of returns that are lost.
     pub dropout: f64,
+    /// Where a drawn crowd comes in and leaves, metres. Without any everybody is there from the start and stays.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub entrances_m: Vec<[f64; 2]>,
+    /// Where people of a mixed crowd stop on their way, and queue behind each other, metres.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub places_m: Vec<[f64; 2]>,
     /// Sensors that fall silent for good, by name: after how many seconds.
     pub lost_after_s: BTreeMap<String, f64>,
     /// Sensors whose clock runs ahead of true time, by name: by how many milliseconds.

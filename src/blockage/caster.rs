@@ -62,7 +62,7 @@ impl Caster {
             method: config.method,
             person_box: config.person_box,
             threshold: config.threshold,
-            sampler: Sampler::new(&numbers),
+            sampler: Sampler::new(&numbers, site),
             numbers,
             access_points_m: site.access_points.iter().map(|ap| ap.position()).collect(),
             ue: site.ue,
@@ -150,6 +150,9 @@ impl Caster {
                 p: windows[i].map(|b| f64::from(u8::from(b))),
                 onset_s: [None; 3],
                 duration_s: [None; 3],
+                own: None,
+                hall: None,
+                any: None,
             }));
         }
     }
@@ -174,6 +177,9 @@ impl Caster {
                     p: chances.p,
                     onset_s: chances.onset_s,
                     duration_s: chances.duration_s,
+                    own: chances.own,
+                    hall: chances.hall,
+                    any: chances.any,
                 });
             }
         }

@@ -18,6 +18,8 @@ mod trajectories;
 mod shadows;
 mod rays;
 mod crossing;
+mod things;
+mod causes;
 #[doc(hidden)] // Phases of a gait, for the fit of the body.
 pub mod probability;
 mod caster;
@@ -45,6 +47,7 @@ use crate::{STEP_NS, STEPS};
 /// # let link = Blockage {
 /// #     access_point: 0, track: 7, blocked_now: false, p_now: 0.0, blocked: [false; 9],
 /// #     p: [0.0, 0.1, 0.2, 0.6, 0.8, 0.9, 0.9, 0.9, 0.9], onset_s: [None; 3], duration_s: [None; 3],
+/// #     own: None, hall: None, any: None,
 /// # };
 /// assert_eq!(lost_within_s(&link), Some(0.4));
 /// ```
@@ -68,6 +71,34 @@ pub struct Blockage {
     /// The same of the time until the blockage is over: the one that is, or the first that comes. `None` as well where
     /// none comes with a chance of 10 % or more.
     pub duration_s: [Option<f64>; 3],
+    /// Blocked by the owner's own body; what stands above is of others. `None` where the UE is on the body's axis, within
+    /// it, and where the method knows others alone.
+    pub own: Option<Chance>,
+    /// The same by walls, pillars and furniture.
+    pub hall: Option<Chance>,
+    /// The same by others, the owner or the hall.
+    pub any: Option<Chance>,
+}
+
+/// How likely a link is blocked by one cause, now and in every window.
+///
+/// ```
+/// use umbracast::blockage::Chance;
+///
+/// let behind_a_pillar_soon = Chance { p_now: 0.0, p: [0.0, 0.2, 0.7, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0] };
+/// assert!(behind_a_pillar_soon.p[2] > Chance::NONE.p[2]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chance {
+    /// At the frame's instant.
+    pub p_now: f64,
+    /// Index w - 1: at any of steps 1..=w; never falls with w.
+    pub p: [f64; STEPS],
+}
+
+impl Chance {
+    /// Not at all.
+    pub const NONE: Self = Self { p_now: 0.0, p: [0.0; STEPS] };
 }
 
 impl Blockage {
@@ -79,6 +110,7 @@ impl Blockage {
     /// # let link = umbracast::blockage::Blockage {
     /// #     access_point: 0, track: 7, blocked_now: false, p_now: 0.05, blocked: [false; 9],
     /// #     p: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9], onset_s: [None; 3], duration_s: [None; 3],
+    /// #     own: None, hall: None, any: None,
     /// # };
     /// assert_eq!(link.p_within(Duration::from_millis(300)), link.p[2]);
     /// assert_eq!(link.p_within(Duration::from_millis(399)), link.p[2]);

@@ -5,6 +5,8 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::Chance;
+use super::causes::{Causes, Firsts, Known};
 use super::crossing::{Crossing, Part};
 use super::draws::{Draws, Quantiles};
 use super::figure::Figure;
@@ -14,12 +16,13 @@ use super::numbers::Numbers;
 pub use super::phases::Phases;
 use super::rays::{Near, Rays};
 use super::shadows::{Meeting, Shadows};
-use super::trajectories::{MOMENTS, Trajectories};
+use super::things::Things;
+use super::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::forecast::Forecast;
 use crate::geometry::DVec3;
 use crate::site::Ue;
 use crate::track::Track;
-use crate::{STEP_S, STEPS};
+use crate::{STEP_S, STEPS, Site};
 
 /// Quantiles of times that are reported.
 const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
@@ -46,6 +49,12 @@ pub struct Chances {
     /// Quantiles of the time until it is clear. Of a link that counts as blocked now over the samples in which it is;
     /// else, where there is an onset, over those in which it is in sight now and will be blocked.
     pub duration_s: [Option<f64>; 3],
+    /// That the owner's own body blocks it; `None` where the UE is on the axis.
+    pub own: Option<Chance>,
+    /// That the hall does.
+    pub hall: Option<Chance>,
+    /// That others, the owner or the hall do.
+    pub any: Option<Chance>,
 }
 
 /// Samples of all people in one frame.
@@ -69,6 +78,8 @@ pub struct Sampler {
     rays: Rays,
     crossing: Crossing,
     link: Link,
+    things: Things,
+    causes: Causes,
 }
 
 /// From which access point to whose UE.
@@ -93,11 +104,13 @@ struct Link {
     /// What is to be asked height by height of the body that is looked at.
     trunk: Vec<u32>,
     arms: Vec<u32>,
+    /// Blocked for the first time.
+    firsts: Firsts,
 }
 
 impl Sampler {
     /// Nobody is there yet.
-    pub fn new(numbers: &Numbers) -> Self {
+    pub fn new(numbers: &Numbers, site: &Site) -> Self {
         Self {
             figure: Figure::new(&numbers.body),
             draws: BTreeMap::new(),
@@ -112,6 +125,8 @@ impl Sampler {
             rays: Rays::default(),
             crossing: Crossing::default(),
             link: Link::default(),
+            things: Things::new(site),
+            causes: Causes::default(),
         }
     }
 
@@ -236,7 +251,30 @@ impl Sampler {
                 break;
             }
         }
-        counts.chances(samples)
+        let [own, hall, any] = self.ask_causes(ap, aim, words);
+        Chances { own, hall, any, ..counts.chances(samples) }
+    }
+
+    /// The same by the owner's body, by the hall, and by any cause.
+    #[inline(always)]
+    fn ask_causes(&mut self, ap: usize, aim: Aim, words: usize) -> [Option<Chance>; 3] {
+        let (asks_own, Aim { ue, ap_m, person: number }) = (!aim.ue.is_on_axis(), aim);
+        if asks_own {
+            self.people[number].walk(&self.figure, &self.draws);
+            self.people[number].face_as_owner(&self.draws);
+        }
+        let (person, reach_m) = (&self.people[number], ue.forward_m.abs() + ue.left_m.abs());
+        let disc = Disc { radius_m: person.second.radius_m + reach_m, ..person.second };
+        let in_way = self.things.look(ap, ap_m, disc, ue.height_share * person.heights_m[0]);
+        let things = in_way.then_some(&self.things);
+        let known = Known { others: &self.link.firsts, samples: self.samples, person, number };
+        let aim = |rays: &mut Rays, step: usize| rays.aim(ap_m, ue, person, step, 0..words);
+        let (crossing, rays) = (&mut self.crossing, &mut self.rays);
+        let causes = self.causes.of(&known, &self.figure, things, asks_own, crossing, rays, aim);
+        if asks_own {
+            self.people[number].face_as_blocker();
+        }
+        causes
     }
 
     /// What these words of samples show of a link at a step. `rest` are the link's meetings from that step on; those of
@@ -303,7 +341,8 @@ impl Sampler {
 
 impl Link {
     fn begin(&mut self, samples: usize) {
-        let Self { blocked, now, met, over, trunk, arms } = self;
+        let Self { blocked, now, met, over, trunk, arms, firsts } = self;
+        firsts.begin(samples.div_ceil(WORD));
         for words in [blocked, now, met, over, trunk, arms] {
             words.clear();
             words.resize(samples.div_ceil(WORD), 0);
@@ -339,6 +378,7 @@ impl Link {
             let ones = |bits: u32| bits.count_ones() as usize;
             if step == 0 {
                 self.now[word] = blocked;
+                self.firsts.note(step, word, blocked);
                 counts.now += ones(blocked);
                 continue;
             }
@@ -348,6 +388,7 @@ impl Link {
                 false => met & !now & !self.over[word] & !blocked,
             };
             let new = blocked & !met;
+            self.firsts.note(step, word, new);
             self.over[word] |= over;
             self.met[word] |= new;
             counts.met[step] += ones(new);
@@ -387,6 +428,9 @@ impl Counts {
                 (false, Some(_)) => over_s(coming),
                 (false, None) => [None; 3],
             },
+            own: None,
+            hall: None,
+            any: None,
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::blockage::body::blocks;
 use crate::forecast::constant_velocity;
 use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
+use crate::site::{AccessPoint, Pillar};
 
 #[test]
 fn quantiles_count_those_who_come_later_than_the_last_step() {
@@ -61,6 +62,39 @@ fn one_by_one(sampler: &Sampler, numbers: &Numbers, ue: &Ue, ap_m: DVec3, q: usi
     (0..MOMENTS).fold(0, |bits, step| bits | u16::from(blocked(step)) << step)
 }
 
+/// The same of the owner's body and of the hall's pillars.
+fn causes(
+    sampler: &Sampler,
+    numbers: &Numbers,
+    ue: &Ue,
+    site: &Site,
+    ap_m: DVec3,
+    q: usize,
+    k: usize,
+) -> [u16; 2] {
+    let (person, mut bits) = (&sampler.people[q], [0; 2]);
+    for step in 0..MOMENTS {
+        let posture = person.posture(&sampler.draws[&person.track], numbers.body.arms.still_share, step, k);
+        let ue_m = ue.on_body(posture.position_m, posture.ahead.to_angle(), posture.height_m);
+        if !ue.is_on_axis() {
+            bits[0] |= u16::from(blocks(&numbers.body, &posture, ap_m, ue_m)) << step;
+        }
+        for pillar in &site.pillars {
+            let (from, along) = (ap_m.truncate(), (ue_m - ap_m).truncate());
+            let axis_m = DVec2::from_array(pillar.position_m);
+            let share = ((axis_m - from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+            let near = axis_m.distance(from + along * share) <= pillar.radius_m;
+            bits[1] |= u16::from(near) << step;
+        }
+    }
+    bits
+}
+
+fn chance_of(bits: &[u16]) -> Chance {
+    let share = |steps: u16| bits.iter().filter(|&&at| at & steps != 0).count() as f64 / bits.len() as f64;
+    Chance { p_now: share(1), p: std::array::from_fn(|w| share((1 << (w + 2)) - 2)) }
+}
+
 /// The chances as they are defined, from the bits of all samples.
 fn chances_of(bits: &[u16], threshold: f64) -> Chances {
     let share = |steps: u16| bits.iter().filter(|&&at| at & steps != 0).count() as f64 / bits.len() as f64;
@@ -87,6 +121,9 @@ fn chances_of(bits: &[u16], threshold: f64) -> Chances {
             (false, Some(_)) => of(&|at| at & 1 == 0 && at != 0, &again),
             (false, None) => [None; 3],
         },
+        own: None,
+        hall: None,
+        any: None,
     }
 }
 
@@ -98,11 +135,21 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
     let ear = Ue { forward_m: 0.05, left_m: 0.1, height_share: 0.9 };
     let aps_m = [DVec3::new(9.0, 1.0, 2.0), DVec3::new(0.0, 0.0, 3.0), DVec3::new(-3.0, -6.0, 0.6)];
     let (mut in_doubt, mut seen_late) = (0, 0);
+    let mut site = config.site.clone();
+    site.pillars = vec![Pillar { position_m: [3.0, 0.5], radius_m: 0.4 }];
+    site.furniture.clear();
+    site.access_points.push(AccessPoint { name: "low".into(), position_m: [-3.0, -6.0, 0.6] });
+    for (ap, ap_m) in site.access_points.iter_mut().zip(aps_m) {
+        ap.position_m = ap_m.to_array();
+    }
+    let mut by_hall = 0;
     for (samples, ue) in [(128, config.site.ue), (70, ear)] {
-        let numbers = Numbers { samples, ..Numbers::new(&config.blockage) };
+        let numbers = Numbers::new(&config.blockage);
+        let own_heading_sigma_rad = numbers.heading_sigma_rad;
+        let numbers = Numbers { samples, own_heading_sigma_rad, ..numbers };
         let tracks: Vec<Track> = (0..14).map(|id| somebody(id, &mut random)).collect();
         let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
-        let mut sampler = Sampler::new(&numbers);
+        let mut sampler = Sampler::new(&numbers, &site);
         sampler.draw(&numbers, &ue, &aps_m, tracks.iter().zip(&forecasts));
         for (ap, &ap_m) in aps_m.iter().enumerate() {
             for q in 0..tracks.len() {
@@ -115,11 +162,23 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
                     bits[half..].fill(0);
                 }
                 let found = sampler.chances(&ue, ap, ap_m, q, THRESHOLD);
-                assert_eq!(found, chances_of(&bits, THRESHOLD), "access point {ap}, person {q}");
+                let causes = || (0..samples).map(|k| causes(&sampler, &numbers, &ue, &site, ap_m, q, k));
+                let own: Vec<u16> = causes().map(|[own, _]| own).collect();
+                let hall: Vec<u16> = causes().map(|[_, hall]| hall).collect();
+                let any: Vec<u16> = (0..samples).map(|k| bits[k] | own[k] | hall[k]).collect();
+                let expected = Chances {
+                    own: (!ue.is_on_axis()).then(|| chance_of(&own)),
+                    hall: Some(chance_of(&hall)),
+                    any: Some(chance_of(&any)),
+                    ..chances_of(&bits, THRESHOLD)
+                };
+                assert_eq!(found, expected, "access point {ap}, person {q}");
+                by_hall += usize::from(hall.iter().any(|at| *at != 0));
                 in_doubt += usize::from(found.p[8] > 0.1 && found.p[8] < 0.9);
             }
         }
     }
+    assert!(by_hall > 5, "{by_hall} links that the pillar hides in some sample");
     assert!(in_doubt > 10 && seen_late < 5, "{in_doubt} in doubt, {seen_late} in the second half alone");
 }
 
@@ -132,7 +191,7 @@ fn processors_with_narrower_registers_give_the_same_bits() {
     let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
     let people = || tracks.iter().zip(&forecasts);
     let aps_m = [DVec3::new(9.0, 1.0, 2.0), DVec3::new(0.0, 0.0, 3.0)];
-    let (mut wide, mut narrow) = (Sampler::new(&numbers), Sampler::new(&numbers));
+    let (mut wide, mut narrow) = (Sampler::new(&numbers, &config.site), Sampler::new(&numbers, &config.site));
     wide.draw(&numbers, &ue, &aps_m, people());
     narrow.draw_portably(&numbers, &ue, &aps_m, people());
     for (ap, &ap_m) in aps_m.iter().enumerate() {

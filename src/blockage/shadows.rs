@@ -181,6 +181,19 @@ impl Shadows {
 }
 
 impl Meeting {
+    /// Of somebody's own body with the own link: all of it.
+    pub(super) fn own(person: usize, step: usize) -> Self {
+        Self {
+            other: person as u32,
+            step: step as u32,
+            band: Band { low: f64::NEG_INFINITY, high: f64::INFINITY },
+            holds: false,
+            plan: 0,
+            reach_m: 0.0,
+            off_m: 0.0,
+        }
+    }
+
     /// Nearest to the middle ray first, then in order of people: distances are not negative, so their bits are in order.
     #[inline(always)]
     fn rank(&self) -> u64 {

@@ -58,6 +58,8 @@ pub(super) struct Trajectories {
     pub(super) height_m: Vec<f32>,
     pub(super) width_scale: Vec<f32>,
     turn_rad: Vec<f32>,
+    /// Of what the turn is more than the velocity's, one standard deviation; the same for the owner's own UE.
+    turn_sigma_rad: [f32; 2],
     speed_mps: Vec<f32>,
     phase: Option<GaitPhase>,
     /// Phases of even shares, in their order.
@@ -65,6 +67,7 @@ pub(super) struct Trajectories {
     /// Of another frame until the body is in somebody's way.
     pub(super) gait: Gait,
     walks: bool,
+    faces: bool,
     /// Offset and drift of each sample at the step that is drawn.
     state: [Vec<f32>; 4],
 }
@@ -76,6 +79,8 @@ pub(super) struct Gait {
     pub(super) axis_m: [Vec<f32>; 2],
     /// By step and sample: the unit vector that the trunk faces.
     pub(super) own: [Vec<f32>; 2],
+    /// The same as the owner's own UE goes round with it.
+    with_ue: [Vec<f32>; 2],
     /// By step and sample: how far the arms swing, left ahead, as speed over hip height.
     pub(super) wave_hz: Vec<f32>,
     /// By sample: speed over hip height of whoever swings the arms; 0 for arms that hang still.
@@ -104,7 +109,7 @@ impl Trajectories {
         self.asked = numbers.samples;
         self.track = track.id;
         self.phase = Some(track.gait);
-        self.walks = false;
+        (self.walks, self.faces) = (false, false);
         self.mean_m = std::array::from_fn(|s| position_at(track, forecast, s));
         self.ahead = std::array::from_fn(|s| DVec2::from_angle(heading_at(track, forecast, s)));
         self.start(draws, &root(&forecast.coupling.state));
@@ -174,7 +179,12 @@ impl Trajectories {
         let velocity = track.velocity_mps;
         let walks = velocity.length() > WALKS_FROM_MPS;
         let trunk_rad = numbers.heading_sigma_rad;
-        let turn_sigma_rad = if walks { trunk_rad } else { track.heading_sigma_rad.hypot(trunk_rad) } as f32;
+        let sigma_rad = |of_trunk: f64| {
+            let sigma = if walks { of_trunk } else { track.heading_sigma_rad.hypot(of_trunk) };
+            sigma as f32
+        };
+        self.turn_sigma_rad = [trunk_rad, numbers.own_heading_sigma_rad].map(sigma_rad);
+        let turn_sigma_rad = self.turn_sigma_rad[0];
         let (height_m, width) = (track.height_m as f32, track.width_scale as f32);
         let height_sigma_m = track.height_sigma_m.hypot(numbers.height_sigma_m) as f32;
         let width_sigma = track.width_scale_sigma.hypot(numbers.width_sigma) as f32;
@@ -262,6 +272,40 @@ impl Trajectories {
             let off_m = [0, 1].map(|i| &self.off_m[i][step * n..(step + 1) * n]);
             gait.walk_step(figure, step, self.ahead[step], off_m);
         }
+    }
+}
+
+impl Trajectories {
+    /// From here to [`Trajectories::face_as_blocker`] the samples face as their own UE goes with them. The gait is known.
+    #[inline(always)]
+    pub(super) fn face_as_owner(&mut self, draws: &BTreeMap<u64, Draws>) {
+        if !self.faces {
+            self.faces = true;
+            let (n, gait, z) = (self.samples, &mut self.gait, &draws[&self.track].heading);
+            let less_rad = self.turn_sigma_rad[0] - self.turn_sigma_rad[1];
+            renew(&mut gait.turn[0], self.turn_rad.iter().zip(z).map(|(turn, z)| turn - less_rad * z));
+            cos_sin(&mut gait.turn);
+            let [cos, sin] = &gait.turn;
+            let [with_x, with_y] = &mut gait.with_ue;
+            with_x.resize(MOMENTS * n, 0.0);
+            with_y.resize(MOMENTS * n, 0.0);
+            for step in 0..MOMENTS {
+                let [ahead_x, ahead_y] = self.ahead[step].to_array().map(|x| x as f32);
+                let row = step * n..(step + 1) * n;
+                let (with_x, with_y) = (&mut with_x[row.clone()], &mut with_y[row]);
+                for k in 0..n {
+                    with_x[k] = ahead_x * cos[k] - ahead_y * sin[k];
+                    with_y[k] = ahead_y * cos[k] + ahead_x * sin[k];
+                }
+            }
+        }
+        std::mem::swap(&mut self.gait.own, &mut self.gait.with_ue);
+    }
+
+    /// As others meet them again.
+    #[inline(always)]
+    pub(super) fn face_as_blocker(&mut self) {
+        std::mem::swap(&mut self.gait.own, &mut self.gait.with_ue);
     }
 }
 

@@ -1,11 +1,13 @@
 //! A site that cannot be: what stands outside the hall, angles and shares out of their range, unknown models.
 
+use super::check_hall::check_hall;
+use crate::geometry::DVec2;
 use crate::lidar::{Model, sensor_model, sensor_models};
 use crate::site::{AccessPoint, Furniture, Pillar, Sensor, Ue};
 use crate::{Error, Site};
 
 /// No hall is longer; a longer one is in another unit.
-const HALL_MAX_M: f64 = 1000.0;
+pub(super) const HALL_MAX_M: f64 = 1000.0;
 /// A clock that is further ahead is not set: that is the assembler's to put right.
 const CLOCK_MS: f64 = 1000.0;
 
@@ -15,11 +17,7 @@ const CLOCK_MS: f64 = 1000.0;
 /// # Errors
 /// As said; names that are empty or given twice, for recordings, tables and links go by them; no sensor.
 pub(super) fn check_site(site: &Site) -> Result<(), Error> {
-    let hall = &site.hall;
-    for (key, size_m) in [("length_m", hall.length_m), ("width_m", hall.width_m), ("height_m", hall.height_m)]
-    {
-        above_0(&format!("site.hall.{key}"), size_m, HALL_MAX_M)?;
-    }
+    check_hall(&site.hall)?;
     if site.sensors.is_empty() {
         return Err(Error::new("site.sensors: expected one or more, found none"));
     }
@@ -42,7 +40,7 @@ fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
     // Outdoors, the hall is the part that is watched, and a sensor known by its clouds may stand beside it.
     match sensor_model(&sensor.model) {
         Some("points") => within(&key("position_m, z"), sensor.position_m[2], 0.0, site.hall.height_m)?,
-        _ => in_hall(&key("position_m"), sensor.position_m, site)?,
+        _ => hung(&key("position_m"), sensor.position_m, site)?,
     }
     let turn = &sensor.rotation_deg;
     within(&key("rotation_deg.yaw"), turn.yaw, -360.0, 360.0)?;
@@ -77,6 +75,13 @@ fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
 
 fn simulation(site: &Site) -> Result<(), Error> {
     within("site.simulation.dropout", site.simulation.dropout, 0.0, 1.0)?;
+    for (key, places_m) in
+        [("entrances_m", &site.simulation.entrances_m), ("places_m", &site.simulation.places_m)]
+    {
+        for (i, place_m) in places_m.iter().enumerate() {
+            on_floor(&format!("site.simulation.{key}[{i}]"), *place_m, site)?;
+        }
+    }
     let (lost, ahead) = (&site.simulation.lost_after_s, &site.simulation.clock_ahead_ms);
     let of = |key: &'static str, least, most| move |(name, &value)| (key, name, value, least, most);
     let lost = lost.iter().map(of("lost_after_s", 0.0, f64::INFINITY));
@@ -96,20 +101,20 @@ fn simulation(site: &Site) -> Result<(), Error> {
 }
 
 fn access_point(ap: &AccessPoint, site: &Site) -> Result<(), Error> {
-    in_hall(&format!("site.access_points.{}.position_m", ap.name), ap.position_m, site)
+    hung(&format!("site.access_points.{}.position_m", ap.name), ap.position_m, site)
 }
 
 fn pillar(index: usize, pillar: &Pillar, site: &Site) -> Result<(), Error> {
     let key = |key: &str| format!("site.pillars[{index}].{key}");
     on_floor(&key("position_m"), pillar.position_m, site)?;
-    above_0(&key("radius_m"), pillar.radius_m, 0.5 * site.hall.length_m.min(site.hall.width_m))
+    above_0(&key("radius_m"), pillar.radius_m, 0.5 * size_m(site).min_element())
 }
 
 fn furniture(index: usize, furniture: &Furniture, site: &Site) -> Result<(), Error> {
     let key = |key: &str| format!("site.furniture[{index}].{key}");
     on_floor(&key("position_m"), furniture.position_m, site)?;
     let [length_m, width_m, height_m] = furniture.size_m;
-    let longest_m = site.hall.length_m.hypot(site.hall.width_m);
+    let longest_m = size_m(site).x.hypot(size_m(site).y);
     above_0(&key("size_m, x"), length_m, longest_m)?;
     above_0(&key("size_m, y"), width_m, longest_m)?;
     above_0(&key("size_m, z"), height_m, site.hall.height_m)?;
@@ -135,26 +140,44 @@ fn names<'a>(key: &str, names: impl Iterator<Item = &'a str>) -> Result<(), Erro
     Ok(())
 }
 
-fn in_hall(key: &str, [x_m, y_m, z_m]: [f64; 3], site: &Site) -> Result<(), Error> {
-    on_floor(key, [x_m, y_m], site)?;
+/// Sensors and access points: within a rectangle, for it is a room; an outline may be the part of one that is watched.
+fn hung(key: &str, [x_m, y_m, z_m]: [f64; 3], site: &Site) -> Result<(), Error> {
+    if site.hall.outline_m.is_empty() {
+        on_floor(key, [x_m, y_m], site)?;
+    } else {
+        let [least, most] = site.hall.bounds_m();
+        within(&format!("{key}, x (near the hall)"), x_m, least.x - HALL_MAX_M, most.x + HALL_MAX_M)?;
+        within(&format!("{key}, y (near the hall)"), y_m, least.y - HALL_MAX_M, most.y + HALL_MAX_M)?;
+    }
     within(&format!("{key}, z (from the floor to the ceiling)"), z_m, 0.0, site.hall.height_m)
 }
 
 fn on_floor(key: &str, [x_m, y_m]: [f64; 2], site: &Site) -> Result<(), Error> {
-    let (ahead_m, aside_m) = (0.5 * site.hall.length_m, 0.5 * site.hall.width_m);
-    within(&format!("{key}, x (within the hall)"), x_m, -ahead_m, ahead_m)?;
-    within(&format!("{key}, y (within the hall)"), y_m, -aside_m, aside_m)
+    let [least, most] = site.hall.bounds_m();
+    within(&format!("{key}, x (within the hall)"), x_m, least.x, most.x)?;
+    within(&format!("{key}, y (within the hall)"), y_m, least.y, most.y)?;
+    match site.hall.contains(DVec2::new(x_m, y_m)) {
+        true => Ok(()),
+        false => {
+            Err(Error::new(format!("{key}: expected a place within site.hall.outline_m, found {x_m}, {y_m}")))
+        }
+    }
+}
+
+fn size_m(site: &Site) -> DVec2 {
+    let [least, most] = site.hall.bounds_m();
+    most - least
 }
 
 /// Not a number is within nothing.
-fn within(key: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {
+pub(super) fn within(key: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {
     match (least..=most).contains(&value) {
         true => Ok(()),
         false => Err(Error::new(format!("{key}: expected {least} to {most}, found {value}"))),
     }
 }
 
-fn above_0(key: &str, value: f64, most: f64) -> Result<(), Error> {
+pub(super) fn above_0(key: &str, value: f64, most: f64) -> Result<(), Error> {
     match value > 0.0 && value <= most {
         true => Ok(()),
         false => Err(Error::new(format!("{key}: expected more than 0 and {most} at most, found {value}"))),
@@ -166,8 +189,11 @@ mod tests {
     use super::*;
     use crate::{Config, Mode};
 
-    const SITES: [&str; 4] = [
+    const SITES: [&str; 7] = [
         include_str!("../../config/sites/hand-mounted.toml"),
+        include_str!("../../config/sites/corridor.toml"),
+        include_str!("../../config/sites/hexagon.toml"),
+        include_str!("../../config/sites/l-hall.toml"),
         include_str!("../../config/sites/logictronix.toml"),
         include_str!("../../config/sites/ouster.toml"),
         include_str!("../../config/sites/lost-sensor.toml"),

@@ -9,6 +9,7 @@ mod forecast;
 mod blockage;
 mod missing;
 mod overlay;
+mod check_hall;
 mod check_site;
 mod check;
 

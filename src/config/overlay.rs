@@ -52,7 +52,8 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 8] = [
+const OPTIONAL: [(&str, &str, &str); 11] = [
+    ("site.hall", "outline_m", "an array"),
     ("site.sensors", "address", "a string"),
     ("site.sensors", "calibration", "a string"),
     ("site.sensors", "calibration_file", "a string"),
@@ -61,6 +62,8 @@ const OPTIONAL: [(&str, &str, &str); 8] = [
     ("site.sensors", "udp_port", "a whole number"),
     ("site.simulation", "clock_ahead_ms", "a table"),
     ("site.simulation", "slip", "a table"),
+    ("site.simulation", "entrances_m", "an array"),
+    ("site.simulation", "places_m", "an array"),
 ];
 
 type Complain<'a> = &'a dyn Fn(usize, String) -> Error;

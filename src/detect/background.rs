@@ -64,11 +64,7 @@ impl Background {
             method: config.background,
             thin_m: config.thin_m,
             sensors: site.sensors.iter().map(SensorModel::new).collect(),
-            clip: Clip {
-                half_length_m: site.hall.length_m * 0.5,
-                half_width_m: site.hall.width_m * 0.5,
-                highest_m: config.highest_m,
-            },
+            clip: Clip { hall: site.hall.clone(), highest_m: config.highest_m },
             map: None,
             map_scans: 0,
             keys: Vec::new(),
@@ -227,7 +223,7 @@ impl Background {
             }
         }
         if self.thin_m > 0.0 {
-            thin(points, self.thin_m, &mut self.keys, &mut self.thinned);
+            thin(points, self.thin_m, self.clip.hall.middle_m(), &mut self.keys, &mut self.thinned);
         }
     }
 

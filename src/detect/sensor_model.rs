@@ -6,7 +6,7 @@ use super::{Point, Prior};
 use crate::Health;
 use crate::geometry::{DVec3, Pose};
 use crate::lidar::{Cloud, Model, RangeImage, Scan, SensorPoint};
-use crate::site::Sensor;
+use crate::site::{Hall, Sensor};
 
 /// Width of a pixel of an organised scan: a little more than one column of a sensor at 10 Hz.
 const AZIMUTH_BIN_DEG: f64 = 0.2;
@@ -115,19 +115,15 @@ pub(super) struct Look<'a> {
 }
 
 /// Where people can be: the hall is known, so what lies outside is a reflection.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Clip {
-    pub(super) half_length_m: f64,
-    pub(super) half_width_m: f64,
+    pub(super) hall: Hall,
     pub(super) highest_m: f64,
 }
 
 impl Clip {
     fn holds(&self, p: DVec3) -> bool {
-        p.x.abs() <= self.half_length_m
-            && p.y.abs() <= self.half_width_m
-            && p.z >= LOWEST_M
-            && p.z <= self.highest_m
+        self.hall.contains(p.truncate()) && p.z >= LOWEST_M && p.z <= self.highest_m
     }
 }
 

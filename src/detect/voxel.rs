@@ -2,7 +2,7 @@
 //! them, quirks included (facts and values: koide3/hdl_people_tracking at 2d12516).
 
 use super::Point;
-use crate::geometry::{Aabb, DVec3};
+use crate::geometry::{Aabb, DVec2, DVec3};
 
 /// More voxels than this are not kept; what lies beyond counts as new.
 const VOXELS_MAX: usize = 1 << 28;
@@ -59,22 +59,31 @@ impl VoxelMap {
     }
 }
 
-/// Replaces the points of each voxel by their centroid, in order of z, y, x; `keys` and `thinned` are scratch.
-pub fn thin(points: &mut Vec<Point>, edge_m: f64, keys: &mut Vec<u64>, thinned: &mut Vec<Point>) {
+/// Replaces the points of each voxel by their centroid, in order of z, y, x; `keys` and `thinned` are scratch. Voxels
+/// count from `middle_m`, rounded to their edges.
+pub fn thin(
+    points: &mut Vec<Point>,
+    edge_m: f64,
+    middle_m: DVec2,
+    keys: &mut Vec<u64>,
+    thinned: &mut Vec<Point>,
+) {
     // A key holds z, y and x of the voxel in 14 bits each (1.6 km at 0.1 m) and the point in the rest.
     const AXIS_BITS: u32 = 14;
     const INDEX_BITS: u32 = 64 - 3 * AXIS_BITS;
     const HALF_AXIS: i64 = 1 << (AXIS_BITS - 1);
     points.truncate(1 << INDEX_BITS);
-    let part = |c: f64| {
+    let [zero_x, zero_y] = (middle_m / edge_m).round().to_array();
+    let part = |c: f64, zero: f64| {
         // Rounded down; `floor` is a call where it is no instruction.
-        let cell = (c / edge_m).clamp(-HALF_AXIS as f64, (HALF_AXIS - 1) as f64);
+        let cell = (c / edge_m - zero).clamp(-HALF_AXIS as f64, (HALF_AXIS - 1) as f64);
         let toward_zero = cell as i64;
         (toward_zero - i64::from(toward_zero as f64 > cell) + HALF_AXIS) as u64
     };
     keys.clear();
     keys.extend(points.iter().zip(0..).map(|(p, i): (_, u64)| {
-        let [x, y, z] = p.position_m.to_array().map(part);
+        let DVec3 { x, y, z } = p.position_m;
+        let (x, y, z) = (part(x, zero_x), part(y, zero_y), part(z, 0.0));
         ((z << AXIS_BITS | y) << AXIS_BITS | x) << INDEX_BITS | i
     }));
     keys.sort_unstable();
@@ -124,9 +133,17 @@ mod tests {
     #[test]
     fn thinning_keeps_one_centroid_a_voxel() {
         let mut points = vec![point(0.02, 0.05, 0.05), point(0.06, 0.05, 0.05), point(-0.02, 0.05, 0.05)];
-        thin(&mut points, 0.1, &mut Vec::new(), &mut Vec::new());
+        thin(&mut points, 0.1, DVec2::ZERO, &mut Vec::new(), &mut Vec::new());
         assert_eq!(points.len(), 2);
         assert_eq!(points[0].position_m.x, -0.02);
         assert!((points[1].position_m.x - 0.04).abs() < 1e-12);
+    }
+
+    #[test]
+    fn thinning_keeps_voxels_apart_far_from_the_origin() {
+        let far = |x: f64| point(500_000.0 + x, 5_400_000.05, 0.05);
+        let mut points = vec![far(0.05), far(0.15), far(0.16)];
+        thin(&mut points, 0.1, DVec2::new(500_000.0, 5_400_000.0), &mut Vec::new(), &mut Vec::new());
+        assert_eq!(points.len(), 2);
     }
 }

@@ -41,11 +41,12 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 30] = [
+const JOBS: [Job; 32] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
     job("sites", "other heights, a lost sensor, more people, pairs", Needs::Nothing, crowds::sites),
+    job("shapes", "three halls of other shapes, devices in the hand: what blocks, by cause", Needs::Nothing, crowds::shapes),
     job("people", "other bodies, real walkers, dense crowds", Needs::Data, crowds::people),
     job("walkers", "16 real walkers, ten draws of bodies, error budget and oracles", Needs::Data, crowds::walkers),
     job("circle-antipode", "8 and 16 real walkers, every mode", Needs::Data, scores::antipode),

@@ -58,7 +58,7 @@ fn cases() -> Vec<Case> {
         println!("UMBRACAST_DATA is not set: no real walkers, no clouds of a real sensor");
         return cases;
     };
-    let mut walkers = words("--seed 100030 --unit cm --fps 25 --trajectories");
+    let mut walkers = words("--seed 100030 --centre --unit cm --fps 25 --trajectories");
     walkers.push(argument(data.join("circle_antipode/circle-10m-16-2.txt")));
     cases.push(Case { name: "real walkers", words: walkers, clouds: None });
     let site = words("--site config/sites/logictronix.toml");

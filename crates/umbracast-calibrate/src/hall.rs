@@ -38,7 +38,9 @@ pub struct Outline {
 impl Outline {
     /// Of a site.
     pub fn new(site: &Site) -> Self {
-        let mut surfaces = Vec::new();
+        let hall = &site.hall;
+        let wall = |ends_m| Surface::Wall { ends_m, top_m: hall.height_m };
+        let mut surfaces: Vec<Surface> = hall.walls().map(wall).collect();
         let mut rectangle = |middle_m: DVec2, size_m: DVec2, yaw_rad: f64, top_m: f64| {
             let corner = |x: f64, y: f64| {
                 middle_m + DVec2::from_angle(yaw_rad).rotate(size_m * 0.5 * DVec2::new(x, y))
@@ -47,8 +49,6 @@ impl Outline {
             let wall = |i: usize| Surface::Wall { ends_m: [corners[i], corners[(i + 1) % 4]], top_m };
             surfaces.extend((0..4).map(wall));
         };
-        let hall = &site.hall;
-        rectangle(DVec2::ZERO, DVec2::new(hall.length_m, hall.width_m), 0.0, hall.height_m);
         for item in &site.furniture {
             let [length_m, width_m, top_m] = item.size_m;
             let middle_m = DVec2::from_array(item.position_m);

@@ -124,7 +124,12 @@ fn empty_site(sensor: &Sensor, level: &Level, default: &Site) -> Site {
     let mut sensor = sensor.clone();
     sensor.position_m = DVec3::new(0.0, 0.0, level.height_m).to_array();
     Site {
-        hall: Hall { length_m: size_m, width_m: size_m, height_m: level.height_m + size_m },
+        hall: Hall {
+            length_m: size_m,
+            width_m: size_m,
+            height_m: level.height_m + size_m,
+            outline_m: Vec::new(),
+        },
         pillars: Vec::new(),
         furniture: Vec::new(),
         sensors: vec![sensor],

@@ -5,26 +5,44 @@ use std::sync::Arc;
 
 use umbracast::geometry::DVec2;
 use umbracast::{Error, Site};
-use umbracast_eval::run::chain::{People, SceneSpec};
+use umbracast_eval::run::chain::{self, People, SceneSpec};
 use umbracast_io::bvh;
 use umbracast_io::trajectories::{self, Options};
 use umbracast_sim::body::Bodies;
 use umbracast_sim::body::Gait;
+use umbracast_sim::crowd::Preset;
+use umbracast_sim::crowd::floor::from_piece_m;
 use umbracast_sim::crowd::replay::{Recorded, replay};
 
 use crate::args::{BodyArgs, Replay};
 use crate::say;
 
-/// Who walks this near to the site's middle, on the whole, is taken to be placed already: the middle of an
-/// experiment is known better than that of noisy tracks.
+/// With `--centre`, who walks this near to the hall's middle, on the whole, is taken to be placed already: the middle of
+/// an experiment is known better than that of noisy tracks.
 const PLACED_M: f64 = 0.5;
 
 /// Scenes, and what was done to them in words: a line each.
 pub type Told = (Vec<SceneSpec>, Vec<String>);
 
-/// One scene a file of recorded people, a group each; scene i has the seed `first_seed` + i. People who walk
-/// elsewhere are moved to the middle of the site.
-pub fn recorded_scenes(files: &[PathBuf], replayed: &Replay, first_seed: u64) -> Result<Told, Error> {
+/// Scenes of drawn crowds in the hall of a site.
+pub fn drawn_scenes(
+    site: &Site,
+    presets: &[Preset],
+    scenes: usize,
+    people: usize,
+    seed: u64,
+) -> Result<Told, Error> {
+    Ok((chain::scenes_in(site, presets, scenes, people, seed)?, Vec::new()))
+}
+
+/// One scene a file of recorded people, a group each; scene i has the seed `first_seed` + i. They keep their places and
+/// their numbers; with `--centre` people who walk elsewhere are moved to the middle of the site's hall.
+pub fn recorded_scenes(
+    site: &Site,
+    files: &[PathBuf],
+    replayed: &Replay,
+    first_seed: u64,
+) -> Result<Told, Error> {
     if let Some(seconds) = replayed.seconds.filter(|seconds| seconds.is_nan() || *seconds <= 0.0) {
         return Err(Error::new(format!("--seconds: expected more than 0, found {seconds}")));
     }
@@ -39,17 +57,30 @@ pub fn recorded_scenes(files: &[PathBuf], replayed: &Replay, first_seed: u64) ->
                 return Err(Error::new(story).within(file.display()));
             }
         }
-        let [x_m, y_m] = trajectories::middle_m(&people).unwrap_or_default();
-        let moved = x_m.hypot(y_m) > PLACED_M;
+        let middle_m = trajectories::middle_m(&people).unwrap_or_default();
+        let by_m = site.hall.middle_m() - DVec2::from_array(middle_m);
+        let moved = replayed.centre && by_m.length() > PLACED_M;
         if moved {
-            trajectories::shift(&mut people, [-x_m, -y_m]);
+            trajectories::shift(&mut people, by_m.to_array());
         }
         let recorded: Vec<Recorded> =
             people.iter().map(|p| Recorded { samples: &p.samples, height_m: p.height_m }).collect();
-        let crowd = replay(&recorded, replayed.smooth).map_err(|e| e.within(file.display()))?;
+        let mut crowd = replay(&recorded, replayed.smooth).map_err(|e| e.within(file.display()))?;
+        let numbers = people.iter().map(|person| u32::try_from(person.id));
+        let numbers: Result<Vec<u32>, _> = numbers.collect();
+        match numbers {
+            Ok(numbers) => {
+                crowd.trajectories.iter_mut().zip(numbers).for_each(|(way, number)| way.person = number)
+            }
+            Err(_) => say::note(&format!(
+                "{}: people are numbered from 0: expected ids from 0 to {}, found others",
+                file.display(),
+                u32::MAX
+            )),
+        }
         let group = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let place = match moved {
-            true => format!("moved by ({:.2}, {:.2}) m to the middle of the site", -x_m, -y_m),
+            true => format!("moved by ({:.2}, {:.2}) m to the middle of the site", by_m.x, by_m.y),
             false => "where they were recorded".to_owned(),
         };
         let told = format!(
@@ -65,18 +96,11 @@ pub fn recorded_scenes(files: &[PathBuf], replayed: &Replay, first_seed: u64) ->
 /// Who walks where the site has none, in words: a line for each scene where somebody does. Sensors see them there, and
 /// walls hide them, which no recording meant.
 pub fn through_walls(scenes: &[SceneSpec], site: &Site) -> Vec<String> {
-    let half_m = 0.5 * DVec2::new(site.hall.length_m, site.hall.width_m);
-    let outside = |at: DVec2| at.abs().cmpgt(half_m).any();
+    let outside = |at: DVec2| !site.hall.contains(at);
     let in_pillar = |at: DVec2| {
         site.pillars.iter().any(|pillar| at.distance(DVec2::from_array(pillar.position_m)) < pillar.radius_m)
     };
-    let in_furniture = |at: DVec2| {
-        site.furniture.iter().any(|box_| {
-            let turned = DVec2::from_angle(-box_.yaw_deg.to_radians());
-            let from_middle = turned.rotate(at - DVec2::from_array(box_.position_m));
-            from_middle.abs().cmplt(0.5 * DVec2::new(box_.size_m[0], box_.size_m[1])).all()
-        })
-    };
+    let in_furniture = |at: DVec2| site.furniture.iter().any(|piece| from_piece_m(piece, at) < 0.0);
     let told = |scene: &SceneSpec| {
         let crowd = scene.crowd();
         let count = |hits: &dyn Fn(DVec2) -> bool| {
@@ -86,6 +110,7 @@ pub fn through_walls(scenes: &[SceneSpec], site: &Site) -> Vec<String> {
             (count(&outside), "leave the hall"),
             (count(&in_pillar), "walk through a pillar"),
             (count(&in_furniture), "walk through furniture"),
+            (crowd.trajectories.iter().filter(|way| way.positions_m.is_empty()).count(), "never come in"),
         ];
         let found = found.iter().filter(|(people, _)| *people > 0);
         let found: Vec<String> = found.map(|(people, where_)| format!("{people} {where_}")).collect();
@@ -125,8 +150,6 @@ pub fn dressed((mut scenes, mut told): Told, args: &BodyArgs) -> Result<Told, Er
 mod tests {
     use super::*;
     use umbracast::Config;
-    use umbracast_eval::run::chain::drawn_scenes;
-    use umbracast_sim::crowd::Preset;
 
     #[test]
     fn who_walks_through_walls_is_counted() {
@@ -141,7 +164,20 @@ mod tests {
         let things = scenes(&[[0.0, 11.5, 10.0], [4.0, 11.5, 12.0], [14.0, 16.0, 9.0]]);
         let told = ["file, seed 7: of 1 people 1 walk through a pillar, 1 walk through furniture"];
         assert_eq!(through_walls(&things, &site), told);
-        let drawn = drawn_scenes(&[Preset::Orca03, Preset::Mixed], 2, 10, 200_000);
+        let (drawn, _) = drawn_scenes(&site, &[Preset::Orca03, Preset::Mixed], 2, 10, 200_000).unwrap();
         assert!(through_walls(&drawn, &site).is_empty(), "crowds are drawn into the hall");
+    }
+
+    #[test]
+    fn a_hall_that_the_circle_does_not_fit_has_its_people_within() {
+        let mut site = Config::default().site;
+        (site.hall.length_m, site.hall.width_m) = (20.0, 12.0);
+        site.pillars.iter_mut().for_each(|pillar| pillar.position_m = pillar.position_m.map(|m| 0.3 * m));
+        site.furniture.truncate(1);
+        site.furniture[0].position_m = [0.0, 5.0];
+        let (scenes, _) = drawn_scenes(&site, &[Preset::Orca03, Preset::Mixed], 2, 10, 200_000).unwrap();
+        assert_eq!(through_walls(&scenes, &site), [""; 0]);
+        let told = drawn_scenes(&site, &[Preset::Mixed], 1, 1000, 7).unwrap_err().to_string();
+        assert!(told.contains("people: expected") && told.contains("found 1000"), "{told}");
     }
 }

@@ -24,7 +24,7 @@ pub fn without_effect(name: &str, command: &ArgMatches) -> Vec<String> {
         let in_vain = flags.iter().filter(|flag| given(flag));
         told.extend(in_vain.map(|flag| format!("--{} has no effect {why}", flag.replace('_', "-"))));
     };
-    const REPLAY: [&str; 4] = ["fps", "unit", "smooth", "seconds"];
+    const REPLAY: [&str; 5] = ["fps", "unit", "smooth", "seconds", "centre"];
     if given("dir") {
         let done = "on a run that is done: nothing is simulated";
         idle(&["preset", "people", "seed", "bodies", "gait"], done);

@@ -216,12 +216,25 @@ fn what_changes_nothing_and_who_walks_through_walls_is_told() {
         "25",
         "--people",
         "4",
+        "--csv",
         "--out",
         text(&sim),
     ]);
     assert!(said.contains("note: --fps has no effect on") && said.contains("column t_s"), "{said}");
     assert!(said.contains("note: --people has no effect with --trajectories"), "{said}");
-    assert!(said.contains("of 3 people 2 leave the hall"), "{said}");
+    assert!(said.contains("of 3 people 1 leave the hall"), "{said}");
+    assert!(said.contains("where they were recorded"), "{said}");
+    let people = fs::read_to_string(sim.join("people.csv")).expect("the truth");
+    let first: Vec<&str> = people.lines().nth(1).expect("a row").split(',').collect();
+    assert_eq!(first[3], "1", "the number in the file: {first:?}");
+    assert!(
+        (first[4].parse::<f64>().expect("metres") - 6.0).abs() < 0.01,
+        "the place in the file: {first:?}"
+    );
+    let centred = folder.join("centred");
+    let said =
+        done(&["simulate", "--centre", "--trajectories", text(&trajectories), "--out", text(&centred)]);
+    assert!(said.contains("moved by (-23.00, 0.05) m to the middle of the site"), "{said}");
 }
 
 #[test]

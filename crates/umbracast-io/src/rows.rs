@@ -2,6 +2,7 @@
 #![allow(missing_docs, reason = "names carry the unit; what needs a word has one")]
 
 use serde::{Deserialize, Serialize};
+use umbracast::blockage::Chance;
 use umbracast::detect::Detection;
 use umbracast::geometry::{Aabb, Obb};
 use umbracast::track::Track;
@@ -119,6 +120,13 @@ pub struct LinkRow {
     pub onset_s: [Option<f64>; 3],
     /// The same of the time until the blockage that is or comes first is over; null where that is not within the steps.
     pub duration_s: [Option<f64>; 3],
+    /// Probability that the owner's own body blocks the link: now, then within windows 1..=9; null while the UE is on the
+    /// body's axis and where the method knows others alone.
+    pub p_own: [Option<f64>; 1 + STEPS],
+    /// The same of walls, pillars and furniture.
+    pub p_hall: [Option<f64>; 1 + STEPS],
+    /// The same of others, the owner or the hall.
+    pub p_any: [Option<f64>; 1 + STEPS],
 }
 
 /// The rows of one outcome.
@@ -139,7 +147,14 @@ pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, lin
         p: b.p,
         onset_s: b.onset_s,
         duration_s: b.duration_s,
+        p_own: of_chance(b.own),
+        p_hall: of_chance(b.hall),
+        p_any: of_chance(b.any),
     }));
+}
+
+fn of_chance(chance: Option<Chance>) -> [Option<f64>; 1 + STEPS] {
+    std::array::from_fn(|w| chance.map(|of| w.checked_sub(1).map_or(of.p_now, |w| of.p[w])))
 }
 
 /// The detections of one outcome.

@@ -37,7 +37,7 @@ pub struct Published {
     /// What changed of the links.
     pub events: Vec<Event>,
     /// New points, site frame, centimetres.
-    pub points_cm: Vec<[i16; 3]>,
+    pub points_cm: Vec<[i32; 3]>,
     /// All of them as they are, where they are recorded.
     pub foreground: Option<Vec<Point>>,
     /// Of assembler and stages since the start.
@@ -110,9 +110,9 @@ impl Published {
 }
 
 /// What is drawn of a frame's new points.
-pub fn points_cm(foreground: &[Point]) -> Vec<[i16; 3]> {
+pub fn points_cm(foreground: &[Point]) -> Vec<[i32; 3]> {
     let every = foreground.len().div_ceil(POINTS_DRAWN).max(1);
-    let in_cm = |value_m: f64| (value_m * 100.0).round() as i16; // Saturates beyond 327 m.
+    let in_cm = |value_m: f64| (value_m * 100.0).round() as i32; // A map in UTM fits in.
     foreground.iter().step_by(every).map(|point| point.position_m.to_array().map(in_cm)).collect()
 }
 

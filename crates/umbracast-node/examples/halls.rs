@@ -28,7 +28,7 @@ use umbracast_node::hall::{Hall, Outlet, Urgency};
 use umbracast_node::keys::Keys;
 use umbracast_node::network::{Mode, Network};
 use umbracast_node::share::empty_frames;
-use umbracast_sim::crowd::{Preset, Stroll};
+use umbracast_sim::crowd::{Ground, Preset, Stroll};
 use umbracast_sim::scene::Scene;
 use zenoh::Wait;
 
@@ -143,7 +143,7 @@ fn recorded(config: &Config) -> Result<(Vec<Vec<Foreground>>, usize), Error> {
     let sensors = site.sensors.len();
     let of_sensor = |sensor: usize| empty.iter().flat_map(|frame| frame[sensor].clone()).collect();
     let empty = empty_frames(site, &(0..sensors).map(of_sensor).collect::<Vec<_>>())?;
-    let crowd = Stroll::new(Preset::Orca03, PEOPLE, CIRCLE_M, SEED).leg(SCENE_S);
+    let crowd = Stroll::new(Preset::Orca03, PEOPLE, &Ground::circle(CIRCLE_M), SEED).leg(SCENE_S);
     let mut scene = Scene::new(crowd, site, SEED)?;
     let new = |sensor| Front::new(config, &[sensor], &empty, Arc::default(), HostClock::start());
     let mut fronts = (0..sensors).map(new).collect::<Result<Vec<Front>, _>>()?;

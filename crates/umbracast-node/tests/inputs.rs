@@ -13,7 +13,7 @@ use umbracast_node::keys::Keys;
 use umbracast_node::role::Role;
 use umbracast_node::share::Shared;
 use umbracast_node::{Node, Settings, Source, ros2};
-use umbracast_sim::crowd::{Preset, Stroll};
+use umbracast_sim::crowd::{Ground, Preset, Stroll};
 use umbracast_sim::scene::Scene;
 use zenoh::Wait;
 
@@ -92,7 +92,7 @@ fn packets_of_drivers_give_foreground() {
     let driver = ros2::Node::new(hall.session(), 3, "", "velodyne_driver").unwrap();
     let publisher = |topic: &(usize, String)| driver.publisher(&topic.1, &messages::SCAN).unwrap();
     let mut publishers: Vec<ros2::Publisher> = topics.iter().map(publisher).collect();
-    let crowd = Stroll::new(Preset::Orca03, 3, 12.5, 7).leg(1);
+    let crowd = Stroll::new(Preset::Orca03, 3, &Ground::circle(12.5), 7).leg(1);
     let mut scene = Scene::new(crowd, &config.site, 7).unwrap();
     while let Some(frame) = scene.next_frame() {
         for (publisher, packets) in publishers.iter_mut().zip(&frame.packets) {

@@ -76,14 +76,11 @@ impl Scene {
     /// The same people without sensors: no packets and no returns, for training and the ladder of oracles.
     pub fn truth_only(crowd: Crowd, site: &Site, seed: u64) -> Self {
         let frames = (crowd.duration_ns / STEP_NS).max(0) as u64;
-        let body = |way: Trajectory| {
-            let own_seed = own_seed(seed, &way);
-            Walker::new(way, own_seed)
-        };
+        let body = |(number, way): (usize, Trajectory)| Walker::new(way, own_seed(seed, number));
         Self {
             site: site.clone(),
             seed,
-            walkers: crowd.trajectories.into_iter().map(body).collect(),
+            walkers: crowd.trajectories.into_iter().enumerate().map(body).collect(),
             sensors: None,
             truth: Truth::default(),
             frames,
@@ -95,9 +92,8 @@ impl Scene {
     #[must_use]
     pub fn with_bodies(mut self, bodies: &Bodies) -> Self {
         if !bodies.is_plain() {
-            for walker in &mut self.walkers {
-                let own_seed = own_seed(self.seed, &walker.trajectory);
-                *walker = bodies.walker(walker.trajectory.clone(), own_seed);
+            for (number, walker) in self.walkers.iter_mut().enumerate() {
+                *walker = bodies.walker(walker.trajectory.clone(), own_seed(self.seed, number));
             }
         }
         self
@@ -163,9 +159,9 @@ impl Scene {
     }
 }
 
-/// Of a person's body.
-fn own_seed(scene_seed: u64, way: &Trajectory) -> u64 {
-    stream(scene_seed, "body", u64::from(way.person)).next_u64()
+/// Of a person's body: by the place in the crowd, whatever number a recording gives.
+fn own_seed(scene_seed: u64, number: usize) -> u64 {
+    stream(scene_seed, "body", number as u64).next_u64()
 }
 
 #[cfg(test)]

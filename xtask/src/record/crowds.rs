@@ -7,7 +7,7 @@ use super::book::Book;
 use crate::tools::{Result, argument};
 
 /// How recorded walkers of the circle antipode experiment are read.
-const ANTIPODE: [&str; 5] = ["--unit", "cm", "--fps", "25", "--trajectories"];
+const ANTIPODE: [&str; 6] = ["--centre", "--unit", "cm", "--fps", "25", "--trajectories"];
 
 /// Where sensors hang, how many sensors there are, how many people walk and how.
 pub fn sites(book: &mut Book) -> Result<()> {
@@ -25,6 +25,30 @@ pub fn sites(book: &mut Book) -> Result<()> {
     book.compare()
 }
 
+/// Halls of other shapes with devices in the right hand: links blocked by others, by their owners, by the hall, and by any
+/// of them.
+pub fn shapes(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record shapes");
+    for site in ["l-hall", "hexagon", "corridor"] {
+        let file = format!("config/sites/{site}.toml");
+        let words =
+            ["evaluate", "--mode", "default", "--scenes", "10", "--preset", "orca-03,mixed", "--site", &file];
+        let said = book.quietly(&words.map(OsString::from))?;
+        book.line(&format!("{site}: 20 scenes of 10 people, half of them orca-03, half mixed"));
+        let mut shown = false;
+        let stage1 = ["all      MOTA", "all      switches", "all      position"];
+        for line in said.lines() {
+            shown = (shown || line.starts_with("Blockage by cause")) && !line.is_empty();
+            let others = line.contains(" 300 ms  default  ") && !shown;
+            if shown || others || stage1.iter().any(|start| line.starts_with(start)) {
+                book.line(line);
+            }
+        }
+        book.line("");
+    }
+    Ok(())
+}
+
 /// Other bodies and real people beside the ORCA row.
 pub fn people(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record people");
@@ -35,11 +59,11 @@ pub fn people(book: &mut Book) -> Result<()> {
     recorded(book, "antipode", &ANTIPODE, &walkers)?;
     // Of the bottlenecks the part in which people wait and push through; the corridor's people trained the residual,
     // as did other clips of the crowd in the street.
-    let middle = ["--seconds", "20", "--trajectories"];
+    let middle = ["--centre", "--seconds", "20", "--trajectories"];
     recorded(book, "bottleneck", &middle, &["pedpy/030_c_56_h0.txt", "pedpy/040_c_56_h-.txt"])?;
     recorded(book, "trained-on", &middle, &["pedpy/traj_UNI_CORR_500_01.txt"])?;
     let street = ["1A", "1C", "2F"].map(|name| format!("madras/Topview_{name}.csv"));
-    recorded(book, "madras", &["--trajectories"], &street)?;
+    recorded(book, "madras", &["--centre", "--trajectories"], &street)?;
     book.compare()
 }
 

@@ -23,6 +23,11 @@ pub fn look(book: &mut Book) -> Result<()> {
     bodies(book, &["--scenes", "4", "--preset", "orca-03", "--seed", &seed(2)], GAIT)?;
     // The residual learned from 1B, 2C and 2D; 1A, 1C and 2F are shown in the documents.
     let street = ["2A", "2B", "2E"].map(|name| format!("madras/Topview_{name}.csv"));
-    recorded(book, "madras", &["--seed", &seed(3), "--seconds", "15", "--trajectories"], &street)?;
+    recorded(
+        book,
+        "madras",
+        &["--centre", "--seed", &seed(3), "--seconds", "15", "--trajectories"],
+        &street,
+    )?;
     book.compare()
 }

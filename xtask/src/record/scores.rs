@@ -25,7 +25,7 @@ pub fn antipode(book: &mut Book) -> Result<()> {
     let walkers = ["circle-10m-08-2.txt", "circle-10m-16-2.txt"];
     let walkers = walkers.map(|name| book.data(&format!("circle_antipode/{name}")));
     let mut words: Vec<OsString> =
-        ["evaluate", "--unit", "cm", "--fps", "25", "--out"].map(Into::into).into();
+        ["evaluate", "--centre", "--unit", "cm", "--fps", "25", "--out"].map(Into::into).into();
     words.extend([argument(book.scratch("walkers")), "--trajectories".into()]);
     for walkers in walkers {
         words.push(walkers?);

@@ -140,6 +140,9 @@ pub struct Replay {
     /// Of a longer recording replay the middle, so many seconds.
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
+    /// Move people who walk elsewhere to the middle of the site's hall: their recording has a frame of its own.
+    #[arg(long)]
+    pub centre: bool,
 }
 
 /// What bodies they have.

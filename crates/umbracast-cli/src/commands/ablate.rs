@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use umbracast::config::Mechanism;
+use umbracast::geometry::DVec2;
 use umbracast::{Config, Error, Health, Mode};
 use umbracast_eval::run::ablate::{self, DataSet, Source};
 use umbracast_eval::run::chain::{SceneSpec, drawn_scenes};
@@ -107,16 +108,17 @@ fn recorded(args: &Ablate, folder: &Path) -> Result<Vec<DataSet>, Error> {
     let walkers = ["08-1x", "16-1", "32-1xx"];
     let walkers: Vec<PathBuf> =
         walkers.iter().map(|name| folder.join(format!("circle_antipode/circle-10m-{name}.txt"))).collect();
-    let replay = |seconds, unit, fps| Replay { fps, unit, smooth: 0.12, seconds };
+    let replay = |seconds, unit, fps| Replay { fps, unit, smooth: 0.12, seconds, centre: true };
     let in_cm = replay(None, Some(Unit::Centimetre), Some(25.0));
+    let site = Config::default().site;
     let bottleneck = [folder.join("pedpy/040_c_56_h-.txt")];
     Ok(vec![
         set("cmu-walk", Config::default(), dressed(crowd, Kind::CmuWalk, Some(gait))?),
-        set("walkers", Config::default(), crowds::recorded_scenes(&walkers, &in_cm, args.seed)?.0),
+        set("walkers", Config::default(), crowds::recorded_scenes(&site, &walkers, &in_cm, args.seed)?.0),
         set(
             "bottleneck",
             Config::default(),
-            crowds::recorded_scenes(&bottleneck, &replay(Some(10.0), None, None), args.seed)?.0,
+            crowds::recorded_scenes(&site, &bottleneck, &replay(Some(10.0), None, None), args.seed)?.0,
         ),
         labelled(&folder.join("logictronix_vlp16"))?,
     ])
@@ -141,10 +143,8 @@ fn labelled(folder: &Path) -> Result<DataSet, Error> {
     let file = folder.join("labels.csv");
     let pose = config.site.sensors[0].site_from_sensor();
     let mut labels = labels::parse(&setup::read_text(&file)?, &pose, &file.display().to_string())?;
-    let hall = config.site.hall;
-    let watched = |row: &umbracast_io::rows::PeopleRow| {
-        2.0 * row.x_m.abs() <= hall.length_m && 2.0 * row.y_m.abs() <= hall.width_m
-    };
+    let hall = &config.site.hall;
+    let watched = |row: &umbracast_io::rows::PeopleRow| hall.contains(DVec2::new(row.x_m, row.y_m));
     labels.retain(|row| frames.iter().any(|frame| frame.index == row.frame) && watched(row));
     Ok(DataSet { name: "logictronix".to_owned(), config, source: Source::Labelled { frames, labels } })
 }

@@ -24,7 +24,7 @@ pub fn run(args: &Demo, common: &Common) -> Result<Ending, Error> {
              links they block.\n"
         ));
     }
-    let scenes = chain::drawn_scenes(&[args.crowd.preset], 1, args.crowd.people, seed);
+    let scenes = chain::scenes_in(&configs[0].site, &[args.crowd.preset], 1, args.crowd.people, seed)?;
     let ending =
         evaluate::in_memory(configs, setup::weights(None)?, (scenes, Vec::new()), Some(&args.out), common)?;
     if !common.json && cfg!(feature = "serve") {

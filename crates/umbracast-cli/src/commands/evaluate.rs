@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use umbracast::forecast::Weights;
+use umbracast::geometry::DVec2;
 use umbracast::site::AccessPoint;
 use umbracast::{Config, Error, Health, Mode};
 use umbracast_eval::report::{self, Context, Kept};
@@ -34,15 +35,16 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
         (None, ..) => {
             let seed = args.seed.unwrap_or(TEST_SEED);
             let scenes = args.scenes.unwrap_or(1) as usize;
-            let drawn = match args.trajectories.is_empty() {
-                true => (chain::drawn_scenes(&args.preset, scenes, args.people, seed), Vec::new()),
-                false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed)?,
-            };
             let configs = args
                 .mode
                 .iter()
                 .map(|&mode| setup::config(mode, args.site.site.as_deref()))
                 .collect::<Result<Vec<Config>, _>>()?;
+            let site = &configs[0].site;
+            let drawn = match args.trajectories.is_empty() {
+                true => crowds::drawn_scenes(site, &args.preset, scenes, args.people, seed)?,
+                false => crowds::recorded_scenes(site, &args.trajectories, &args.replay, seed)?,
+            };
             let weights = setup::weights(args.weights.as_deref())?;
             let (scenes, mut told) = crowds::dressed(drawn, &args.bodies)?;
             told.extend(crowds::through_walls(&scenes, &configs[0].site));
@@ -215,8 +217,7 @@ fn against_labels(dir: &Path, file: &Path, args: &Evaluate, common: &Common) -> 
         None => tracks.iter().map(|row| row.frame).collect(),
     };
     // The hall is what is watched; not every mode cuts what lies outside.
-    let hall = config.site.hall;
-    let watched = |x_m: f64, y_m: f64| 2.0 * x_m.abs() <= hall.length_m && 2.0 * y_m.abs() <= hall.width_m;
+    let watched = |x_m: f64, y_m: f64| config.site.hall.contains(DVec2::new(x_m, y_m));
     let tracks: Vec<TrackRow> = tracks.into_iter().filter(|row| watched(row.x_m, row.y_m)).collect();
     let labels: Vec<PeopleRow> = labels
         .into_iter()

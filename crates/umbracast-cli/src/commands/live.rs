@@ -17,7 +17,7 @@ use umbracast_live::record::RecordSettings;
 use umbracast_live::run::{Counters, needs_restart};
 use umbracast_live::send::{self, Sent};
 use umbracast_live::{HostClock, Live, Settings, Summary};
-use umbracast_sim::crowd::Stroll;
+use umbracast_sim::crowd::{Ground, Stroll};
 use umbracast_sim::sensor::Sensors;
 
 use crate::args::{self, Common, LogForm, RecordArgs};
@@ -192,7 +192,9 @@ fn demonstration(
     let to: Vec<SocketAddr> =
         to.iter().map(|at| SocketAddr::from((Ipv4Addr::LOCALHOST, at.port()))).collect();
     let sensors = Sensors::new(&site, seed)?;
-    let stroll = Stroll::new(preset, people, CIRCLE_M, seed);
+    let ground = Ground::of(&site, CIRCLE_M)?;
+    ground.hold(people)?;
+    let stroll = Stroll::new(preset, people, &ground, seed);
     Ok(std::thread::spawn(move || {
         let first = send::frame_of_hour(clock.now_ns());
         let packets = send::ahead(send::strolling(stroll, site, sensors, seed, first));

@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use umbracast::forecast::Weights;
-use umbracast::{Config, Error, Mode};
+use umbracast::{Config, Error, Mode, Site};
 use umbracast_eval::report::{self, Context};
-use umbracast_eval::run::chain::{self, Spec};
+use umbracast_eval::run::chain::Spec;
 use umbracast_eval::run::experiment::{Experiment, Shard};
 use umbracast_eval::run::pooled;
 
@@ -32,7 +32,7 @@ pub fn run(args: &Reproduce, common: &Common) -> Result<Ending, Error> {
         .map(|mode| setup::config(mode, args.site.site.as_deref()))
         .collect::<Result<Vec<Config>, _>>()?;
     let weights = Weights::from_safetensors(&network.weights)?;
-    let (scenes, told) = scenes(args)?;
+    let (scenes, told) = scenes(args, &configs[0].site)?;
     let spec = Spec { configs, weights: Some(weights), scenes, keep: None, ladder: true };
     let folder = args.out.join(SCENES);
     let experiment = Experiment::new(&spec, &folder, &program()?, &network.weights)?;
@@ -85,13 +85,13 @@ fn run_missing(experiment: &Experiment, shard: Shard, common: &Common) -> Result
     Ok(missing.len())
 }
 
-fn scenes(args: &Reproduce) -> Result<crowds::Told, Error> {
+fn scenes(args: &Reproduce, site: &Site) -> Result<crowds::Told, Error> {
     let seed = args.crowd.seed.unwrap_or(TEST_SEED);
     if !args.trajectories.is_empty() {
-        return crowds::recorded_scenes(&args.trajectories, &args.replay, seed);
+        return crowds::recorded_scenes(site, &args.trajectories, &args.replay, seed);
     }
     let count = if args.quick { QUICK_SCENES } else { args.scenes };
-    Ok((chain::drawn_scenes(&[args.crowd.preset], count as usize, args.crowd.people, seed), Vec::new()))
+    crowds::drawn_scenes(site, &[args.crowd.preset], count as usize, args.crowd.people, seed)
 }
 
 /// The program's own bytes: scenes of another build are not mixed with this one's.
@@ -152,11 +152,12 @@ fn command(args: &Reproduce, scenes: usize) -> String {
     } else {
         command += " --trajectories";
         args.trajectories.iter().for_each(|file| command += &format!(" {}", file.display()));
-        let Replay { fps, unit, smooth, seconds } = &args.replay;
+        let Replay { fps, unit, smooth, seconds, centre } = &args.replay;
         fps.iter().for_each(|hz| command += &format!(" --fps {hz}"));
         unit.iter().for_each(|unit| command += &format!(" --unit {}", unit.name()));
         command += &format!(" --smooth {smooth}");
         seconds.iter().for_each(|seconds| command += &format!(" --seconds {seconds}"));
+        command += if *centre { " --centre" } else { "" };
     }
     command += &format!(" --seed {seed}");
     args.site.site.iter().for_each(|file| command += &named("--site", file));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use umbracast::{Config, Error, Mode};
-use umbracast_eval::run::chain::{self, EMPTY_FRAMES, SceneSpec};
+use umbracast_eval::run::chain::{EMPTY_FRAMES, SceneSpec};
 use umbracast_eval::score::scene::SceneTruth;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables::TableWriter;
@@ -30,8 +30,8 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
     let seed = args.crowd.seed.unwrap_or(TEST_SEED);
     let (preset, count) = (args.crowd.preset, args.scenes as usize);
     let mut drawn = match args.trajectories.is_empty() {
-        true => (chain::drawn_scenes(&[preset], count, args.crowd.people, seed), Vec::new()),
-        false => crowds::recorded_scenes(&args.trajectories, &args.replay, seed)?,
+        true => crowds::drawn_scenes(&config.site, &[preset], count, args.crowd.people, seed)?,
+        false => crowds::recorded_scenes(&config.site, &args.trajectories, &args.replay, seed)?,
     };
     if let Some(seconds) = args.stroll {
         for scene in &mut drawn.0 {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use indicatif::ProgressBar;
-use umbracast::Error;
+use umbracast::{Config, Error};
 use umbracast_train::axis::train_axis;
 use umbracast_train::body::fit_body;
 use umbracast_train::departures::{ResidualOptions, train_residual};
@@ -59,7 +59,8 @@ fn axis(fitted: &Fitted, common: &Common) -> Result<String, Error> {
 
 fn residual(args: &TrainResidual, common: &Common) -> Result<String, Error> {
     let end = args.first_scene.saturating_add(args.scenes);
-    let (recorded, _) = crowds::recorded_scenes(&args.trajectories, &args.replay, end)?;
+    let site = Config::default().site;
+    let (recorded, _) = crowds::recorded_scenes(&site, &args.trajectories, &args.replay, end)?;
     let options = ResidualOptions {
         scenes: args.first_scene..end,
         recorded: recorded.into_iter().map(|scene| (scene.group.clone(), scene.crowd())).collect(),

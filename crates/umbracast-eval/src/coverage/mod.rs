@@ -81,8 +81,9 @@ impl Place {
 /// A step, height or number of headings that cannot be, a site without sensors or floor, a sensor that cannot be
 /// simulated.
 pub fn survey(site: &Site, options: Options) -> Result<Coverage, Error> {
-    let floor_m = DVec2::new(site.hall.length_m, site.hall.width_m) * 0.5 - ELBOW_ROOM_M;
-    check(site, &options, floor_m)?;
+    let [least_m, most_m] = site.hall.bounds_m();
+    let (least_m, most_m) = (least_m + ELBOW_ROOM_M, most_m - ELBOW_ROOM_M);
+    check(site, &options, most_m - least_m)?;
     let survey = Survey::new(site, &Sensors::new(site, 0)?);
     let bodies: Vec<(Walker, f64)> = (0..options.headings)
         .map(|i| {
@@ -90,9 +91,10 @@ pub fn survey(site: &Site, options: Options) -> Result<Coverage, Error> {
             (standing(options.height_m, i as u64), heading_rad)
         })
         .collect();
-    let most = (floor_m / options.step_m).floor().as_i64vec2();
-    let positions: Vec<DVec2> = (-most.y..=most.y)
-        .flat_map(|j| (-most.x..=most.x).map(move |i| DVec2::new(i as f64, j as f64) * options.step_m))
+    let least = (least_m / options.step_m).ceil().as_i64vec2();
+    let most = (most_m / options.step_m).floor().as_i64vec2();
+    let positions: Vec<DVec2> = (least.y..=most.y)
+        .flat_map(|j| (least.x..=most.x).map(move |i| DVec2::new(i as f64, j as f64) * options.step_m))
         .filter(|&position_m| is_floor(site, position_m))
         .collect();
     let look = |survey: &mut Survey, position_m| look(site, survey, &bodies, position_m);
@@ -109,10 +111,11 @@ fn check(site: &Site, options: &Options, floor_m: DVec2) -> Result<(), Error> {
         return expected("site.sensors: expected one or more", &"none");
     }
     if !(floor_m.min_element() >= 0.0 && floor_m.is_finite()) {
-        let found = format!("{} x {} m", site.hall.length_m, site.hall.width_m);
+        let DVec2 { x, y } = floor_m + 2.0 * ELBOW_ROOM_M;
+        let found = format!("{x} x {y} m");
         return expected("site.hall: expected a floor for a person to stand on", &found);
     }
-    let places = floor_m.x * floor_m.y * 4.0 / (step_m * step_m);
+    let places = floor_m.x * floor_m.y / (step_m * step_m);
     if !(step_m > 0.0 && places <= MOST_PLACES) {
         return expected("step: expected more than 0 m and at most 250000 places on the floor", &step_m);
     }
@@ -138,8 +141,9 @@ fn standing(height_m: f64, seed: u64) -> Walker {
     Walker::new(trajectory, seed)
 }
 
-/// Outside of every pillar and piece of furniture, with room for the elbows.
+/// Within the walls and outside of every pillar and piece of furniture, with room for the elbows.
 fn is_floor(site: &Site, position_m: DVec2) -> bool {
+    let in_hall = site.hall.clearance_m(position_m) >= ELBOW_ROOM_M;
     let in_pillar = site.pillars.iter().any(|pillar| {
         position_m.distance(DVec2::from_array(pillar.position_m)) < pillar.radius_m + ELBOW_ROOM_M
     });
@@ -149,7 +153,7 @@ fn is_floor(site: &Site, position_m: DVec2) -> bool {
         let half_m = DVec3::from_array(item.size_m).truncate() * 0.5;
         (own_m.abs() - half_m).max(DVec2::ZERO).length() < ELBOW_ROOM_M
     });
-    !in_pillar && !in_furniture
+    in_hall && !in_pillar && !in_furniture
 }
 
 fn look(site: &Site, survey: &mut Survey, bodies: &[(Walker, f64)], position_m: DVec2) -> Place {

@@ -59,7 +59,8 @@ pub fn svg(site: &Site, coverage: &Coverage) -> String {
 
 /// From metres to pixels.
 struct Plan {
-    half_m: DVec2,
+    least_m: DVec2,
+    most_m: DVec2,
     scale: f64,
 }
 
@@ -70,18 +71,19 @@ fn class_of(returns: f64) -> usize {
 // Writing to a String cannot fail, so what `write!` returns is let go below.
 impl Plan {
     fn of(site: &Site) -> Self {
-        let half_m = DVec2::new(site.hall.length_m, site.hall.width_m) * 0.5;
-        Self { half_m, scale: PLAN * 0.5 / half_m.max_element() }
+        let [least_m, most_m] = site.hall.bounds_m();
+        Self { least_m, most_m, scale: PLAN / (most_m - least_m).max_element() }
     }
 
     /// Pixels to the right and down.
     fn at(&self, position_m: DVec2) -> (f64, f64) {
-        let from_corner = DVec2::new(position_m.x + self.half_m.x, self.half_m.y - position_m.y) * self.scale;
+        let from_corner =
+            DVec2::new(position_m.x - self.least_m.x, self.most_m.y - position_m.y) * self.scale;
         (MARGIN.0 + from_corner.x, MARGIN.1 + from_corner.y)
     }
 
     fn size(&self) -> (f64, f64) {
-        (2.0 * self.half_m.x * self.scale, 2.0 * self.half_m.y * self.scale)
+        ((self.most_m - self.least_m) * self.scale).into()
     }
 
     /// Title, axes and an empty floor.
@@ -108,8 +110,8 @@ impl Plan {
             coverage.options.step_m,
         );
         let bottom = top + height;
-        for metre in ticks(self.half_m.x) {
-            let (x, _) = self.at(DVec2::new(metre, 0.0));
+        for metre in ticks(self.least_m.x, self.most_m.x) {
+            let (x, _) = self.at(DVec2::new(metre, self.least_m.y));
             let _ = writeln!(
                 svg,
                 "<path stroke=\"#888888\" d=\"M{x:.1} {bottom:.1}v5\"/>\
@@ -117,8 +119,8 @@ impl Plan {
                 bottom + 19.0
             );
         }
-        for metre in ticks(self.half_m.y) {
-            let (_, y) = self.at(DVec2::new(0.0, metre));
+        for metre in ticks(self.least_m.y, self.most_m.y) {
+            let (_, y) = self.at(DVec2::new(self.least_m.x, metre));
             let _ = writeln!(
                 svg,
                 "<path stroke=\"#888888\" d=\"M{left} {y:.1}h-5\"/>\
@@ -167,7 +169,6 @@ impl Plan {
 
     /// Walls, pillars, furniture, and the circle of the paper's scene where it fits in.
     fn standing(&self, site: &Site) -> String {
-        let (width, height) = self.size();
         let mut svg = String::from("<g fill=\"#8a8a8a\" stroke=\"#333333\" stroke-width=\"1.2\">\n");
         for pillar in &site.pillars {
             let (x, y) = self.at(DVec2::from_array(pillar.position_m));
@@ -186,14 +187,9 @@ impl Plan {
                 -item.yaw_deg
             );
         }
-        let (left, top) = MARGIN;
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{left}\" y=\"{top}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"none\" \
-             stroke-width=\"2\"/>\n</g>"
-        );
+        svg += &self.walls(site);
         if has_circle(site) {
-            let (x, y) = self.at(DVec2::ZERO);
+            let (x, y) = self.at(site.hall.middle_m());
             let radius = CIRCLE_M * self.scale;
             let _ = writeln!(
                 svg,
@@ -202,6 +198,22 @@ impl Plan {
             );
         }
         svg
+    }
+
+    fn walls(&self, site: &Site) -> String {
+        let ((left, top), (width, height)) = (MARGIN, self.size());
+        if site.hall.outline_m.is_empty() {
+            return format!(
+                "<rect x=\"{left}\" y=\"{top}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"none\" \
+                 stroke-width=\"2\"/>\n</g>\n"
+            );
+        }
+        let corners = site.hall.corners().into_iter().map(|corner| {
+            let (x, y) = self.at(corner);
+            format!("{x:.1},{y:.1}")
+        });
+        let corners = corners.collect::<Vec<_>>().join(" ");
+        format!("<polygon points=\"{corners}\" fill=\"none\" stroke-width=\"2\"/>\n</g>\n")
     }
 
     /// A square, and an arrow where it looks.
@@ -292,14 +304,14 @@ fn follows(start_m: DVec2, count: usize, place: &Place, step_m: f64) -> bool {
 
 /// Does the circle of the paper's scene lie within the hall?
 fn has_circle(site: &Site) -> bool {
-    2.0 * CIRCLE_M <= site.hall.length_m.min(site.hall.width_m)
+    site.hall.clearance_m(site.hall.middle_m()) >= CIRCLE_M
 }
 
 /// Every five metres, or every metre in a small hall.
-fn ticks(half_m: f64) -> impl Iterator<Item = f64> {
-    let step_m = if half_m > 6.0 { 5.0 } else { 1.0 };
-    let most = (half_m / step_m).floor() as i64;
-    (-most..=most).map(move |i| i as f64 * step_m)
+fn ticks(least_m: f64, most_m: f64) -> impl Iterator<Item = f64> {
+    let step_m = if most_m - least_m > 12.0 { 5.0 } else { 1.0 };
+    let (least, most) = ((least_m / step_m).ceil() as i64, (most_m / step_m).floor() as i64);
+    (least..=most).map(move |i| i as f64 * step_m)
 }
 
 fn square(x: f64, y: f64) -> String {

@@ -77,8 +77,9 @@ pub struct Region {
 /// A floor without a place to stand on.
 pub fn summary(site: &Site, coverage: &Coverage) -> Result<Summary, Error> {
     let all: Vec<&Place> = coverage.places.iter().collect();
+    let middle_m = site.hall.middle_m();
     let circle: Vec<&Place> =
-        all.iter().copied().filter(|place| place.position_m.length() <= CIRCLE_M).collect();
+        all.iter().copied().filter(|place| place.position_m.distance(middle_m) <= CIRCLE_M).collect();
     let several = site.sensors.len() > 1;
     let mut rows: Vec<Row> = row("the whole floor".to_owned(), &all, None, several).into_iter().collect();
     if rows.is_empty() {

@@ -10,8 +10,8 @@ pub type Window = ((f64, f64), (f64, f64));
 
 /// The walls.
 pub fn walls(site: &Site) -> Outline {
-    let (x, y) = (site.hall.length_m / 2.0, site.hall.width_m / 2.0);
-    closed([(-x, -y), (x, -y), (x, y), (-x, y)])
+    let corners: Vec<(f64, f64)> = site.hall.corners().into_iter().map(<(f64, f64)>::from).collect();
+    closed(&corners)
 }
 
 /// Pillars and furniture.
@@ -29,7 +29,7 @@ pub fn standing(site: &Site) -> Vec<Outline> {
             let (u, v) = (along * piece.size_m[0] / 2.0, across * piece.size_m[1] / 2.0);
             (piece.position_m[0] + u * cos - v * sin, piece.position_m[1] + u * sin + v * cos)
         };
-        closed([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)])
+        closed(&[corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)])
     });
     pillars.chain(furniture).collect()
 }
@@ -62,8 +62,8 @@ pub fn scale_bar_m((x, _): Window) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|round| round * decade).find(|&bar_m| bar_m <= fifth).unwrap_or(decade)
 }
 
-fn closed(corners: [(f64, f64); 4]) -> Outline {
-    vec![corners[0], corners[1], corners[2], corners[3], corners[0]]
+fn closed(corners: &[(f64, f64)]) -> Outline {
+    corners.iter().chain(corners.first()).copied().collect()
 }
 
 #[cfg(test)]

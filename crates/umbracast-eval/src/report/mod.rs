@@ -2,6 +2,7 @@
 
 pub mod published;
 pub mod tables;
+mod causes;
 pub mod compare;
 mod long_table;
 mod ladder_table;
@@ -79,7 +80,9 @@ pub fn to_text(scores: &Scores, site: &Site) -> String {
     shown.extend((scores.groups.len() > 1).then(|| tables::presets(scores)));
     shown.extend([tables::tracking(group), tables::displacement(group, published)]);
     shown.extend(tables::losses(group));
+    shown.push(causes::causes(group));
     shown.push(tables::figures_by_preset(scores, published));
+    shown.retain(|table| !table.rows.is_empty());
     shown.iter().map(Table::to_text).collect::<Vec<_>>().join("\n")
 }
 
@@ -99,6 +102,7 @@ fn tables(scores: &Scores, published: bool) -> Vec<Table> {
     all.extend((scores.groups.len() > 1).then(|| tables::presets(scores)));
     all.extend([tables::tracking(group), tables::displacement(group, published)]);
     all.push(tables::figures_by_preset(scores, published));
+    all.push(causes::causes(group));
     all.push(tables::times(group));
     for access_point in group.access_points() {
         all.push(tables::baselines(group, access_point));

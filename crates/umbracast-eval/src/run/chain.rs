@@ -9,7 +9,7 @@ use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Pipeline, Site};
 use umbracast_io::rows;
 use umbracast_sim::body::Bodies;
-use umbracast_sim::crowd::{self, Crowd, Preset};
+use umbracast_sim::crowd::{self, Crowd, Ground, Preset};
 use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
 
@@ -61,6 +61,8 @@ pub enum People {
         preset: Preset,
         /// How many they are.
         people: usize,
+        /// Where.
+        ground: Ground,
     },
     /// Trajectories from elsewhere.
     Replayed(Crowd),
@@ -69,11 +71,9 @@ pub enum People {
 impl SceneSpec {
     /// Everybody's trajectory.
     pub fn crowd(&self) -> Crowd {
-        let seed = self.seed;
         match &self.people {
             People::Replayed(crowd) => crowd.clone(),
-            People::Drawn { preset: Preset::Mixed, people } => crowd::mixed::crowd(*people, CIRCLE_M, seed),
-            People::Drawn { preset, people } => crowd::circle_crossing(*preset, *people, CIRCLE_M, seed),
+            People::Drawn { preset, people, ground } => crowd::drawn(*preset, *people, ground, self.seed),
         }
     }
 }
@@ -100,14 +100,41 @@ pub struct SceneResult {
     pub kept: Option<(SceneTruth, Vec<SceneRun>)>,
 }
 
-/// `scenes` scenes of each preset. Seeds count on from preset to preset, so that no two scenes share bodies and
+/// `scenes` scenes of each preset, on the paper's circle. Seeds count on from preset to preset, so that no two scenes share bodies and
 /// noise: scene i of preset k has the seed `first_seed` + k * `scenes` + i.
 pub fn drawn_scenes(presets: &[Preset], scenes: usize, people: usize, first_seed: u64) -> Vec<SceneSpec> {
+    scenes_on(&Ground::circle(CIRCLE_M), presets, scenes, people, first_seed)
+}
+
+/// The same in the hall of a site: across the circle where it fits, else over the floor.
+///
+/// # Errors
+/// A hall that has no room for so many.
+pub fn scenes_in(
+    site: &Site,
+    presets: &[Preset],
+    scenes: usize,
+    people: usize,
+    first_seed: u64,
+) -> Result<Vec<SceneSpec>, Error> {
+    let in_site = |error: Error| error.within(format!("site {:?}", site.name));
+    let ground = Ground::of(site, CIRCLE_M).map_err(in_site)?;
+    ground.hold(people).map_err(in_site)?;
+    Ok(scenes_on(&ground, presets, scenes, people, first_seed))
+}
+
+fn scenes_on(
+    ground: &Ground,
+    presets: &[Preset],
+    scenes: usize,
+    people: usize,
+    first_seed: u64,
+) -> Vec<SceneSpec> {
     let of_presets = presets.iter().flat_map(|&preset| std::iter::repeat_n(preset, scenes));
     let scene = |(seed, preset): (u64, Preset)| SceneSpec {
         group: preset.name().to_owned(),
         seed,
-        people: People::Drawn { preset, people },
+        people: People::Drawn { preset, people, ground: ground.clone() },
         bodies: Bodies::default(),
     };
     (first_seed..).zip(of_presets).map(scene).collect()

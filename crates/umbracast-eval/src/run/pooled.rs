@@ -251,8 +251,13 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
                 let of_scenes: Vec<&LinkCounts> =
                     scenes.iter().filter_map(|scene| scene.said.get(i)?.access_points.get(a)).collect();
                 let mut windows = windows(&bootstrap, &of_scenes);
-                if said.predictor != Predictor::Run {
+                let is_cause = Predictor::CAUSES.iter().any(|(cause, _)| *cause == said.predictor);
+                if said.predictor != Predictor::Run && !is_cause {
                     windows.iter_mut().for_each(|scores| scores.bins.clear());
+                }
+                let ever = windows.iter().any(|scores| scores.counts.recall().is_some());
+                if is_cause && !ever {
+                    continue;
                 }
                 links.push(LinkScores {
                     mode: said.mode,
@@ -261,6 +266,11 @@ fn group(name: &str, scenes: &[&SceneScore], access_points: &[String]) -> Group 
                     windows,
                 });
             }
+        }
+        // Where nothing but others blocks, anything is no news.
+        let [own, hall, any] = Predictor::CAUSES.map(|(cause, _)| cause.name());
+        if !links.iter().any(|of: &LinkScores| of.predictor == own || of.predictor == hall) {
+            links.retain(|of| of.predictor != any);
         }
         modes = (0..first.modes.len()).map(|m| mode_scores(&bootstrap, scenes, m)).collect();
         let pooled = sum(scenes.iter().map(|scene| &scene.constant_velocity));

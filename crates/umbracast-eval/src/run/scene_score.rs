@@ -14,7 +14,7 @@ use crate::oracle::true_bodies::true_bodies;
 use crate::oracle::true_forecasts::TrueForecasts;
 use crate::score::device::bound_once;
 use crate::score::displacement::Displacement;
-use crate::score::instances::instances;
+use crate::score::instances::{Cause, instances, instances_of};
 use crate::score::link_counts::{LinkCounts, Prediction};
 use crate::score::links::{Said, never, persistence_of_truth};
 use crate::score::matching::match_scene;
@@ -27,6 +27,12 @@ use crate::score::times::Times;
 pub enum Predictor {
     /// The mode itself.
     Run,
+    /// The mode's chance of being blocked by the owner's own body; scored against that.
+    ByOwner,
+    /// The same by the hall.
+    ByHall,
+    /// The same by others, the owner or the hall.
+    ByAny,
     /// The mode itself, heard through devices that are bound to a track once ([`crate::score::device`]).
     BoundOnce,
     /// The mode with Algorithm 1 on axis-aligned boxes for its stage 3.
@@ -50,10 +56,17 @@ pub enum Predictor {
 }
 
 impl Predictor {
+    /// Those that are scored against another truth than all others, with what that is.
+    pub const CAUSES: [(Self, Cause); 3] =
+        [(Self::ByOwner, Cause::Owner), (Self::ByHall, Cause::Hall), (Self::ByAny, Cause::Any)];
+
     /// As tables and files call it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Run => "run",
+            Self::ByOwner => "blocked by the owner",
+            Self::ByHall => "blocked by the hall",
+            Self::ByAny => "blocked by anything",
             Self::BoundOnce => "run with devices bound once",
             Self::Aabb => "AABB",
             Self::Obb => "OBB",
@@ -141,15 +154,17 @@ pub fn score_scene(
     let instances = instances(&index);
     let site_access_points = runs.first().map_or(0, |run| run.config.site.access_points.len()) as u32;
     let mut said = Vec::new();
-    let mut add = |mode: Option<Mode>, predictor: Predictor, predictions: Vec<Prediction>| {
+    let of_others = |mode: Option<Mode>, predictor: Predictor, predictions: Vec<Prediction>| {
         let access_points = LinkCounts::each(&instances, &predictions, site_access_points);
-        said.push(PredictorCounts { mode, predictor, access_points });
+        PredictorCounts { mode, predictor, access_points }
     };
-    add(None, Predictor::Never, never(&instances));
-    add(None, Predictor::PersistenceOfTruth, persistence_of_truth(&instances));
+    said.push(of_others(None, Predictor::Never, never(&instances)));
+    said.push(of_others(None, Predictor::PersistenceOfTruth, persistence_of_truth(&instances)));
+    let by_cause = Predictor::CAUSES.map(|(_, cause)| instances_of(&index, cause));
     let (mut modes, mut true_forecasts) = (Vec::new(), TrueForecasts::default());
     for ModeRun { config, rows, health } in runs {
         let mode = Some(config.mode);
+        let mut add = |mode, predictor, predictions| said.push(of_others(mode, predictor, predictions));
         let matching = match_scene(&truth.people, &rows.tracks);
         let own = Said::by_run(rows);
         let of_tracks = |said: Said| said.of_tracks(&instances, &matching);
@@ -170,6 +185,12 @@ pub fn score_scene(
         add(mode, Predictor::TrueFuture, of_tracks(replaced::true_future(&index, rows, &matching, config)));
         if let Some(walkers) = walkers {
             add(mode, Predictor::TrueBody, of_tracks(true_bodies(rows, &matching, walkers, &config.site)));
+        }
+        for ((predictor, cause), of_cause) in Predictor::CAUSES.into_iter().zip(&by_cause) {
+            let threshold = config.blockage.threshold;
+            let predictions = Said::by_cause(rows, cause, threshold).of_tracks(of_cause, &matching);
+            let access_points = LinkCounts::each(of_cause, &predictions, site_access_points);
+            said.push(PredictorCounts { mode, predictor, access_points });
         }
         modes.push(ModeSums {
             mode: config.mode,

@@ -2,8 +2,35 @@
 
 use umbracast::STEPS;
 use umbracast::track::OBSERVED;
+use umbracast_io::rows::PeopleLinkRow;
 
 use crate::score::scene::TruthIndex;
+
+/// What blocks a link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// Other people's bodies. A link that hall or furniture blocks does not count.
+    Others,
+    /// The owner's own body. While the UE is inside it, a link does not count.
+    Owner,
+    /// Walls, pillars and furniture.
+    Hall,
+    /// Any of them.
+    Any,
+}
+
+impl Cause {
+    /// Whether it blocks a link; `None` where that does not count.
+    fn blocks(self, link: &PeopleLinkRow) -> Option<bool> {
+        let by_owner = link.self_blocked == Some(true);
+        match self {
+            Self::Others => (!link.static_blocked).then_some(link.blocked),
+            Self::Owner => link.self_blocked,
+            Self::Hall => Some(link.static_blocked),
+            Self::Any => Some(link.blocked || link.static_blocked || by_owner),
+        }
+    }
+}
 
 /// One link at one instant `t_e`, with what really happened after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,10 +61,17 @@ impl Instance {
 /// A person of the truth counts at `t_e` when not arrived then, with truth in the 10 frames up to and with `t_e`
 /// and in the 9 after. A link counts when nothing of hall or furniture blocks it in any of those frames.
 pub fn instances(truth: &TruthIndex) -> Vec<Instance> {
+    instances_of(truth, Cause::Others)
+}
+
+/// The same where another cause is asked for.
+pub fn instances_of(truth: &TruthIndex, cause: Cause) -> Vec<Instance> {
     let mut all = Vec::new();
     for &access_point in &truth.access_points {
         for &person in &truth.persons {
-            all.extend(truth.frames.iter().filter_map(|&frame| instance(truth, access_point, person, frame)));
+            all.extend(
+                truth.frames.iter().filter_map(|&frame| instance(truth, cause, access_point, person, frame)),
+            );
         }
     }
     all
@@ -54,24 +88,29 @@ fn around(frame: u64) -> Option<std::ops::RangeInclusive<u64>> {
     Some(frame.checked_sub(OBSERVED as u64 - 1)?..=frame + STEPS as u64)
 }
 
-fn instance(truth: &TruthIndex, access_point: u32, person: u32, frame: u64) -> Option<Instance> {
+fn instance(
+    truth: &TruthIndex,
+    cause: Cause,
+    access_point: u32,
+    person: u32,
+    frame: u64,
+) -> Option<Instance> {
     if !person_counts(truth, person, frame) {
         return None;
     }
     for k in around(frame)? {
-        if truth.link(k, person, access_point)?.static_blocked {
-            return None;
-        }
+        cause.blocks(truth.link(k, person, access_point)?)?;
     }
     let now = truth.link(frame, person, access_point)?;
+    let is_blocked = |link: &PeopleLinkRow| cause.blocks(link) == Some(true);
     let blocked_at =
-        |step: usize| truth.link(frame + step as u64, person, access_point).is_some_and(|link| link.blocked);
+        |step: usize| truth.link(frame + step as u64, person, access_point).is_some_and(is_blocked);
     Some(Instance {
         access_point,
         person,
         frame,
         time_ns: now.time_ns,
-        blocked_now: now.blocked,
+        blocked_now: is_blocked(now),
         first_blocked: (1..=STEPS).find(|&step| blocked_at(step)),
     })
 }
@@ -126,6 +165,24 @@ mod tests {
         let all = instances(&TruthIndex::new(&truth));
         let last = |person| all.iter().filter(|i| i.person == person).map(|i| i.frame).max();
         assert_eq!((last(0), last(1)), (Some(30), Some(29)));
+    }
+
+    #[test]
+    fn every_cause_has_its_own_instances_and_truth() {
+        let mut truth = truth_of(1, 40, |_, frame| frame == 12);
+        for row in &mut truth.links {
+            row.static_blocked = row.frame == 36;
+            row.self_blocked = (row.frame < 30).then_some(row.frame == 14);
+        }
+        let index = TruthIndex::new(&truth);
+        let of = |cause| instances_of(&index, cause);
+        let firsts = |cause| of(cause).iter().map(|i| i.first_blocked).take(4).collect::<Vec<_>>();
+        assert_eq!(firsts(Cause::Others), [Some(3), Some(2), Some(1), None]);
+        assert_eq!(firsts(Cause::Owner), [Some(5), Some(4), Some(3), Some(2)]);
+        assert_eq!(firsts(Cause::Any), [Some(3), Some(2), Some(1), Some(2)]);
+        let last = |cause| of(cause).last().map(|i| i.frame);
+        let lasts = [Cause::Others, Cause::Owner, Cause::Hall, Cause::Any].map(last);
+        assert_eq!(lasts, [Some(26), Some(20), Some(30), Some(30)]);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use umbracast::STEPS;
 use umbracast::blockage::Blockage;
 
-use crate::score::instances::Instance;
+use crate::score::instances::{Cause, Instance};
 use crate::score::link_counts::Prediction;
 use crate::score::scene::{Matching, SceneRun};
 
@@ -24,6 +24,24 @@ impl Said {
             let window = Prediction { blocked: row.blocked, p: row.p };
             let now = Prediction { blocked: [row.blocked_now; STEPS], p: [row.p_now; STEPS] };
             said.by_link.insert((row.frame, row.access_point, row.track), (window, now));
+        }
+        said
+    }
+
+    /// By a run, of its tracks, of one cause; from `threshold` on a link counts as blocked.
+    pub fn by_cause(run: &SceneRun, cause: Cause, threshold: f64) -> Self {
+        let mut said = Self::default();
+        for row in &run.links {
+            let p = match cause {
+                Cause::Others => return Self::by_run(run),
+                Cause::Owner => row.p_own,
+                Cause::Hall => row.p_hall,
+                Cause::Any => row.p_any,
+            };
+            let p = p.map(Option::unwrap_or_default);
+            let of = |p: [f64; STEPS]| Prediction { blocked: p.map(|p| p >= threshold), p };
+            let window = of(std::array::from_fn(|w| p[w + 1]));
+            said.by_link.insert((row.frame, row.access_point, row.track), (window, of([p[0]; STEPS])));
         }
         said
     }

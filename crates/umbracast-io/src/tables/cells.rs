@@ -218,5 +218,15 @@ impl Row for LinkRow {
                 see(Name(name, Some(percent), "_s"), Cell::MaybeF64(value));
             }
         }
+        for (now, within, chances) in [
+            ("p_own_now", "p_own_w", &mut self.p_own),
+            ("p_hall_now", "p_hall_w", &mut self.p_hall),
+            ("p_any_now", "p_any_w", &mut self.p_any),
+        ] {
+            for (w, value) in chances.iter_mut().enumerate() {
+                let name = if w == 0 { plain(now) } else { Name(within, Some(w), "") };
+                see(name, Cell::MaybeF64(value));
+            }
+        }
     }
 }

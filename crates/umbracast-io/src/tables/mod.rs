@@ -229,7 +229,7 @@ mod tests {
             assert_eq!(names[..3], keys);
         }
         let links = columns::<LinkRow>();
-        assert_eq!(links.len(), 3 + 2 + 2 * (1 + STEPS) + 2 * 3);
+        assert_eq!(links.len(), 3 + 2 + 2 * (1 + STEPS) + 2 * 3 + 3 * (1 + STEPS));
         assert!(
             ["blocked_now", "blocked_w1", "blocked_w9", "p_now", "p_w9", "onset_p10_s", "duration_p90_s"]
                 .iter()
@@ -287,6 +287,27 @@ mod tests {
         let expected = "scene,frame,time_ns,access_point,person,blocked,static_blocked,self_blocked\n\
                         0,4,500,\"centre, north\",0,true,false,\n";
         assert_eq!(text, expected);
+    }
+
+    /// Tables of runs before these columns were there are read as well.
+    #[test]
+    fn a_column_that_may_be_empty_may_be_missing() {
+        #[derive(Clone, Copy, Default)]
+        struct Older(LinkRow);
+        impl Row for Older {
+            const TABLE: &'static str = LinkRow::TABLE;
+            fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+                self.0.visit(&mut |name, cell| {
+                    if !matches!(cell, Cell::MaybeF64(_)) {
+                        see(name, cell);
+                    }
+                });
+            }
+        }
+        let directory = tempfile::tempdir().unwrap();
+        let row = LinkRow { frame: 7, p_now: 0.25, ..LinkRow::default() };
+        write(directory.path(), &access_points(), false, &[Older(row)]).unwrap();
+        assert_eq!(read::<LinkRow>(directory.path(), &access_points()).unwrap(), [row]);
     }
 
     fn error_of<R: Row + std::fmt::Debug>(directory: &Path, access_points: &[String]) -> String {

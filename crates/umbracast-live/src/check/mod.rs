@@ -226,9 +226,7 @@ fn looks(
 
 /// Whether people may be there.
 fn is_watched(site: &Site, point_m: &DVec3) -> bool {
-    point_m.x.abs() < 0.5 * site.hall.length_m
-        && point_m.y.abs() < 0.5 * site.hall.width_m
-        && (-HEIGHT_MAX_M..WATCHED_MAX_M).contains(&point_m.z)
+    site.hall.contains(point_m.truncate()) && (-HEIGHT_MAX_M..WATCHED_MAX_M).contains(&point_m.z)
 }
 
 /// Returns of the fullest frame, in the site's frame.

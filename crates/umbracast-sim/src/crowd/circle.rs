@@ -11,9 +11,9 @@ use super::trajectory::{Crowd, STEP_NS, Trajectory};
 use crate::random::stream;
 
 /// Preferred speed of everybody.
-const PREFERRED_MPS: f32 = 1.0;
+pub(super) const PREFERRED_MPS: f32 = 1.0;
 /// Between the body axes of a pair: people who walk hand in hand or talk.
-const PAIR_GAP_M: f64 = 0.5;
+pub(super) const PAIR_GAP_M: f64 = 0.5;
 /// A scene of people who cross a circle. A scene in which not all arrive or somebody turns back at once is
 /// dropped and drawn anew.
 ///

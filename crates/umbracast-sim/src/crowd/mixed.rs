@@ -19,14 +19,14 @@ use crate::random::stream;
 const SPEED_MPS: (f32, f32) = (1.34, 0.26);
 const SPEED_LIMITS_MPS: (f32, f32) = (0.6, 2.0);
 /// To evade, people walk so much faster than they like to.
-const HURRY: f32 = 1.3;
+pub(super) const HURRY: f32 = 1.3;
 /// People stop within two steps; starts are gentler, but one limit keeps avoidance predictable.
-const MOST_ACCELERATION_MPS2: f32 = 2.0;
+pub(super) const MOST_ACCELERATION_MPS2: f32 = 2.0;
 /// Everybody sets off within so long.
-const LATEST_START_S: f32 = 5.0;
+pub(super) const LATEST_START_S: f32 = 5.0;
 /// Share of parties that stop on the way, and for how long.
-const STOPPING: f64 = 0.25;
-const STOP_S: std::ops::Range<f32> = 2.0..6.0;
+pub(super) const STOPPING: f64 = 0.25;
+pub(super) const STOP_S: std::ops::Range<f32> = 2.0..6.0;
 /// Share of parties that turn to another goal on the way.
 const TURNING: f64 = 0.3;
 /// Where on the way to the first goal they do.
@@ -39,7 +39,7 @@ const GAP_M: std::ops::Range<f64> = 0.5..0.6;
 /// Of the free disc around one person.
 const RADIUS_M: f32 = 0.3;
 /// Starts and goals leave this between the discs.
-const CLEARANCE_M: f32 = 0.2;
+pub(super) const CLEARANCE_M: f32 = 0.2;
 /// A group's row turns no faster: the outer of three then walks 0.6 m/s faster or slower.
 const MOST_TURN_RADPS: f32 = 1.0;
 /// Nor does its turning change faster: 1.1 m/s^2 for the outer of three.
@@ -49,7 +49,7 @@ const TURN_S: f32 = 0.5;
 /// A row follows the direction of motion only when there is one.
 const LEAST_SPEED_MPS: f32 = 0.2;
 /// A scene in which strangers come nearer than this is dropped: their bodies would touch.
-const APART_M: f64 = 0.45;
+pub(super) const APART_M: f64 = 0.45;
 
 /// People who walk together: one, or a row.
 struct Party {
@@ -65,29 +65,46 @@ struct Party {
 struct Walk {
     leg: usize,
     stands_until_s: f32,
-    /// Of the way; the row stands across it.
+    row: Row,
+    arrived_ns: Option<i64>,
+}
+
+/// How a party stands: in a row across its way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    /// Of the way.
     heading_rad: f32,
     turn_radps: f32,
-    arrived_ns: Option<i64>,
 }
 
 /// A mixed crowd that crosses a circle. Scenes are dropped and drawn anew as in [`super::circle_crossing`],
 /// and when strangers come too close; turns are as sharp as people make them.
 pub fn crowd(people: usize, radius_m: f64, seed: u64) -> Crowd {
-    first_acceptable(radius_m, seed, |rng| {
-        let mut parties = Vec::new();
-        let mut left = people;
-        while left > 0 {
-            let members = match rng.random_range(0.0..1.0) {
-                u if u < SINGLES => 1,
-                u if u < UP_TO_PAIRS => 2,
-                _ => 3,
-            };
-            parties.push((members.min(left), rng.random_range(GAP_M)));
-            left -= members.min(left);
-        }
-        parties
-    })
+    first_acceptable(radius_m, seed, |rng| sizes(people, rng))
+}
+
+/// Members and gap of each party.
+pub(super) fn sizes(people: usize, rng: &mut dyn Rng) -> Vec<(usize, f64)> {
+    let mut parties = Vec::new();
+    let mut left = people;
+    while left > 0 {
+        let members = match rng.random_range(0.0..1.0) {
+            u if u < SINGLES => 1,
+            u if u < UP_TO_PAIRS => 2,
+            _ => 3,
+        };
+        parties.push((members.min(left), rng.random_range(GAP_M)));
+        left -= members.min(left);
+    }
+    parties
+}
+
+/// A group is as fast as its slowest member.
+pub(super) fn preferred_mps(members: usize, rng: &mut impl Rng) -> f32 {
+    let normal = Normal::new(SPEED_MPS.0, SPEED_MPS.1).expect("a positive deviation");
+    (0..members)
+        .map(|_| normal.sample(rng).clamp(SPEED_LIMITS_MPS.0, SPEED_LIMITS_MPS.1))
+        .fold(f32::INFINITY, f32::min)
 }
 
 /// The same, of nothing but pairs whose body axes are `gap_m` apart.
@@ -116,7 +133,7 @@ fn first_acceptable(
 }
 
 /// Radius of the disc that holds a party.
-fn disc_m(members: usize, gap_m: f64) -> f32 {
+pub(super) fn disc_m(members: usize, gap_m: f64) -> f32 {
     RADIUS_M + 0.5 * (members - 1) as f32 * gap_m as f32
 }
 
@@ -155,15 +172,11 @@ fn parties(
         goals[i] = goal;
     }
 
-    let normal = Normal::new(SPEED_MPS.0, SPEED_MPS.1).expect("a positive deviation");
     sizes
         .iter()
         .enumerate()
         .map(|(i, &(members, gap_m))| {
-            // A group is as fast as its slowest member.
-            let preferred_mps = (0..members)
-                .map(|_| normal.sample(&mut speeds).clamp(SPEED_LIMITS_MPS.0, SPEED_LIMITS_MPS.1))
-                .fold(f32::INFINITY, f32::min);
+            let preferred_mps = preferred_mps(members, &mut speeds);
             let start_s = ways.random_range(0.0..LATEST_START_S);
             let stop_s = if ways.random_bool(STOPPING) { ways.random_range(STOP_S) } else { 0.0 };
             let on_the_way = starts[i] * (1.0 - 2.0 * ways.random_range(ON_THE_WAY));
@@ -192,8 +205,7 @@ fn walk(parties: &[Party], starts: &[Vec2]) -> Crowd {
         .map(|(party, &start)| Walk {
             leg: 0,
             stands_until_s: party.start_s,
-            heading_rad: (party.legs[0].0 - start).to_angle(),
-            turn_radps: 0.0,
+            row: Row::facing(party.legs[0].0 - start),
             arrived_ns: None,
         })
         .collect();
@@ -203,11 +215,9 @@ fn walk(parties: &[Party], starts: &[Vec2]) -> Crowd {
         let mut person = 0;
         for ((party, walk), agent) in parties.iter().zip(&mut walks).zip(&mut orca.agents) {
             agent.preferred_mps = walk.prefer(party, agent.position_m, steps);
-            walk.turn(agent.velocity_mps);
-            let across = DVec2::from_angle(f64::from(walk.heading_rad)).perp() * party.gap_m;
-            for member in 0..party.members {
-                let place = member as f64 - 0.5 * (party.members - 1) as f64;
-                positions[person].push(agent.position_m.as_dvec2() + across * place);
+            walk.row.turn(agent.velocity_mps);
+            for place_m in walk.row.places(agent.position_m, party.members, party.gap_m) {
+                positions[person].push(place_m);
                 person += 1;
             }
         }
@@ -243,10 +253,23 @@ impl Walk {
         }
         Vec2::ZERO
     }
+}
+
+impl Row {
+    pub(super) fn facing(way: Vec2) -> Self {
+        Self { heading_rad: way.to_angle(), turn_radps: 0.0 }
+    }
+
+    /// Where the members are.
+    pub(super) fn places(self, middle_m: Vec2, members: usize, gap_m: f64) -> impl Iterator<Item = DVec2> {
+        let across = DVec2::from_angle(f64::from(self.heading_rad)).perp() * gap_m;
+        let place = move |member: usize| member as f64 - 0.5 * (members - 1) as f64;
+        (0..members).map(move |member| middle_m.as_dvec2() + across * place(member))
+    }
 
     /// Lets the row follow the motion. It looks the same from behind, so it never turns by more than 90 deg:
     /// those who turn back swap sides.
-    fn turn(&mut self, velocity_mps: Vec2) {
+    pub(super) fn turn(&mut self, velocity_mps: Vec2) {
         let quarter = std::f32::consts::FRAC_PI_2;
         let off = (velocity_mps.to_angle() - self.heading_rad + quarter).rem_euclid(2.0 * quarter) - quarter;
         let moving = velocity_mps.length() >= LEAST_SPEED_MPS;

@@ -6,11 +6,16 @@ pub mod orca;
 mod crossing;
 pub mod mixed;
 pub mod circle;
+pub mod floor;
+mod steering;
+mod indoors;
+mod ground;
 mod strolling;
 mod speed_augmentation;
 pub mod replay;
 
 pub use circle::circle_crossing;
+pub use ground::{Ground, drawn};
 pub use mixed::pairs;
 pub use preset::Preset;
 pub use replay::{Recorded, replay};

@@ -8,7 +8,7 @@ pub(super) const STEP_NS: i64 = 10_000_000;
 /// One person's way, sampled evenly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// Counts from 0 in a scene.
+    /// Counts from 0 in a drawn scene; of recorded people the number in their file.
     pub person: u32,
     /// Time of the first sample.
     pub start_ns: i64,
@@ -32,6 +32,15 @@ pub struct Crowd {
 }
 
 impl Crowd {
+    /// The same people elsewhere.
+    #[must_use]
+    pub fn moved(mut self, by_m: DVec2) -> Self {
+        if by_m != DVec2::ZERO {
+            self.trajectories.iter_mut().flat_map(|way| &mut way.positions_m).for_each(|at| *at += by_m);
+        }
+        self
+    }
+
     /// The same people so much later.
     #[must_use]
     pub fn later(mut self, by_ns: i64) -> Self {

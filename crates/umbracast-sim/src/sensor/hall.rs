@@ -66,6 +66,8 @@ impl HallImage {
 struct Solids {
     room_min_m: DVec3,
     room_max_m: DVec3,
+    /// Those of a room that is no rectangle along x and y.
+    walls: Vec<[DVec2; 2]>,
     pillars: Vec<(DVec2, f64)>,
     /// Pose of each box's middle and its half edges.
     boxes: Vec<(Pose, DVec3)>,
@@ -73,15 +75,17 @@ struct Solids {
 
 impl Solids {
     fn new(site: &Site) -> Self {
-        let half = DVec2::new(site.hall.length_m, site.hall.width_m) * 0.5;
+        let [least_m, most_m] = site.hall.bounds_m();
+        let is_box = site.hall.outline_m.is_empty();
         let boxes = site.furniture.iter().map(|item| {
             let size_m = DVec3::from_array(item.size_m);
             let middle_m = DVec2::from_array(item.position_m).extend(size_m.z * 0.5);
             (Pose::from_yaw_pitch_roll_deg(middle_m, item.yaw_deg, 0.0, 0.0).inverse(), size_m * 0.5)
         });
         Self {
-            room_min_m: (-half).extend(0.0),
-            room_max_m: half.extend(site.hall.height_m),
+            room_min_m: least_m.extend(0.0),
+            room_max_m: most_m.extend(site.hall.height_m),
+            walls: if is_box { Vec::new() } else { site.hall.walls().collect() },
             pillars: site.pillars.iter().map(|p| (DVec2::from_array(p.position_m), p.radius_m)).collect(),
             boxes: boxes.collect(),
         }
@@ -113,9 +117,25 @@ impl Solids {
             // A ray along a wall pair never leaves through it: x / 0 is infinite.
             (wall_m - origin_m[axis]) / direction[axis]
         };
-        let (side, end) = (exit(0).min(exit(1)), exit(2));
+        let side = match self.walls.is_empty() {
+            true => exit(0).min(exit(1)),
+            false => {
+                let meets = |of: &[DVec2; 2]| wall(origin_m.truncate(), direction.truncate(), *of);
+                self.walls.iter().filter_map(meets).fold(f64::INFINITY, f64::min)
+            }
+        };
+        let end = exit(2);
         if side < end { (side, WALL) } else { (end, if direction.z < 0.0 { FLOOR } else { CEILING }) }
     }
+}
+
+/// Where a ray meets a wall, seen from above. Both ends belong to it, so that no ray slips through a corner.
+fn wall(origin_m: DVec2, direction: DVec2, [from, to]: [DVec2; 2]) -> Option<f64> {
+    let along = to - from;
+    let across = direction.perp_dot(along);
+    let range_m = (from - origin_m).perp_dot(along) / across;
+    let share = (from - origin_m).perp_dot(direction) / across;
+    (range_m > 0.0 && (-1e-9..=1.0 + 1e-9).contains(&share)).then_some(range_m)
 }
 
 /// Where a ray, given from the axis of an upright cylinder, enters it.

@@ -110,10 +110,10 @@ impl Simulated {
             let found = sensor.rate_hz;
             return Err(Error::new(format!("rate_hz: expected more than 0 and at most 50, found {found}")));
         }
-        let hall_m = DVec3::new(site.hall.length_m, site.hall.width_m, site.hall.height_m);
-        let [x, y, z] = sensor.position_m;
-        if !(2.0 * x.abs() < hall_m.x && 2.0 * y.abs() < hall_m.y && z > 0.0 && z < hall_m.z) {
-            let found = sensor.position_m;
+        let at_m = DVec3::from_array(sensor.position_m);
+        if !(site.hall.clearance_m(at_m.truncate()) > 0.0 && at_m.z > 0.0 && at_m.z < site.hall.height_m) {
+            let [least_m, most_m] = site.hall.bounds_m();
+            let (hall_m, found) = ((most_m - least_m).extend(site.hall.height_m), sensor.position_m);
             return Err(Error::new(format!(
                 "position_m: expected a place within the hall of {hall_m} m, found {found:?}"
             )));

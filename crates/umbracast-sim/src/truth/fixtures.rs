@@ -4,10 +4,22 @@ use umbracast::Site;
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::site::{Furniture, Pillar};
 
-/// Is the segment cut by a pillar or a piece of furniture? Walls cannot: the hall is convex and holds both ends.
+/// Is the segment cut by a pillar, a piece of furniture or a wall between two places of the hall? A rectangle has none
+/// such; who looks in from outside of an outline looks in through it.
 pub fn block(site: &Site, start_m: DVec3, end_m: DVec3) -> bool {
-    site.pillars.iter().any(|pillar| pillar_blocks(pillar, start_m, end_m))
+    let indoors = !site.hall.outline_m.is_empty() && site.hall.contains(start_m.truncate());
+    (indoors && walls_block(site, start_m.truncate(), end_m.truncate()))
+        || site.pillars.iter().any(|pillar| pillar_blocks(pillar, start_m, end_m))
         || site.furniture.iter().any(|piece| furniture_blocks(piece, start_m, end_m))
+}
+
+/// Walls reach from floor to ceiling. A segment that ends on one is not cut by it.
+fn walls_block(site: &Site, start: DVec2, end: DVec2) -> bool {
+    let side = |[a, b]: [DVec2; 2], p: DVec2| (b - a).perp_dot(p - a);
+    site.hall.walls().any(|wall| {
+        side(wall, start) * side(wall, end) < 0.0
+            && side([start, end], wall[0]) * side([start, end], wall[1]) < 0.0
+    })
 }
 
 /// A pillar reaches from floor to ceiling, so only the plan view counts: is its axis nearer than its radius?

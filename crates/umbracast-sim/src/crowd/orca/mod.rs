@@ -49,8 +49,9 @@ impl Orca {
         }
     }
 
-    /// Moves everybody by one step: all choose first, then all move.
+    /// Moves everybody by one step: all choose first, then all move. Agents may have come and gone since the last.
     pub fn step(&mut self) {
+        self.next_mps.resize(self.agents.len(), Vec2::ZERO);
         self.grid.rebuild(&self.agents);
         for i in 0..self.agents.len() {
             self.next_mps[i] = self.choose_velocity(i);
