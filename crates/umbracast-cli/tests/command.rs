@@ -227,9 +227,13 @@ fn what_changes_nothing_and_who_walks_through_walls_is_told() {
     let people = fs::read_to_string(sim.join("people.csv")).expect("the truth");
     let first: Vec<&str> = people.lines().nth(1).expect("a row").split(',').collect();
     assert_eq!(first[3], "1", "the number in the file: {first:?}");
-    assert!((first[4].parse::<f64>().expect("metres") - 6.0).abs() < 0.01, "the place in the file: {first:?}");
+    assert!(
+        (first[4].parse::<f64>().expect("metres") - 6.0).abs() < 0.01,
+        "the place in the file: {first:?}"
+    );
     let centred = folder.join("centred");
-    let said = done(&["simulate", "--centre", "--trajectories", text(&trajectories), "--out", text(&centred)]);
+    let said =
+        done(&["simulate", "--centre", "--trajectories", text(&trajectories), "--out", text(&centred)]);
     assert!(said.contains("moved by (-23.00, 0.05) m to the middle of the site"), "{said}");
 }
 

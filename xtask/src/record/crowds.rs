@@ -31,7 +31,8 @@ pub fn shapes(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record shapes");
     for site in ["l-hall", "hexagon", "corridor"] {
         let file = format!("config/sites/{site}.toml");
-        let words = ["evaluate", "--mode", "default", "--scenes", "10", "--preset", "orca-03,mixed", "--site", &file];
+        let words =
+            ["evaluate", "--mode", "default", "--scenes", "10", "--preset", "orca-03,mixed", "--site", &file];
         let said = book.quietly(&words.map(OsString::from))?;
         book.line(&format!("{site}: 20 scenes of 10 people, half of them orca-03, half mixed"));
         let mut shown = false;
