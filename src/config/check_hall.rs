@@ -1,12 +1,13 @@
 //! Floor plans that cannot be.
 
-use super::check_site::{HALL_MAX_M, above_0, within};
 use crate::Error;
 use crate::geometry::DVec2;
 use crate::site::{Hall, doubled_area_m2};
 
+/// No hall is longer; a longer one is in another unit.
+pub(super) const HALL_MAX_M: f64 = 1000.0;
 /// No coordinate is larger: that of the far end of a map in UTM.
-pub(super) const FAR_M: f64 = 1e7;
+const FAR_M: f64 = 1e7;
 /// No floor is smaller, square metres: nobody could stand on it.
 const AREA_MIN_M2: f64 = 0.25;
 
@@ -76,6 +77,21 @@ fn cross([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> bool {
         || on(a, b, d)
         || on(c, d, a)
         || on(c, d, b)
+}
+
+/// Not a number is within nothing.
+pub(super) fn within(key: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {
+    match (least..=most).contains(&value) {
+        true => Ok(()),
+        false => Err(Error::new(format!("{key}: expected {least} to {most}, found {value}"))),
+    }
+}
+
+pub(super) fn above_0(key: &str, value: f64, most: f64) -> Result<(), Error> {
+    match value > 0.0 && value <= most {
+        true => Ok(()),
+        false => Err(Error::new(format!("{key}: expected more than 0 and {most} at most, found {value}"))),
+    }
 }
 
 #[cfg(test)]

@@ -1,13 +1,11 @@
 //! A site that cannot be: what stands outside the hall, angles and shares out of their range, unknown models.
 
-use super::check_hall::check_hall;
+use super::check_hall::{HALL_MAX_M, above_0, check_hall, within};
 use crate::geometry::DVec2;
 use crate::lidar::{Model, sensor_model, sensor_models};
 use crate::site::{AccessPoint, Furniture, Pillar, Sensor, Ue};
 use crate::{Error, Site};
 
-/// No hall is longer; a longer one is in another unit.
-pub(super) const HALL_MAX_M: f64 = 1000.0;
 /// A clock that is further ahead is not set: that is the assembler's to put right.
 const CLOCK_MS: f64 = 1000.0;
 
@@ -167,21 +165,6 @@ fn on_floor(key: &str, [x_m, y_m]: [f64; 2], site: &Site) -> Result<(), Error> {
 fn size_m(site: &Site) -> DVec2 {
     let [least, most] = site.hall.bounds_m();
     most - least
-}
-
-/// Not a number is within nothing.
-pub(super) fn within(key: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {
-    match (least..=most).contains(&value) {
-        true => Ok(()),
-        false => Err(Error::new(format!("{key}: expected {least} to {most}, found {value}"))),
-    }
-}
-
-pub(super) fn above_0(key: &str, value: f64, most: f64) -> Result<(), Error> {
-    match value > 0.0 && value <= most {
-        true => Ok(()),
-        false => Err(Error::new(format!("{key}: expected more than 0 and {most} at most, found {value}"))),
-    }
 }
 
 #[cfg(test)]

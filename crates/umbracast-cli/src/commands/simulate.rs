@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use umbracast::{Config, Error, Mode};
-use umbracast_eval::run::chain::{EMPTY_FRAMES, SceneSpec};
+use umbracast_eval::run::chain::{CIRCLE_M, EMPTY_FRAMES, People, SceneSpec};
 use umbracast_eval::score::scene::SceneTruth;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables::TableWriter;
-use umbracast_sim::crowd::strolling;
+use umbracast_sim::crowd::{Ground, Stroll};
 use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
 
@@ -34,9 +34,10 @@ pub fn run(args: &Simulate, common: &Common) -> Result<Ending, Error> {
         false => crowds::recorded_scenes(&config.site, &args.trajectories, &args.replay, seed)?,
     };
     if let Some(seconds) = args.stroll {
+        let ground = Ground::of(&config.site, CIRCLE_M)?;
         for scene in &mut drawn.0 {
-            let crowd = strolling(preset, args.crowd.people, chain::CIRCLE_M, scene.seed, seconds.into());
-            scene.people = chain::People::Replayed(crowd);
+            let mut stroll = Stroll::new(preset, args.crowd.people, &ground, scene.seed);
+            scene.people = People::Replayed(stroll.leg(seconds.into()));
         }
     }
     let (scenes, mut told) = crowds::dressed(drawn, &args.bodies)?;
