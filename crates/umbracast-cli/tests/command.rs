@@ -114,14 +114,15 @@ fn sensors_that_hang_elsewhere_than_the_site_says_are_told() {
              rotation_deg = {{ yaw = {yaw}, pitch = 35.0, roll = 0.0 }}\n"
         )
     };
-    let run = |code: i32, yaw: f64| {
+    let run = |code: i32, yaw: f64, follow: bool| {
         let sensors = [sensor("lidar_east", 16.0, yaw), sensor("lidar_west", -16.0, 0.0)].concat();
-        fs::write(&site, sensors).expect("writes");
+        fs::write(&site, format!("{sensors}[detect]\nfollow_sensors = {follow}\n")).expect("writes");
         let out = folder.join("run");
         ends_with(code, &["run", text(&sim), "--site", text(&site), "--out", text(&out)])
     };
-    run(0, 180.0);
-    assert!(run(3, 182.0).contains("the sensors disagree"));
+    run(0, 180.0, true);
+    assert!(run(3, 182.0, true).contains("sensors_moved"), "by floor and walls");
+    assert!(run(3, 182.0, false).contains("the sensors disagree"), "by the people they see");
 }
 
 #[test]

@@ -36,11 +36,12 @@ pub fn svg(site: &Site, found: &Calibration) -> Result<String, Error> {
 }
 
 fn panel(title: &str, site: &Site, found: &Calibration, plans: &[Plan]) -> Panel {
-    let half = (0.5 * site.hall.length_m + MARGIN_M, 0.5 * site.hall.width_m + MARGIN_M);
+    let [least_m, most_m] = site.hall.bounds_m();
+    let (least_m, most_m) = (least_m - MARGIN_M, most_m + MARGIN_M);
     let mut series = vec![walls(site)];
     for (s, plan) in plans.iter().enumerate() {
         let (seen, color) = (&found.seen[s], COLORS[s % COLORS.len()]);
-        let inside = |p: &DVec2| p.x.abs() < half.0 && p.y.abs() < half.1;
+        let inside = |p: &DVec2| p.cmpgt(least_m).all() && p.cmplt(most_m).all();
         let point = |p: DVec2| (p.x, p.y);
         let every = seen.upright_m.len().div_ceil(POINTS_MAX).max(1);
         let upright =
@@ -61,24 +62,18 @@ fn panel(title: &str, site: &Site, found: &Calibration, plans: &[Plan]) -> Panel
     Panel {
         title: format!("{title}: y, m"),
         x_label: "x, m".into(),
-        x: (-half.0, half.0),
-        y: (-half.1, half.1),
-        x_step: None,
-        y_step: None,
-        y_digits: 0,
-        y_names: Vec::new(),
-        y_log: false,
+        x: (least_m.x, most_m.x),
+        y: (least_m.y, most_m.y),
         equal_axes: true,
         series,
-        shaded: Vec::new(),
-        notes: Vec::new(),
+        ..Panel::default()
     }
 }
 
 fn walls(site: &Site) -> Series {
-    let (x, y) = (0.5 * site.hall.length_m, 0.5 * site.hall.width_m);
-    let corners = vec![(x, y), (-x, y), (-x, -y), (x, -y), (x, y)];
-    of("walls of the site file".into(), HALL, Mark::Line(1.5), corners)
+    let corners = site.hall.corners();
+    let around = corners.iter().chain(corners.first()).map(|corner| (corner.x, corner.y)).collect();
+    of("walls of the site file".into(), HALL, Mark::Line(1.5), around)
 }
 
 fn of(name: String, color: &'static str, mark: Mark, points: Vec<(f64, f64)>) -> Series {
