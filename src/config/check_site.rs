@@ -166,11 +166,13 @@ mod tests {
     use super::*;
     use crate::{Config, Mode};
 
-    const SITES: [&str; 4] = [
+    const SITES: [&str; 6] = [
         include_str!("../../config/sites/hand-mounted.toml"),
         include_str!("../../config/sites/logictronix.toml"),
         include_str!("../../config/sites/ouster.toml"),
         include_str!("../../config/sites/lost-sensor.toml"),
+        include_str!("../../config/sites/slipping-sensor.toml"),
+        include_str!("../../config/sites/turned-sensor.toml"),
     ];
 
     #[test]
