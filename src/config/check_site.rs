@@ -172,7 +172,7 @@ mod tests {
     use super::*;
     use crate::{Config, Mode};
 
-    const SITES: [&str; 7] = [
+    const SITES: [&str; 9] = [
         include_str!("../../config/sites/hand-mounted.toml"),
         include_str!("../../config/sites/corridor.toml"),
         include_str!("../../config/sites/hexagon.toml"),
@@ -180,6 +180,8 @@ mod tests {
         include_str!("../../config/sites/logictronix.toml"),
         include_str!("../../config/sites/ouster.toml"),
         include_str!("../../config/sites/lost-sensor.toml"),
+        include_str!("../../config/sites/slipping-sensor.toml"),
+        include_str!("../../config/sites/turned-sensor.toml"),
     ];
 
     #[test]

@@ -86,10 +86,11 @@ fn main() -> Result<(), Error> {
         let text = |(mean, worst): (f64, f64), digits: usize| format!("{mean:.digits$} ({worst:.digits$})");
         let sigma = |k: usize| {
             let told: Vec<f64> = errors.iter().filter_map(|off| off.sigmas[k]).collect();
-            (told.iter().map(|off| off * off).sum::<f64>() / told.len().max(1) as f64).sqrt()
+            let rms = (told.iter().map(|off| off * off).sum::<f64>() / told.len() as f64).sqrt();
+            if told.is_empty() { "-".to_owned() } else { format!("{rms:.1}") }
         };
         println!(
-            "{:20} {:>15} {:>15} {:>17} {:>17} {:>15} {:>6.1}{:4.1}{:4.1}{:4.1}",
+            "{:20} {:>15} {:>15} {:>17} {:>17} {:>15} {:>6}{:>4}{:>4}{:>4}",
             case.name,
             if case.walls { text(of(|e| e.angle_deg), 3) } else { "-".to_owned() },
             if case.walls { text(of(|e| 100.0 * e.place_m), 2) } else { "-".to_owned() },
@@ -220,7 +221,9 @@ fn errors(case: &Case, truth: &Site, found: &Calibration) -> Vec<Off> {
             .rem_euclid(360.0)
             - 180.0;
         let clock_ms = found.sensors[s].clock_offset_ms - if s == 1 { case.clock_ms } else { 0.0 };
-        let by = |off: f64, sigma: Option<f64>| sigma.filter(|_| case.walls).map(|sigma| off / sigma);
+        let by = |off: f64, sigma: Option<f64>| sigma.map(|sigma| off / sigma);
+        // Without walls the frame is the site file's, and only the clock is told against the truth.
+        let in_hall = |off: f64, sigma: Option<f64>| by(off, sigma.filter(|_| case.walls));
         Off {
             angle_deg: turned_deg(is.rotation, of.rotation),
             place_m: off.length(),
@@ -228,9 +231,9 @@ fn errors(case: &Case, truth: &Site, found: &Calibration) -> Vec<Off> {
             between_m: found_between.translation_m.distance(true_between.translation_m),
             clock_ms: clock_ms.abs(),
             sigmas: [
-                by(yaw, sigma.yaw_deg),
-                by(off.x, sigma.x_m),
-                by(off.y, sigma.y_m),
+                in_hall(yaw, sigma.yaw_deg),
+                in_hall(off.x, sigma.x_m),
+                in_hall(off.y, sigma.y_m),
                 by(clock_ms, sigma.clock_ms.filter(|_| s == 1)),
             ],
         }

@@ -1,5 +1,8 @@
 //! Sensors that hang elsewhere than the site file says: found again, and what that is worth.
 
+use std::ffi::OsString;
+use std::fs;
+
 use super::book::Book;
 use crate::tools::{Result, argument, root};
 
@@ -39,6 +42,26 @@ pub fn calibrate(book: &mut Book) -> Result<()> {
         let site = site.into_iter().flat_map(|site| ["--site".into(), site]);
         book.umbracast_says(words.into_iter().chain(site))?;
         book.score(name, [argument(&out), "--truth".into(), argument(&scenes)])?;
+    }
+    book.compare()
+}
+
+/// Sensors that hang otherwise than the site says, or slip, with nothing done about it but what runs.
+pub fn following(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record following");
+    let off = book.scratch("off.toml");
+    for site in ["exact", "turned-sensor", "slipping-sensor"] {
+        let crowd = ["--scenes", "20", "--preset", "orca-03"];
+        let file = (site != "exact").then(|| format!("config/sites/{site}.toml"));
+        let site_words = file.iter().flat_map(|file| ["--site", file]);
+        book.score(site, crowd.into_iter().chain(site_words))?;
+        if let Some(file) = &file {
+            let text = fs::read_to_string(root().join(file)).map_err(|e| format!("{file}: {e}"))?;
+            let text = text + "\n[detect]\nfollow_sensors = false\n";
+            fs::write(&off, text).map_err(|e| e.to_string())?;
+            let words = crowd.map(Into::into).into_iter().chain(["--site".into(), argument(&off)]);
+            book.score::<OsString>(&format!("{site}, not followed"), words)?;
+        }
     }
     book.compare()
 }
