@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Pose;
 
 pub use hall::Hall;
-pub(crate) use hall::doubled_area_m2;
+pub(crate) use hall::{doubled_area_m2, from_segment_m};
 
 /// The place that is watched.
 ///

@@ -6,6 +6,7 @@ use super::rays::Rays;
 use super::trajectories::Disc;
 use crate::Site;
 use crate::geometry::{DVec2, DVec3};
+use crate::site::from_segment_m;
 
 /// An access point hangs on whatever wall is as near.
 const HUNG_M: f64 = 0.3;
@@ -153,12 +154,6 @@ impl Cuboid {
             && cut(from.y, along.y, -self.half_m.y, self.half_m.y)
             && cut(start_m.z, z - start_m.z, 0.0, self.top_m)
     }
-}
-
-fn from_segment_m(at_m: DVec2, [from, to]: [DVec2; 2]) -> f64 {
-    let along = to - from;
-    let share = (at_m - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
-    at_m.distance(from + along * share.clamp(0.0, 1.0))
 }
 
 /// Whether two segments come as near as `room_m`.

@@ -117,14 +117,16 @@ impl Hall {
     /// assert_eq!(hall.clearance_m(DVec2::new(19.0, 3.0)), -2.0);
     /// ```
     pub fn clearance_m(&self, place_m: DVec2) -> f64 {
-        let to_wall_m = |[from, to]: [DVec2; 2]| {
-            let along = to - from;
-            let share = (place_m - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
-            place_m.distance(from + along * share.clamp(0.0, 1.0))
-        };
-        let nearest_m = self.walls().map(to_wall_m).fold(f64::INFINITY, f64::min);
+        let nearest_m = self.walls().map(|wall| from_segment_m(place_m, wall)).fold(f64::INFINITY, f64::min);
         if self.contains(place_m) { nearest_m } else { -nearest_m }
     }
+}
+
+/// How far a place is from the nearest of a straight piece.
+pub(crate) fn from_segment_m(at_m: DVec2, [from, to]: [DVec2; 2]) -> f64 {
+    let along = to - from;
+    let share = (at_m - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+    at_m.distance(from + along * share.clamp(0.0, 1.0))
 }
 
 /// Twice the area within corners; negative where they go clockwise.
