@@ -22,6 +22,8 @@ const GAIN_MIN: f32 = 0.02;
 const STEP_M: f32 = 0.3;
 /// Width of one row of a person: a leg or a post is narrower, furniture and walls are wider.
 const WIDTH_M: [f32; 2] = [0.2, 1.0];
+/// What is behind somebody is taken to be as near as the nearest of so many bins beside: leaves have no even face.
+const BESIDE_BINS: usize = 5;
 /// Revolutions without a return after which something has gone: edges flicker for one.
 const GONE: u32 = 2;
 /// A mover has gone from this share of its pixels, in this many rows, and came to the bin beside in as many as
@@ -319,7 +321,9 @@ impl RangeModel {
                     break;
                 }
             }
-            self.nearest_m[bin * self.rows + row]
+            (0..BESIDE_BINS)
+                .map(|k| self.nearest_m[(bin + k * step) % self.bins * self.rows + row])
+                .fold(f32::INFINITY, f32::min)
         };
         let behind_m: Vec<f32> =
             pixels.iter().map(|&pixel| beside_m(pixel, self.bins - 1).min(beside_m(pixel, 1))).collect();
