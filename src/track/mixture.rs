@@ -7,8 +7,9 @@ use super::association::{Assignment, FORBIDDEN, in_order};
 use super::followed::{Track, seconds};
 use super::gaussian::{inverted, plus, quadratic, round};
 use super::numbers::Numbers;
+use super::origin::BESIDE_M;
 use super::person::{Person, noise, sway};
-use super::remembered::{PEOPLE_MAX, Remembered, Words};
+use super::remembered::{FURNITURE_MAX, PEOPLE_MAX, Remembered, Words};
 use super::visibility::{Body, BodyView, Visibility, detection_probability};
 use crate::Site;
 use crate::config::TrackConfig;
@@ -40,6 +41,8 @@ pub struct MixtureTracker {
     visibility: Visibility,
     /// In order of `id`.
     people: Vec<Person>,
+    /// Where tracks were taken for furniture that the background now knows, the latest last.
+    furniture_m: Vec<DVec2>,
     next_id: u64,
     time_ns: Option<i64>,
     memory: Memory,
@@ -76,6 +79,7 @@ impl Remembered for MixtureTracker {
         words.maybe_i64(&mut self.time_ns);
         let numbers = &self.numbers;
         words.list(&mut self.people, PEOPLE_MAX, || Person::blank(numbers));
+        words.list(&mut self.furniture_m, FURNITURE_MAX, || DVec2::ZERO);
     }
 }
 
@@ -88,7 +92,15 @@ impl MixtureTracker {
     /// The same with numbers of one's own.
     pub fn with_numbers(numbers: Numbers, site: &Site) -> Self {
         let visibility = Visibility::new(site);
-        Self { numbers, visibility, people: Vec::new(), next_id: 0, time_ns: None, memory: Memory::default() }
+        Self {
+            numbers,
+            visibility,
+            people: Vec::new(),
+            furniture_m: Vec::new(),
+            next_id: 0,
+            time_ns: None,
+            memory: Memory::default(),
+        }
     }
 
     /// Last step's tracks predicted to `time_ns`.
@@ -113,7 +125,7 @@ impl MixtureTracker {
         self.associate(time_ns, last_ns, detections);
         self.correct(time_ns, last_ns, detections);
         self.mark_duplicates(step_s);
-        self.people.retain(|person| !person.is_dead(&self.numbers, time_ns));
+        self.bury(time_ns);
         self.give_birth(time_ns, detections);
         self.tell(time_ns, step_s, tracks);
     }
@@ -190,9 +202,20 @@ impl MixtureTracker {
         }
     }
 
+    /// Forgets the dead, but not where furniture was.
+    fn bury(&mut self, time_ns: i64) {
+        let Self { numbers, people, furniture_m, .. } = self;
+        people.retain(|person| {
+            let dead = person.is_dead(numbers, time_ns);
+            furniture_m.extend(person.furniture_m(time_ns).filter(|_| dead));
+            !dead
+        });
+        furniture_m.drain(..furniture_m.len().saturating_sub(FURNITURE_MAX));
+    }
+
     /// A track for each detection that is nobody's and far enough from everybody.
     fn give_birth(&mut self, time_ns: i64, detections: &[Detection]) {
-        let Self { numbers, people, next_id, memory, .. } = self;
+        let Self { numbers, people, furniture_m: known_m, next_id, memory, .. } = self;
         let Memory { order, assignment, places_m, taken, .. } = memory;
         taken.clear();
         taken.resize(order.len(), false);
@@ -205,7 +228,13 @@ impl MixtureTracker {
             if !detection.full_body || places_m.iter().any(near) {
                 continue;
             }
-            let mut person = Person::born(numbers, *next_id, detection, time_ns);
+            let furniture_m = people.iter().filter_map(|person| person.furniture_m(time_ns));
+            let beside = known_m
+                .iter()
+                .copied()
+                .chain(furniture_m)
+                .any(|place| place.distance(detection.position_m) < BESIDE_M);
+            let mut person = Person::born(numbers, *next_id, detection, time_ns, beside);
             let measured_ns = measured_ns(detection, i64::MIN, time_ns);
             person.predict(numbers, seconds(measured_ns, time_ns));
             places_m.push(detection.position_m);

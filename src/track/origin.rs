@@ -11,20 +11,29 @@ use crate::geometry::DVec2;
 const WALKED_M: f64 = 1.0;
 /// What has never walked is furniture after this long,
 const FURNITURE_AFTER_S: f64 = 4.0;
-/// and this, where it has the shape of somebody who stands: who is there from the start may look around for a while.
+/// and this, where it has the shape of somebody who stands and not the place of a part of other furniture: who is there
+/// from the start may look around for a while.
 const UPRIGHT_AFTER_S: f64 = 30.0;
 /// Who stands is higher, not as long in plan view, and has a head on top.
 const UPRIGHT_TOP_M: f64 = 1.3;
 const UPRIGHT_DIAGONAL_M: f64 = 0.9;
 const HEAD_DIAGONAL_M: f64 = 0.6;
 
+/// What first shows this near to furniture is taken for a part of it that was hidden: a large table's other end.
+pub(super) const BESIDE_M: f64 = 0.9;
+/// A detection that cannot be of somebody who stands counts for so many that can: of one who stands 96 of 100 are
+/// upright, of a cupboard up to 45.
+const NOT_UPRIGHT: f64 = 2.0;
+
 /// Where a track began, and what it has shown since.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
     born_ns: i64,
     position_m: DVec2,
+    /// Beside furniture.
+    beside: bool,
     walked: bool,
-    /// Detections that might be of somebody who stands, less those that might not.
+    /// Detections that might be of somebody who stands, less [`NOT_UPRIGHT`] for each that might not.
     upright: f64,
 }
 
@@ -32,14 +41,15 @@ impl Remembered for Origin {
     fn visit(&mut self, words: &mut impl Words) {
         words.i64(&mut self.born_ns);
         words.vec2(&mut self.position_m);
+        words.bool(&mut self.beside);
         words.bool(&mut self.walked);
         words.f64(&mut self.upright);
     }
 }
 
 impl Origin {
-    pub(super) fn new(position_m: DVec2, born_ns: i64) -> Self {
-        Self { born_ns, position_m, walked: false, upright: 0.0 }
+    pub(super) fn new(position_m: DVec2, born_ns: i64, beside: bool) -> Self {
+        Self { born_ns, position_m, beside, walked: false, upright: 0.0 }
     }
 
     pub(super) fn age_s(&self, time_ns: i64) -> f64 {
@@ -53,12 +63,12 @@ impl Origin {
         let upright = detection.top_m > UPRIGHT_TOP_M
             && diagonal_m < UPRIGHT_DIAGONAL_M
             && detection.top_diagonal_m < HEAD_DIAGONAL_M;
-        self.upright += if upright { 1.0 } else { -1.0 };
+        self.upright += if upright { 1.0 } else { -NOT_UPRIGHT };
     }
 
     /// True once it is taken for something that was put there.
     pub(super) fn is_furniture(&self, time_ns: i64) -> bool {
-        let after_s = if self.upright > 0.0 { UPRIGHT_AFTER_S } else { FURNITURE_AFTER_S };
+        let after_s = if self.upright > 0.0 && !self.beside { UPRIGHT_AFTER_S } else { FURNITURE_AFTER_S };
         !self.walked && self.age_s(time_ns) > after_s
     }
 }
@@ -70,8 +80,11 @@ mod tests {
 
     /// Seen ten times a second for `seconds`, with this height and these diagonals, going along x.
     fn is_furniture(seconds: i64, top_m: f64, top_diagonal_m: f64, speed_mps: f64) -> bool {
+        seen(Origin::new(DVec2::ZERO, 0, false), seconds, top_m, top_diagonal_m, speed_mps)
+    }
+
+    fn seen(mut origin: Origin, seconds: i64, top_m: f64, top_diagonal_m: f64, speed_mps: f64) -> bool {
         let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.3, top_m) };
-        let mut origin = Origin::new(DVec2::ZERO, 0);
         for k in 0..10 * seconds {
             let position_m = DVec2::new(0.1 * k as f64 * speed_mps, 0.0);
             let detection = Detection {
@@ -99,6 +112,9 @@ mod tests {
         assert_eq!([3, 5].map(|s| is_furniture(s, 1.8, cupboard, 0.0)), [false, true], "a cupboard");
         assert_eq!([29, 31].map(|s| is_furniture(s, 1.8, head, 0.0)), [false, true], "who stands, perhaps");
         assert!(!is_furniture(300, 1.8, head, 0.5), "who walks");
+        let beside = Origin::new(DVec2::ZERO, 0, true);
+        assert!(seen(beside, 5, 1.8, head, 0.0), "the hidden side of a cupboard");
+        assert!(!seen(beside, 5, 1.8, head, 0.5), "who comes out from behind it");
         // Somebody crouches and creeps: speed alone does not make a person, nor does a jump of the position.
         assert!(is_furniture(5, 0.8, head, 0.15));
     }

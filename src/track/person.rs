@@ -92,10 +92,18 @@ impl Remembered for Person {
 }
 
 impl Person {
-    pub(super) fn born(numbers: &Numbers, id: u64, detection: &Detection, time_ns: i64) -> Self {
+    /// Somebody new, or a part of furniture that stands beside.
+    pub(super) fn born(
+        numbers: &Numbers,
+        id: u64,
+        detection: &Detection,
+        time_ns: i64,
+        beside_furniture: bool,
+    ) -> Self {
         let noise = plus(noise(numbers, detection, &BodyView::default()), sway(numbers));
         let variance = noise[0][0].max(noise[1][1]);
         let mut person = Self::new(numbers, id, detection.position_m, variance, time_ns);
+        person.origin = Origin::new(detection.position_m, time_ns, beside_furniture);
         person.see(numbers, detection, &BodyView::default(), 0.0);
         person
     }
@@ -114,7 +122,7 @@ impl Person {
             existence: EXISTENCE_AT_BIRTH,
             matches: 1,
             doubled_s: 0.0,
-            origin: Origin::new(position_m, time_ns),
+            origin: Origin::new(position_m, time_ns, false),
             last_match_ns: time_ns,
             points: 0,
             heading: Heading::ANY,
@@ -168,6 +176,11 @@ impl Person {
             || self.doubled_s > DUPLICATE_AFTER_S
             || self.origin.is_furniture(time_ns) && seconds(self.last_match_ns, time_ns) > FURNITURE_GONE_S
             || !self.confirmed && self.origin.age_s(time_ns) > CONFIRM_WITHIN_S
+    }
+
+    /// Where it stands, if it is furniture.
+    pub(super) fn furniture_m(&self, time_ns: i64) -> Option<DVec2> {
+        self.origin.is_furniture(time_ns).then(|| self.filter.state().position_m())
     }
 
     /// The body that others may hide behind.

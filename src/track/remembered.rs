@@ -5,10 +5,18 @@ use crate::geometry::{DVec2, DVec3};
 
 /// More people than any hall that is watched holds.
 pub(super) const PEOPLE_MAX: usize = 10_000;
+/// More pieces of furniture than are put into one.
+pub(super) const FURNITURE_MAX: usize = 1_000;
 
 /// Something of which every word can be shown, always in the same order.
 pub(super) trait Remembered {
     fn visit(&mut self, words: &mut impl Words);
+}
+
+impl Remembered for DVec2 {
+    fn visit(&mut self, words: &mut impl Words) {
+        words.vec2(self);
+    }
 }
 
 /// Who is shown words: writes them down, or puts others in their place.
