@@ -11,6 +11,8 @@ use crate::joint::{self, OF_SENSOR, Placed, Seen};
 use crate::plan::{Plan, wrapped};
 use crate::{gauge, matching};
 
+/// A clock is taken for apart from the first by so many of its standard deviations; below that it stays as given.
+const CLOCK_TELLS: f64 = 3.0;
 /// A turn counts at this arm, and a clock at this pace, where directions of error are compared.
 const ARM_M: f64 = 10.0;
 const PACE_MPS: f64 = 1.3;
@@ -127,8 +129,12 @@ pub fn fit(
         let sigma = |k: usize| solution.covariance[(OF_SENSOR * s + k, OF_SENSOR * s + k)].sqrt();
         let in_plan = |k: usize| (is_linked || seen[s].by_walls).then(|| sigma(k));
         let by_floor = |k: usize| floor.map(|floor| floor.sigma[k]);
+        let at_place = hung(sensor, &solution.placed[s], &level);
+        let ahead_ms = at_place.clock_offset_ms - sensor.clock_offset_ms;
+        let clock_tells = ahead_ms.abs() > CLOCK_TELLS * 1e3 * sigma(3);
         let mine = Found {
             sensor: sensor.name.clone(),
+            clock_offset_ms: if clock_tells { at_place.clock_offset_ms } else { sensor.clock_offset_ms },
             sigma: Sigma {
                 x_m: in_plan(1),
                 y_m: in_plan(2),
@@ -143,7 +149,7 @@ pub fn fit(
                 .map(|&(a, b)| site.sensors[a + b - s].name.clone())
                 .collect(),
             people: seen[s].ways.len(),
-            ..hung(sensor, &solution.placed[s], &level)
+            ..at_place
         };
         if floor.is_none() {
             told.push(format!("{}: no floor was seen; height, pitch and roll stay as given", sensor.name));
