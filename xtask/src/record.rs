@@ -41,7 +41,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 33] = [
+const JOBS: [Job; 34] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -53,6 +53,7 @@ const JOBS: [Job; 33] = [
     job("forecasts", "the residual beside a constant velocity", Needs::Data, crowds::forecasts),
     job("calibrate", "sensors that hang elsewhere than the file says, found again", Needs::Nothing, calibrate::calibrate),
     job("following", "a sensor screwed on askew, one that slips", Needs::Nothing, calibrate::following),
+    job("tripods", "from two sensors on tripods to warnings, command by command", Needs::Nothing, calibrate::tripods),
     job("logictronix", "real people before a real VLP-16", Needs::Data, crowds::logictronix),
     job("speed", "how long a frame takes, in every mode", Needs::Nothing, house::speed),
     job("growth", "how long a step takes with more people and access points", Needs::Nothing, house::growth),

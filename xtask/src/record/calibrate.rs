@@ -4,6 +4,7 @@ use std::ffi::OsString;
 use std::fs;
 
 use super::book::Book;
+use super::keep;
 use crate::tools::{Result, argument, root};
 
 const EXAMPLE: &str = "cargo run --release --quiet --package umbracast-calibrate --example hung -- 200000 20";
@@ -44,6 +45,23 @@ pub fn calibrate(book: &mut Book) -> Result<()> {
         book.score(name, [argument(&out), "--truth".into(), argument(&scenes)])?;
     }
     book.compare()
+}
+
+/// The commands of docs/TRIPODS.md, one after the other, by somebody without sensors.
+pub fn tripods(book: &mut Book) -> Result<()> {
+    const SITE: &str = "config/sites/tripods.toml";
+    const TRUTH: &str = "config/sites/tripods-in-truth.toml";
+    let [map, walk, found, crowd, out] = ["map", "walk", "calibrated.toml", "crowd", "out"]
+        .map(|name| book.scratch(name).to_string_lossy().into_owned());
+    let mut says = |words: &[&str]| book.umbracast_says(words.iter().copied());
+    says(&["coverage", "--site", SITE, "--out", &map])?;
+    says(&["simulate", "--stroll", "60", "--seed", "202000", "--site", TRUTH, "--out", &walk])?;
+    says(&["calibrate", &walk, "--site", SITE, "--out", &found])?;
+    says(&["simulate", "--scenes", "10", "--seed", "203000", "--site", TRUTH, "--out", &crowd])?;
+    says(&["run", &crowd, "--site", &found, "--csv", "--out", &out])?;
+    says(&["evaluate", &out, "--truth", &crowd])?;
+    says(&["evaluate", "--scenes", "10", "--seed", "204000", "--preset", "orca-03", "--site", &found])?;
+    keep(book, &book.scratch("calibrated.svg"), "tripods.svg")
 }
 
 /// Sensors that hang otherwise than the site says, or slip, with nothing done about it but what runs.
