@@ -6,6 +6,9 @@
 //! too, so a wall tells how a sensor is turned, and of where it hangs only as much as walls are known. Nothing is changed for
 //! less than [`TURN_RAD`] and [`SHIFT_M`], nor where the hall is not the file's.
 
+use std::borrow::Cow;
+
+use crate::config::DetectConfig;
 use crate::geometry::{DMat3, DVec2, DVec3, Pose};
 use crate::lidar::{Cloud, Frame, RangeImage, Scan};
 use crate::site::Hall;
@@ -45,6 +48,7 @@ type Six = [f64; 6];
 pub struct Mountings {
     /// The floor first.
     surfaces: Vec<Surface>,
+    /// None where sensors are not to be followed.
     sensors: Vec<Mounting>,
     frames: u32,
     moved: Vec<usize>,
@@ -72,7 +76,7 @@ struct Mounting {
 
 impl Mountings {
     /// Of a site's sensors, which hang as it says until they are seen not to.
-    pub fn new(site: &Site) -> Self {
+    pub fn new(config: &DetectConfig, site: &Site) -> Self {
         let mounting = |sensor: &crate::site::Sensor| Mounting {
             given: sensor.site_from_sensor(),
             used: [0.0; 6],
@@ -81,15 +85,15 @@ impl Mountings {
         };
         Self {
             surfaces: surfaces(&site.hall),
-            sensors: site.sensors.iter().map(mounting).collect(),
+            sensors: site.sensors.iter().filter(|_| config.follow_sensors).map(mounting).collect(),
             frames: 0,
             moved: Vec::new(),
         }
     }
 
-    /// Looks at a frame. Gives it with poses put right and without the scans of sensors that are in doubt; none where all
+    /// Looks at a frame. Gives it with poses put right and without the scans of sensors that are in doubt; as it is where all
     /// hang as the site says.
-    pub fn follow(&mut self, frame: &Frame, health: &mut Health) -> Option<Frame> {
+    pub fn follow<'a>(&mut self, frame: &'a Frame, health: &mut Health) -> Cow<'a, Frame> {
         self.moved.clear();
         let look = self.frames.is_multiple_of(EVERY);
         self.frames = self.frames.wrapping_add(1);
@@ -100,7 +104,7 @@ impl Mountings {
         }
         let as_given = |mounting: &Mounting| mounting.used == [0.0; 6] && mounting.doubted.is_none();
         if self.sensors.iter().all(as_given) {
-            return None;
+            return Cow::Borrowed(frame);
         }
         let known =
             |scan: &&Scan| self.sensors.get(scan.sensor).is_none_or(|mounting| mounting.doubted.is_none());
@@ -112,7 +116,7 @@ impl Mountings {
             Scan { site_from_sensor, ..scan.clone() }
         };
         let scans = frame.scans.iter().filter(known).map(put_right).collect();
-        Some(Frame { scans, ..*frame })
+        Cow::Owned(Frame { scans, ..*frame })
     }
 
     /// Sensors that were found in the last frame to have moved since they were believed: what they have learned of the hall

@@ -82,7 +82,7 @@ impl Outcome {
 #[derive(Debug, Clone)]
 pub struct Pipeline {
     /// None where the configuration has sensors hang as the site says, whatever they see.
-    mountings: Option<Mountings>,
+    mountings: Mountings,
     background: Background,
     clusterer: Clusterer,
     measurer: Measurer,
@@ -108,7 +108,7 @@ impl Pipeline {
     /// A setting that cannot work, with what was expected and found.
     pub fn new(config: &Config, weights: Option<&Weights>) -> Result<Self, Error> {
         Ok(Self {
-            mountings: config.detect.follow_sensors.then(|| Mountings::new(&config.site)),
+            mountings: Mountings::new(&config.detect, &config.site),
             background: Background::new(&config.detect, &config.site),
             clusterer: Clusterer::new(&config.detect, &config.site),
             measurer: Measurer::new(&config.detect, &config.site),
@@ -135,8 +135,7 @@ impl Pipeline {
     /// # Ok::<(), umbracast::Error>(())
     /// ```
     pub fn learn_empty(&mut self, frame: &Frame) {
-        let followed = self.mountings.as_mut().and_then(|m| m.follow(frame, &mut self.outcome.health));
-        self.background.learn_empty(followed.as_ref().unwrap_or(frame));
+        self.background.learn_empty(&self.mountings.follow(frame, &mut self.outcome.health));
     }
 
     /// One frame through all stages.
@@ -158,9 +157,8 @@ impl Pipeline {
         if !o.begin(frame) {
             return o;
         }
-        let followed = self.mountings.as_mut().and_then(|m| m.follow(frame, &mut o.health));
-        let frame = followed.as_ref().unwrap_or(frame);
-        self.mountings.iter().flat_map(Mountings::moved).for_each(|&sensor| self.background.forget(sensor));
+        let frame = &*self.mountings.follow(frame, &mut o.health);
+        self.mountings.moved().iter().for_each(|&sensor| self.background.forget(sensor));
         self.tracker.priors(frame.time_ns, &mut self.priors);
         self.background.foreground(frame, &self.priors, &mut o.health, &mut o.foreground);
         self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);

@@ -5,7 +5,7 @@ mod hall;
 
 use std::collections::BTreeMap;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
@@ -71,6 +71,21 @@ pub struct Furniture {
     pub size_m: [f64; 3],
     /// Turn about the vertical, degrees.
     pub yaw_deg: f64,
+}
+
+impl Furniture {
+    /// The corners of its base, counter-clockwise.
+    ///
+    /// ```
+    /// let counter = umbracast::Config::default().site.furniture[0];
+    /// assert_eq!(counter.corners()[0].to_array(), [-3.0, 15.4]);
+    /// ```
+    pub fn corners(&self) -> [DVec2; 4] {
+        let half_m = 0.5 * DVec2::new(self.size_m[0], self.size_m[1]);
+        let turned = DVec2::from_angle(self.yaw_deg.to_radians());
+        [DVec2::NEG_ONE, DVec2::new(1.0, -1.0), DVec2::ONE, DVec2::new(-1.0, 1.0)]
+            .map(|corner| DVec2::from_array(self.position_m) + turned.rotate(corner * half_m))
+    }
 }
 
 /// A LiDAR on the wall.
@@ -323,7 +338,7 @@ impl Ue {
     /// let ue = umbracast::site::Ue { forward_m: 0.3, left_m: 0.0, height_share: 0.5 };
     /// assert_eq!(ue.on_body(DVec2::new(2.0, 1.0), 0.0, 1.8), DVec3::new(2.3, 1.0, 0.9));
     /// ```
-    pub fn on_body(&self, position_m: glam::DVec2, heading_rad: f64, height_m: f64) -> DVec3 {
+    pub fn on_body(&self, position_m: DVec2, heading_rad: f64, height_m: f64) -> DVec3 {
         let (sin, cos) = heading_rad.sin_cos();
         DVec3::new(
             position_m.x + self.forward_m * cos - self.left_m * sin,

@@ -45,10 +45,11 @@ fn a_sensor_that_slips_is_told_and_put_right_within_two_seconds() {
     for turned_deg in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]] {
         let site = slip(2.0, turned_deg, [0.0; 3]);
         let truth = site.simulation.slip["lidar_west"].slipped(&site.sensors[1].site_from_sensor());
-        let (mut mountings, mut health) = (Mountings::new(&site), Health::default());
+        let (mut mountings, mut health) =
+            (Mountings::new(&Config::default().detect, &site), Health::default());
         let (mut told_s, mut last) = (None, None);
         for frame in frames(&site, 5) {
-            last = mountings.follow(&frame, &mut health);
+            last = Some(mountings.follow(&frame, &mut health).into_owned());
             let now_s = frame.time_ns as f64 * 1e-9;
             assert!(health.sensors_moved == 0 || now_s > 2.0, "told before it happened");
             if health.sensors_moved > 0 && told_s.is_none() {
@@ -57,7 +58,7 @@ fn a_sensor_that_slips_is_told_and_put_right_within_two_seconds() {
             }
         }
         assert!(told_s.is_some_and(|told_s| told_s < 4.0), "{told_s:?}");
-        let last = last.expect("poses put right");
+        let last = last.unwrap();
         assert_eq!(last.scans[0].site_from_sensor, site.sensors[0].site_from_sensor());
         let (deg, m) = apart(&last.scans[1].site_from_sensor, &truth);
         assert!(deg < 0.1 && m < 0.03, "{deg} deg, {m} m");
@@ -69,13 +70,13 @@ fn a_sensor_that_slips_is_told_and_put_right_within_two_seconds() {
 fn a_sensor_that_never_hung_right_is_put_right_and_keeps_what_it_learned() {
     let site = slip(0.0, [0.3, -0.3, 0.2], [0.02, 0.0, -0.02]);
     let truth = site.simulation.slip["lidar_west"].slipped(&site.sensors[1].site_from_sensor());
-    let (mut mountings, mut health) = (Mountings::new(&site), Health::default());
+    let (mut mountings, mut health) = (Mountings::new(&Config::default().detect, &site), Health::default());
     let mut last = None;
     for frame in frames(&site, 2) {
-        last = mountings.follow(&frame, &mut health);
+        last = Some(mountings.follow(&frame, &mut health).into_owned());
         assert!(mountings.moved().is_empty());
     }
-    let (deg, m) = apart(&last.expect("poses put right").scans[1].site_from_sensor, &truth);
+    let (deg, m) = apart(&last.unwrap().scans[1].site_from_sensor, &truth);
     assert!(deg < 0.1 && m < 0.04 && health.sensors_moved == 1, "{deg} deg, {m} m, {health:?}");
 }
 

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use crate::geometry::slab::hit_obb;
 use crate::geometry::{DMat3, DVec2, DVec3, Obb, Pose};
 use crate::lidar::{Fan, SECTORS, Views, sector};
-use crate::site::Site;
+use crate::site::{Site, from_segment_m};
 
 /// Radius of the upright cylinder that stands for a body, both as what is seen and as what hides: the trunk,
 /// 0.26 m by 0.46 m, averaged over all directions.
@@ -118,7 +118,7 @@ impl Visibility {
             BodyView { beams_known: eyes.iter().all(|eye| eye.fan.is_some()), ..BodyView::default() };
         for eye in eyes {
             let near = |point: DVec2, radius: f64| {
-                distance_to_segment(point, eye.origin_m.truncate(), body.position_m) < radius + BODY_RADIUS_M
+                from_segment_m(point, [eye.origin_m.truncate(), body.position_m]) < radius + BODY_RADIUS_M
             };
             between.others.clear();
             between.others.extend(others.iter().filter(|o| *o != body && near(o.position_m, BODY_RADIUS_M)));
@@ -222,12 +222,6 @@ fn beam_at(fan: &Fan, elevation_rad: f64) -> f64 {
         n => (all[n - 1], all[n]),
     };
     n as f64 - 0.5 + (elevation_rad - low) / (high - low)
-}
-
-fn distance_to_segment(point: DVec2, start: DVec2, end: DVec2) -> f64 {
-    let along = end - start;
-    let share = ((point - start).dot(along) / along.length_squared()).clamp(0.0, 1.0);
-    (start + along * share - point).length()
 }
 
 /// Does an upright cylinder stand on the line from the eye to the target? One that holds the target does not.

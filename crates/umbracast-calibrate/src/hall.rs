@@ -41,18 +41,10 @@ impl Outline {
         let hall = &site.hall;
         let wall = |ends_m| Surface::Wall { ends_m, top_m: hall.height_m };
         let mut surfaces: Vec<Surface> = hall.walls().map(wall).collect();
-        let mut rectangle = |middle_m: DVec2, size_m: DVec2, yaw_rad: f64, top_m: f64| {
-            let corner = |x: f64, y: f64| {
-                middle_m + DVec2::from_angle(yaw_rad).rotate(size_m * 0.5 * DVec2::new(x, y))
-            };
-            let corners = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
-            let wall = |i: usize| Surface::Wall { ends_m: [corners[i], corners[(i + 1) % 4]], top_m };
-            surfaces.extend((0..4).map(wall));
-        };
         for item in &site.furniture {
-            let [length_m, width_m, top_m] = item.size_m;
-            let middle_m = DVec2::from_array(item.position_m);
-            rectangle(middle_m, DVec2::new(length_m, width_m), item.yaw_deg.to_radians(), top_m);
+            let (corners, top_m) = (item.corners(), item.size_m[2]);
+            let side = |i: usize| Surface::Wall { ends_m: [corners[i], corners[(i + 1) % 4]], top_m };
+            surfaces.extend((0..4).map(side));
         }
         let pillar = |p: &umbracast::site::Pillar| Surface::Round {
             middle_m: DVec2::from_array(p.position_m),

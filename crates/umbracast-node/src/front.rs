@@ -21,7 +21,7 @@ const TRACKER_SILENT_NS: i64 = 1_000_000_000;
 #[derive(Debug)]
 pub struct Front {
     assembler: Assembler,
-    mountings: Option<Mountings>,
+    mountings: Mountings,
     background: Background,
     /// Place in the site of each sensor that the assembler knows.
     own: Vec<usize>,
@@ -71,12 +71,11 @@ impl Front {
             )));
         }
         let sensors = own.iter().map(|&s| config.site.sensors[s].clone()).collect();
-        let mut mountings = config.detect.follow_sensors.then(|| Mountings::new(&config.site));
+        let mut mountings = Mountings::new(&config.detect, &config.site);
         let mut background = Background::new(&config.detect, &config.site);
         let mut health = Health::default();
         for frame in empty {
-            let followed = mountings.as_mut().and_then(|m| m.follow(frame, &mut health));
-            background.learn_empty(followed.as_ref().unwrap_or(frame));
+            background.learn_empty(&mountings.follow(frame, &mut health));
         }
         let knows = !empty.is_empty() || config.detect.background == BackgroundMethod::Voxels;
         Ok(Self {
@@ -129,9 +128,8 @@ impl Front {
         let closed_ns = self.clock.now_ns();
         let priors = self.priors(frame.time_ns);
         let begun_ns = self.clock.now_ns();
-        let followed = self.mountings.as_mut().and_then(|m| m.follow(frame, &mut self.health));
-        let frame = followed.as_ref().unwrap_or(frame);
-        self.mountings.iter().flat_map(Mountings::moved).for_each(|&sensor| self.background.forget(sensor));
+        let frame = &*self.mountings.follow(frame, &mut self.health);
+        self.mountings.moved().iter().for_each(|&sensor| self.background.forget(sensor));
         let mut points = Vec::new();
         self.background.foreground(frame, &priors, &mut self.health, &mut points);
         Foreground {

@@ -255,11 +255,7 @@ fn sides_of_pillar(pillar: &Pillar, zero_m: DVec2) -> Vec<Vec2> {
 }
 
 fn sides_of_piece(piece: &Furniture, zero_m: DVec2) -> Vec<Vec2> {
-    let turned = DVec2::from_angle(piece.yaw_deg.to_radians());
-    let half = 0.5 * DVec2::new(piece.size_m[0], piece.size_m[1]);
-    let corners = [DVec2::new(-1.0, -1.0), DVec2::new(1.0, -1.0), DVec2::ONE, DVec2::new(-1.0, 1.0)];
-    let middle_m = DVec2::from_array(piece.position_m) - zero_m;
-    corners.into_iter().map(|corner| (middle_m + turned.rotate(corner * half)).as_vec2()).collect()
+    piece.corners().map(|corner| (corner - zero_m).as_vec2()).to_vec()
 }
 
 #[cfg(test)]
