@@ -160,6 +160,11 @@ impl Person {
         self.points = 0;
     }
 
+    /// Whether it has a detection in this frame.
+    pub(super) fn is_seen(&self) -> bool {
+        self.points > 0
+    }
+
     pub(super) fn is_dead(&self, numbers: &Numbers, time_ns: i64) -> bool {
         let spread = self.filter.state().position_covariance();
         self.existence < EXISTENCE_MIN
