@@ -24,6 +24,13 @@ const LIMB_M: f64 = 0.55;
 const LIMB_TOP_SHARE: f64 = 0.55;
 /// Passes of k-means; it settles in three or four.
 const PASSES: usize = 10;
+/// How sure a known person's place is at most where pieces are given away, and in a crowd: there a track that took a
+/// neighbour's points would otherwise be told by them that it is right.
+const PIECES_SIGMA_M: f64 = 0.05;
+const CROWD_SIGMA_M: f64 = 0.15;
+/// Two people when the halves of what a known person was given in a crowd lie farther apart than this: what others leave to
+/// see of one body is shorter than a body.
+const BESIDE_M: f64 = 0.30;
 /// Points that deviate more than this along their longest axis are more than four people in a row.
 const CROWD_M: f64 = 0.7;
 
@@ -93,17 +100,11 @@ pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut 
 
 /// Gives each point of a cluster to the known person whose body explains it best, so that who shows little costs nobody
 /// else anything; what nobody known explains is split as if nobody were known.
-fn among_known(
-    moved_m: &[DVec3],
-    priors: &[Prior],
-    known: &[usize],
-    cluster: &[u32],
-    parts: &mut Vec<Part>,
-) {
+fn among_known(moved_m: &[DVec3], priors: &[Prior], known: &[usize], cluster: &[u32], parts: &mut Vec<Part>) {
     let people: Vec<&Prior> = known.iter().map(|&k| &priors[k]).collect();
     let mut own = vec![Cluster::new(); people.len()];
     let mut strangers = Cluster::new();
-    for (&i, owner) in cluster.iter().zip(owners(moved_m, cluster, &people)) {
+    for (&i, owner) in cluster.iter().zip(owners(moved_m, cluster, &people, CROWD_SIGMA_M)) {
         match owner {
             Some(k) => own[k].push(i),
             None => strangers.push(i),
@@ -116,9 +117,8 @@ fn among_known(
         let whole = Part::new(moved_m, points);
         let axis_m = long_axis(moved_m, &whole);
         let ends_m = vec![whole.mean_m() - axis_m, whole.mean_m() + axis_m];
-        let two = means(moved_m, &whole.points, ends_m).filter(|two| {
-            are_people(two, HALVES_M) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
-        });
+        let two = means(moved_m, &whole.points, ends_m)
+            .filter(|two| are_people(two, BESIDE_M) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M));
         let mut halves = two.unwrap_or_else(|| vec![whole]);
         // Who stands beside somebody known is new; the known one is where he is expected.
         let off_m = |part: &Part| part.mean_m().distance(priors[k].position_m);
@@ -188,7 +188,11 @@ pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
     let mut has_body = vec![false; people.len()];
     for body in &bodies {
         if let Some(owner) = body.owner {
-            confirmed.iter().zip(&mut has_body).filter(|(k, _)| **k == owner).for_each(|(_, has)| *has = true);
+            confirmed
+                .iter()
+                .zip(&mut has_body)
+                .filter(|(k, _)| **k == owner)
+                .for_each(|(_, has)| *has = true);
             continue;
         }
         let near = (0..people.len()).filter(|&k| is_near(body, k));
@@ -200,7 +204,7 @@ pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
         pieces.into_iter().partition(|piece| (0..people.len()).any(|k| !has_body[k] && is_near(piece, k)));
     let points: Cluster = near.into_iter().flat_map(|piece| piece.points).collect();
     let mut own = vec![Cluster::new(); people.len()];
-    for (&i, owner) in points.iter().zip(owners(moved_m, &points, &people)) {
+    for (&i, owner) in points.iter().zip(owners(moved_m, &points, &people, PIECES_SIGMA_M)) {
         if let Some(k) = owner.filter(|&k| !has_body[k]) {
             own[k].push(i);
         }
@@ -377,6 +381,29 @@ mod tests {
         let close = [body(0.0, 0.0), body(0.35, 0.0)].concat();
         assert_eq!(people(&close, &[]), 1);
         assert_eq!(people(&close, &[prior(0.0, 0.0), prior(0.4, 0.0)]), 2);
+    }
+
+    #[test]
+    fn one_known_person_who_conflicts_costs_nobody_else_the_guidance() {
+        // Three in a row, as near as nobody would tell strangers apart, and a track that is left where nobody stands.
+        let row = [body(0.0, 0.0), body(0.36, 0.0), body(0.72, 0.0)].concat();
+        let mut known = [prior(0.0, 0.0), prior(0.36, 0.0), prior(0.72, 0.0)].to_vec();
+        assert_eq!(people(&row, &known), 3);
+        known.push(prior(0.3, 0.1));
+        assert!(people(&row, &known) >= 3);
+    }
+
+    #[test]
+    fn who_shows_three_points_in_a_crowd_keeps_them() {
+        let head = (0..3).map(|i| DVec3::new(0.36, 0.03 * f64::from(i), 1.6));
+        let points_m: Vec<DVec3> = body(0.0, 0.0).into_iter().chain(body(0.72, 0.0)).chain(head).collect();
+        let known = [prior(0.0, 0.0), prior(0.36, 0.0), prior(0.72, 0.0)];
+        let mut parts = Vec::new();
+        split(&points_m, &known, (0..points_m.len() as u32).collect(), &mut parts);
+        merge(&mut parts, &known);
+        give_pieces(&points_m, &mut parts, &known);
+        assert_eq!(parts.len(), 3);
+        assert!(parts.iter().any(|part| part.expected && (80..83).all(|i| part.points.contains(&i))));
     }
 
     #[test]

@@ -28,8 +28,11 @@ const GATE_M: f64 = 0.8;
 /// Only a detection farther than this from every track starts one: two people side by side are 0.5 m apart, a split
 /// person's halves 0.4 m at most.
 const BIRTH_RADIUS_M: f64 = 0.45;
-/// The same of a track that has a detection of its own: bodies allow no less.
-const BIRTH_BESIDE_SEEN_M: f64 = 0.35;
+/// The same in a crowd, of tracks that have a detection of their own: bodies allow no less. So many tracks so near are a
+/// crowd, whose clusters are shared out among those who are known, so that nobody is found in halves.
+const BIRTH_BESIDE_SEEN_M: f64 = 0.30;
+const CROWD_PEOPLE: usize = 3;
+const CROWD_M: f64 = 1.0;
 /// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it.
 const DUPLICATE_M: f64 = 0.3;
 /// Nobody walks faster: spares most pairs the rest.
@@ -207,8 +210,10 @@ impl MixtureTracker {
         places_m.extend(people.iter().map(|p| p.filter.state().position_m()));
         for (&d, _) in order.iter().zip(taken).filter(|(_, taken)| !**taken) {
             let detection = &detections[d];
+            let beside = places_m.iter().filter(|place| place.distance(detection.position_m) < CROWD_M);
+            let crowded = beside.count() >= CROWD_PEOPLE;
             let near = |(place_m, seen): (&DVec2, &bool)| {
-                let least_m = if *seen { BIRTH_BESIDE_SEEN_M } else { BIRTH_RADIUS_M };
+                let least_m = if crowded && *seen { BIRTH_BESIDE_SEEN_M } else { BIRTH_RADIUS_M };
                 place_m.distance(detection.position_m) <= least_m
             };
             if !detection.full_body || places_m.iter().zip(&*seen).any(near) {

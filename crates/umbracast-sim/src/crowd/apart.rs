@@ -70,7 +70,8 @@ impl Moved {
         let end_ns = way.start_ns + way.step_ns * (way.positions_m.len() as i64 - 1).max(0);
         let first = way.start_ns.div_euclid(NODE_NS);
         let nodes = first..=end_ns.div_euclid(NODE_NS) + 1;
-        let at = |node: i64| way.at((node * NODE_NS).clamp(way.start_ns, end_ns)).map_or(DVec2::ZERO, |s| s.0);
+        let at =
+            |node: i64| way.at((node * NODE_NS).clamp(way.start_ns, end_ns)).map_or(DVec2::ZERO, |s| s.0);
         let places_m: Vec<DVec2> = nodes.map(at).collect();
         Self { first, shifts_m: vec![DVec2::ZERO; places_m.len()], places_m }
     }
