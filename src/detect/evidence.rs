@@ -24,6 +24,13 @@ const LIMB_M: f64 = 0.55;
 const LIMB_TOP_SHARE: f64 = 0.55;
 /// Passes of k-means; it settles in three or four.
 const PASSES: usize = 10;
+/// How sure a known person's place is at most where pieces are given away, and in a crowd: there a track that took a
+/// neighbour's points would otherwise be told by them that it is right.
+const PIECES_SIGMA_M: f64 = 0.05;
+const CROWD_SIGMA_M: f64 = 0.15;
+/// Two people when the halves of what a known person was given in a crowd lie farther apart than this: what others leave to
+/// see of one body is shorter than a body.
+const BESIDE_M: f64 = 0.30;
 /// Points that deviate more than this along their longest axis are more than four people in a row.
 const CROWD_M: f64 = 0.7;
 
@@ -32,8 +39,10 @@ const CROWD_M: f64 = 0.7;
 pub struct Part {
     /// Indices of its points, ascending.
     pub points: Cluster,
-    /// True for pieces that were joined to a person because one is expected there.
+    /// True for points that are somebody's only because one is expected there.
     pub expected: bool,
+    /// The person of the priors whose points these are, where that was found by who stands where.
+    owner: Option<usize>,
     sum_m: DVec2,
     top_m: f64,
 }
@@ -42,7 +51,7 @@ impl Part {
     fn new(moved_m: &[DVec3], points: Cluster) -> Self {
         let sum_m = points.iter().map(|&i| moved_m[i as usize].truncate()).sum();
         let top_m = points.iter().map(|&i| moved_m[i as usize].z).fold(0.0, f64::max);
-        Self { points, expected: false, sum_m, top_m }
+        Self { points, expected: false, owner: None, sum_m, top_m }
     }
 
     fn mean_m(&self) -> DVec2 {
@@ -59,7 +68,9 @@ pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut 
     }
     let all = Part::new(moved_m, cluster);
     let axis_m = long_axis(moved_m, &all);
-    if axis_m.length() > CROWD_M {
+    let known = expected(moved_m, priors, &all.points);
+    let is_crowd = axis_m.length() > CROWD_M;
+    if is_crowd && known.is_empty() {
         // The work grows with the square of the people, so a crowd is halved first; whom the cut divides, the
         // merge makes whole again.
         let ends_m = vec![all.mean_m() - axis_m, all.mean_m() + axis_m];
@@ -69,10 +80,13 @@ pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut 
         return;
     }
     let cluster = &all.points;
-    let expected_m = expected(moved_m, priors, cluster);
-    let mut people = means(moved_m, cluster, expected_m)
-        .filter(|people| are_people(people, EXPECTED_HALVES_M))
-        .unwrap_or_else(|| vec![all.clone()]);
+    let expected_m = known.iter().map(|&k| priors[k].position_m).collect();
+    let guided = means(moved_m, cluster, expected_m).filter(|people| are_people(people, EXPECTED_HALVES_M));
+    if is_crowd || guided.is_none() && known.len() > 1 {
+        among_known(moved_m, priors, &known, cluster, parts);
+        return;
+    }
+    let mut people = guided.unwrap_or_else(|| vec![all.clone()]);
     // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
     // are never counted: two of them may be one person or two.
     while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
@@ -82,6 +96,40 @@ pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut 
         people = more;
     }
     parts.append(&mut people);
+}
+
+/// Gives each point of a cluster to the known person whose body explains it best, so that who shows little costs nobody
+/// else anything; what nobody known explains is split as if nobody were known.
+fn among_known(moved_m: &[DVec3], priors: &[Prior], known: &[usize], cluster: &[u32], parts: &mut Vec<Part>) {
+    let people: Vec<&Prior> = known.iter().map(|&k| &priors[k]).collect();
+    let mut own = vec![Cluster::new(); people.len()];
+    let mut strangers = Cluster::new();
+    for (&i, owner) in cluster.iter().zip(owners(moved_m, cluster, &people, CROWD_SIGMA_M)) {
+        match owner {
+            Some(k) => own[k].push(i),
+            None => strangers.push(i),
+        }
+    }
+    for (&k, points) in known.iter().zip(own) {
+        if points.is_empty() {
+            continue;
+        }
+        let whole = Part::new(moved_m, points);
+        let axis_m = long_axis(moved_m, &whole);
+        let ends_m = vec![whole.mean_m() - axis_m, whole.mean_m() + axis_m];
+        let two = means(moved_m, &whole.points, ends_m)
+            .filter(|two| are_people(two, BESIDE_M) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M));
+        let mut halves = two.unwrap_or_else(|| vec![whole]);
+        // Who stands beside somebody known is new; the known one is where he is expected.
+        let off_m = |part: &Part| part.mean_m().distance(priors[k].position_m);
+        halves.sort_by(|a, b| off_m(a).total_cmp(&off_m(b)));
+        halves[0].owner = Some(k);
+        halves[0].expected = true;
+        parts.append(&mut halves);
+    }
+    if !strangers.is_empty() {
+        split(moved_m, &[], strangers, parts);
+    }
 }
 
 /// True when all stand apart and show enough.
@@ -131,12 +179,22 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
 /// Gives the points of pieces to the expected people whose bodies are nowhere: legs where the beams pass below the
 /// hips, or the few points that others let through. Without an expected person such pieces are nobody.
 pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
-    let people: Vec<&Prior> = priors.iter().filter(|prior| prior.confirmed).collect();
+    let confirmed: Vec<usize> = (0..priors.len()).filter(|&k| priors[k].confirmed).collect();
+    let people: Vec<&Prior> = confirmed.iter().map(|&k| &priors[k]).collect();
     let off_m = |part: &Part, k: usize| people[k].position_m.distance(part.mean_m());
     let is_near = |part: &Part, k: usize| off_m(part, k) < LIMB_M + people[k].position_sigma_m.min(LIMB_M);
-    let (bodies, pieces): (Vec<Part>, Vec<Part>) = parts.drain(..).partition(|part| !is_piece(part));
+    let (bodies, pieces): (Vec<Part>, Vec<Part>) =
+        parts.drain(..).partition(|part| part.owner.is_some() || !is_piece(part));
     let mut has_body = vec![false; people.len()];
     for body in &bodies {
+        if let Some(owner) = body.owner {
+            confirmed
+                .iter()
+                .zip(&mut has_body)
+                .filter(|(k, _)| **k == owner)
+                .for_each(|(_, has)| *has = true);
+            continue;
+        }
         let near = (0..people.len()).filter(|&k| is_near(body, k));
         if let Some(k) = near.min_by(|&a, &b| off_m(body, a).total_cmp(&off_m(body, b))) {
             has_body[k] = true;
@@ -146,7 +204,7 @@ pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
         pieces.into_iter().partition(|piece| (0..people.len()).any(|k| !has_body[k] && is_near(piece, k)));
     let points: Cluster = near.into_iter().flat_map(|piece| piece.points).collect();
     let mut own = vec![Cluster::new(); people.len()];
-    for (&i, owner) in points.iter().zip(owners(moved_m, &points, &people)) {
+    for (&i, owner) in points.iter().zip(owners(moved_m, &points, &people, PIECES_SIGMA_M)) {
         if let Some(k) = owner.filter(|&k| !has_body[k]) {
             own[k].push(i);
         }
@@ -170,6 +228,8 @@ fn join(parts: &mut [Part], i: usize, j: usize) {
     let (sum_m, top_m) = (parts[j].sum_m, parts[j].top_m);
     parts[i].sum_m += sum_m;
     parts[i].top_m = parts[i].top_m.max(top_m);
+    parts[i].owner = parts[i].owner.or(parts[j].owner);
+    parts[i].expected |= parts[j].expected;
 }
 
 /// Drops what was joined to others.
@@ -180,6 +240,9 @@ fn tidy(parts: &mut Vec<Part>) {
 
 fn is_one_person(a: &Part, b: &Part, priors: &[Prior]) -> bool {
     let apart_m = a.mean_m().distance(b.mean_m());
+    if a.owner.is_some() && b.owner.is_some() {
+        return false;
+    }
     if apart_m < ONE_PERSON_M {
         return !are_expected_apart(a.mean_m(), b.mean_m(), priors);
     }
@@ -199,12 +262,12 @@ fn are_expected_apart(a_m: DVec2, b_m: DVec2, priors: &[Prior]) -> bool {
     p.distance(q) > EXPECTED_HALVES_M && own(p, a_m) && own(q, b_m)
 }
 
-/// Where confirmed people are expected within the cluster.
-fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> Vec<DVec2> {
+/// Which confirmed people are expected within the cluster.
+fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> Vec<usize> {
     let of = || cluster.iter().map(|&i| moved_m[i as usize].truncate());
     let bounds_m = |(least, most): (DVec2, DVec2), p: DVec2| (least.min(p), most.max(p));
     let (least_m, most_m) = of().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), bounds_m);
-    let is_inside = |prior: &&Prior| {
+    let is_inside = |prior: &Prior| {
         let at_m = prior.position_m;
         // Most people are elsewhere.
         let away_m = at_m - at_m.clamp(least_m, most_m);
@@ -212,7 +275,7 @@ fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> Vec<DVec2> 
             && away_m.length_squared() < EXPECTED_M * EXPECTED_M
             && of().any(|p| p.distance(at_m) < EXPECTED_M)
     };
-    priors.iter().filter(is_inside).map(|prior| prior.position_m).collect()
+    (0..priors.len()).filter(|&k| is_inside(&priors[k])).collect()
 }
 
 /// The means of the parts, those of the longest replaced by two, half a step to either side of its middle.
@@ -318,6 +381,29 @@ mod tests {
         let close = [body(0.0, 0.0), body(0.35, 0.0)].concat();
         assert_eq!(people(&close, &[]), 1);
         assert_eq!(people(&close, &[prior(0.0, 0.0), prior(0.4, 0.0)]), 2);
+    }
+
+    #[test]
+    fn one_known_person_who_conflicts_costs_nobody_else_the_guidance() {
+        // Three in a row, as near as nobody would tell strangers apart, and a track that is left where nobody stands.
+        let row = [body(0.0, 0.0), body(0.36, 0.0), body(0.72, 0.0)].concat();
+        let mut known = [prior(0.0, 0.0), prior(0.36, 0.0), prior(0.72, 0.0)].to_vec();
+        assert_eq!(people(&row, &known), 3);
+        known.push(prior(0.3, 0.1));
+        assert!(people(&row, &known) >= 3);
+    }
+
+    #[test]
+    fn who_shows_three_points_in_a_crowd_keeps_them() {
+        let head = (0..3).map(|i| DVec3::new(0.36, 0.03 * f64::from(i), 1.6));
+        let points_m: Vec<DVec3> = body(0.0, 0.0).into_iter().chain(body(0.72, 0.0)).chain(head).collect();
+        let known = [prior(0.0, 0.0), prior(0.36, 0.0), prior(0.72, 0.0)];
+        let mut parts = Vec::new();
+        split(&points_m, &known, (0..points_m.len() as u32).collect(), &mut parts);
+        merge(&mut parts, &known);
+        give_pieces(&points_m, &mut parts, &known);
+        assert_eq!(parts.len(), 3);
+        assert!(parts.iter().any(|part| part.expected && (80..83).all(|i| part.points.contains(&i))));
     }
 
     #[test]

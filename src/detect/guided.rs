@@ -18,8 +18,9 @@ const POINT_SIGMA_M: f64 = 0.2;
 
 /// The place of each of `points` in `people`, if anybody's. `moved_m` are all points, each moved behind the surface
 /// that its sensor saw. k-means, where each person's place stays near the expected one and a body has a shape.
-pub fn owners(moved_m: &[DVec3], points: &[u32], people: &[&Prior]) -> Vec<Option<usize>> {
-    let variance = |prior: &Prior| prior.position_sigma_m.max(0.05).powi(2);
+/// Nobody's place is taken to be surer than `sigma_min_m`.
+pub fn owners(moved_m: &[DVec3], points: &[u32], people: &[&Prior], sigma_min_m: f64) -> Vec<Option<usize>> {
+    let variance = |prior: &Prior| prior.position_sigma_m.max(sigma_min_m).powi(2);
     let mut places: Vec<(DVec2, f64)> =
         people.iter().map(|prior| (prior.position_m, variance(prior))).collect();
     let mut owners = Vec::new();
@@ -95,13 +96,13 @@ mod tests {
         let points_m: Vec<DVec3> = feet.iter().map(|&(x, y)| DVec3::new(x, y, 0.1)).collect();
         let people = [prior(0.05, 0.0, DVec2::X), prior(-0.05, 0.5, DVec2::X)];
         let people: Vec<&Prior> = people.iter().collect();
-        assert_eq!(owners(&points_m, &[0, 1, 2, 3], &people), [Some(0), Some(0), Some(1), Some(1)]);
+        assert_eq!(owners(&points_m, &[0, 1, 2, 3], &people, 0.05), [Some(0), Some(0), Some(1), Some(1)]);
     }
 
     #[test]
     fn what_lies_apart_from_everybody_known_is_nobodys() {
         let points_m = [DVec3::new(0.0, 0.1, 1.2), DVec3::new(0.1, 1.0, 1.2)];
         let known = prior(0.0, 0.0, DVec2::ZERO);
-        assert_eq!(owners(&points_m, &[0, 1], &[&known]), [Some(0), None]);
+        assert_eq!(owners(&points_m, &[0, 1], &[&known], 0.05), [Some(0), None]);
     }
 }

@@ -29,6 +29,11 @@ const GATE_M: f64 = 0.8;
 /// Only a detection farther than this from every track starts one: two people side by side are 0.5 m apart, a split
 /// person's halves 0.4 m at most.
 const BIRTH_RADIUS_M: f64 = 0.45;
+/// The same in a crowd, of tracks that have a detection of their own: bodies allow no less. So many tracks so near are a
+/// crowd, whose clusters are shared out among those who are known, so that nobody is found in halves.
+const BIRTH_BESIDE_SEEN_M: f64 = 0.30;
+const CROWD_PEOPLE: usize = 3;
+const CROWD_M: f64 = 1.0;
 /// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it.
 const DUPLICATE_M: f64 = 0.3;
 /// Nobody walks faster: spares most pairs the rest.
@@ -57,6 +62,8 @@ struct Memory {
     expected: Vec<Expected>,
     /// Of people, then also of who is born.
     places_m: Vec<DVec2>,
+    /// Which of them have a detection in this frame.
+    seen: Vec<bool>,
     assignment: Assignment,
     taken: Vec<bool>,
     ranks: Vec<Rank>,
@@ -216,7 +223,9 @@ impl MixtureTracker {
     /// A track for each detection that is nobody's and far enough from everybody.
     fn give_birth(&mut self, time_ns: i64, detections: &[Detection]) {
         let Self { numbers, people, furniture_m: known_m, next_id, memory, .. } = self;
-        let Memory { order, assignment, places_m, taken, .. } = memory;
+        let Memory { order, assignment, places_m, seen, taken, .. } = memory;
+        seen.clear();
+        seen.extend(people.iter().map(|person| person.is_seen()));
         taken.clear();
         taken.resize(order.len(), false);
         assignment.column_of.iter().flatten().for_each(|&d| taken[d] = true);
@@ -224,8 +233,13 @@ impl MixtureTracker {
         places_m.extend(people.iter().map(|p| p.filter.state().position_m()));
         for (&d, _) in order.iter().zip(taken).filter(|(_, taken)| !**taken) {
             let detection = &detections[d];
-            let near = |place: &DVec2| place.distance(detection.position_m) <= BIRTH_RADIUS_M;
-            if !detection.full_body || places_m.iter().any(near) {
+            let around = places_m.iter().filter(|place| place.distance(detection.position_m) < CROWD_M);
+            let crowded = around.count() >= CROWD_PEOPLE;
+            let near = |(place_m, seen): (&DVec2, &bool)| {
+                let least_m = if crowded && *seen { BIRTH_BESIDE_SEEN_M } else { BIRTH_RADIUS_M };
+                place_m.distance(detection.position_m) <= least_m
+            };
+            if !detection.full_body || places_m.iter().zip(&*seen).any(near) {
                 continue;
             }
             let furniture_m = people.iter().filter_map(|person| person.furniture_m(time_ns));
@@ -238,6 +252,7 @@ impl MixtureTracker {
             let measured_ns = measured_ns(detection, i64::MIN, time_ns);
             person.predict(numbers, seconds(measured_ns, time_ns));
             places_m.push(detection.position_m);
+            seen.push(true);
             people.push(person);
             *next_id += 1;
         }

@@ -183,6 +183,11 @@ impl Person {
         self.origin.is_furniture(time_ns).then(|| self.filter.state().position_m())
     }
 
+    /// Whether it has a detection in this frame.
+    pub(super) fn is_seen(&self) -> bool {
+        self.points > 0
+    }
+
     /// The body that others may hide behind.
     pub(super) fn body(&self, position_m: DVec2) -> Body {
         Body { position_m, height_m: self.height.mean_m() }
@@ -271,7 +276,12 @@ pub(super) fn noise(numbers: &Numbers, detection: &Detection, view: &BodyView) -
         true => 1.0 - 2.0 * f64::from(detection.points) / view.returns_alone.max(f64::MIN_POSITIVE),
         false => 0.0,
     };
-    let hidden = low.max(few).max(0.0);
+    // The same where others hide more than half of the body: what is left to see lies to one side of it.
+    let covered = match view.beams_known {
+        true => 1.0 - 2.0 * view.returns / view.returns_alone.max(f64::MIN_POSITIVE),
+        false => 0.0,
+    };
+    let hidden = low.max(few).max(covered).max(0.0);
     let claimed = detection.covariance_m2.unwrap_or_default();
     let lasting = numbers.noise_floor_m.powi(2) + (HIDDEN_NOISE_M * hidden).powi(2);
     plus(claimed.map(|row| row.map(|c| numbers.noise_share * c)), round(lasting))
@@ -291,8 +301,13 @@ mod tests {
     /// Variance for the filter of a whole body's height with so many returns, where a body in free sight gives 40.
     fn variance_m2(points: u32, beams_known: bool) -> f64 {
         let numbers = Numbers::new(&Config::default().track);
+        let view = BodyView { returns: 40.0, returns_alone: 40.0, beams_known, ..BodyView::default() };
+        noise(&numbers, &whole_body(points), &view)[0][0]
+    }
+
+    fn whole_body(points: u32) -> Detection {
         let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.4, HEIGHT_MEAN_M) };
-        let detection = Detection {
+        Detection {
             position_m: DVec2::ZERO,
             covariance_m2: None,
             z_m: 0.9,
@@ -304,9 +319,7 @@ mod tests {
             top_diagonal_m: 0.2,
             aabb,
             obb: Obb::from_aabb(&aabb),
-        };
-        noise(&numbers, &detection, &BodyView { returns_alone: 40.0, beams_known, ..BodyView::default() })[0]
-            [0]
+        }
     }
 
     #[test]
@@ -319,6 +332,19 @@ mod tests {
             variance_m2(20, true)
         );
         assert!(variance_m2(2, true) > variance_m2(8, true));
+    }
+
+    #[test]
+    fn what_others_leave_to_see_of_a_body_is_hardly_believed() {
+        let numbers = Numbers::new(&Config::default().track);
+        let view = |returns: f64| BodyView {
+            returns,
+            returns_alone: 40.0,
+            beams_known: true,
+            ..BodyView::default()
+        };
+        let covered = [40.0, 25.0, 5.0].map(|returns| noise(&numbers, &whole_body(40), &view(returns))[0][0]);
+        assert!(covered[0] == covered[1] && covered[2] > 4.0 * covered[0], "{covered:?}");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use umbracast_sim::body::Bodies;
 use umbracast_sim::body::Gait;
 use umbracast_sim::crowd::Preset;
 use umbracast_sim::crowd::floor::from_piece_m;
-use umbracast_sim::crowd::replay::{Recorded, replay};
+use umbracast_sim::crowd::{Recorded, move_apart, replay};
 
 use crate::args::{BodyArgs, Replay};
 use crate::say;
@@ -66,6 +66,7 @@ pub fn recorded_scenes(
         let recorded: Vec<Recorded> =
             people.iter().map(|p| Recorded { samples: &p.samples, height_m: p.height_m }).collect();
         let mut crowd = replay(&recorded, replayed.smooth).map_err(|e| e.within(file.display()))?;
+        let apart_m = move_apart(&mut crowd);
         let numbers = people.iter().map(|person| u32::try_from(person.id));
         let numbers: Result<Vec<u32>, _> = numbers.collect();
         match numbers {
@@ -83,8 +84,13 @@ pub fn recorded_scenes(
             true => format!("moved by ({:.2}, {:.2}) m to the middle of the site", by_m.x, by_m.y),
             false => "where they were recorded".to_owned(),
         };
+        // Below a centimetre nobody would see it.
+        let room = match apart_m < 0.01 {
+            true => String::new(),
+            false => format!(", moved apart by up to {apart_m:.2} m, for bodies do not fit into each other"),
+        };
         let told = format!(
-            "{group}, seed {seed}: {} people, {:.1} s, {place}",
+            "{group}, seed {seed}: {} people, {:.1} s, {place}{room}",
             people.len(),
             crowd.duration_ns as f64 * 1e-9
         );

@@ -13,7 +13,9 @@ mod ground;
 mod strolling;
 mod speed_augmentation;
 pub mod replay;
+mod apart;
 
+pub use apart::move_apart;
 pub use circle::circle_crossing;
 pub use ground::{Ground, drawn};
 pub use mixed::pairs;
