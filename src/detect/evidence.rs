@@ -1,7 +1,9 @@
 //! One person more, or one fewer? A cluster is split as long as its parts lie farther apart than the halves of one
 //! body, and parts nearer than two bodies can stand become one. Where people are expected moves both thresholds.
 
+use super::arms::{ARM_M, have_one_head, is_arm};
 use super::guided::owners;
+use super::part::Part;
 use super::{Cluster, Prior};
 use crate::geometry::{DVec2, DVec3};
 
@@ -27,32 +29,9 @@ const PASSES: usize = 10;
 /// Points that deviate more than this along their longest axis are more than four people in a row.
 const CROWD_M: f64 = 0.7;
 
-/// A part of the foreground that may be a person.
-#[derive(Debug, Clone)]
-pub struct Part {
-    /// Indices of its points, ascending.
-    pub points: Cluster,
-    /// True for pieces that were joined to a person because one is expected there.
-    pub expected: bool,
-    sum_m: DVec2,
-    top_m: f64,
-}
-
-impl Part {
-    fn new(moved_m: &[DVec3], points: Cluster) -> Self {
-        let sum_m = points.iter().map(|&i| moved_m[i as usize].truncate()).sum();
-        let top_m = points.iter().map(|&i| moved_m[i as usize].z).fold(0.0, f64::max);
-        Self { points, expected: false, sum_m, top_m }
-    }
-
-    fn mean_m(&self) -> DVec2 {
-        self.sum_m / self.points.len().max(1) as f64
-    }
-}
-
 /// Splits a cluster as long as one person more is likelier; parts go to `parts`. `moved_m` are all points, each
 /// moved behind the surface that its sensor saw.
-pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut Vec<Part>) {
+pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut Vec<Part>) {
     if cluster.len() < 2 * POINTS_MIN {
         parts.push(Part::new(moved_m, cluster));
         return;
@@ -74,14 +53,22 @@ pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut 
         .filter(|people| are_people(people, EXPECTED_HALVES_M))
         .unwrap_or_else(|| vec![all.clone()]);
     // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
-    // are never counted: two of them may be one person or two.
+    // are never counted: two of them may be one person or two. Nor are arms.
     while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
         && are_people(&more, HALVES_M)
         && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
+        && !are_of_one_body(moved_m, &more)
     {
         people = more;
     }
     parts.append(&mut people);
+}
+
+/// True when two of them share a head, or one is another's arm.
+fn are_of_one_body(moved_m: &[DVec3], parts: &[Part]) -> bool {
+    let of_one =
+        |a: &Part, b: &Part| have_one_head(moved_m, a, b) || is_arm(moved_m, a, b) || is_arm(moved_m, b, a);
+    parts.iter().enumerate().any(|(k, a)| parts[k + 1..].iter().any(|b| of_one(a, b)))
 }
 
 /// True when all stand apart and show enough.
@@ -90,10 +77,10 @@ fn are_people(parts: &[Part], apart_m: f64) -> bool {
     parts.iter().enumerate().all(|(k, a)| a.points.len() >= POINTS_MIN && apart(k, a))
 }
 
-/// Joins parts that are one person, nearest first: those nearer than two people can stand, and legs that lost
+/// Joins parts that are one person, nearest first: those nearer than two people can stand, and legs and arms that lost
 /// their body.
-pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
-    let reach_m = ONE_PERSON_M.max(LIMB_M);
+pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
+    let reach_m = ONE_PERSON_M.max(LIMB_M).max(ARM_M);
     let mut order: Vec<usize> = (0..parts.len()).collect();
     order.sort_by(|&a, &b| parts[a].mean_m().x.total_cmp(&parts[b].mean_m().x));
     let mut candidates = Vec::new();
@@ -119,7 +106,7 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
     };
     for (_, i, j) in candidates {
         let (i, j) = (root(&into, i), root(&into, j));
-        if i == j || !is_one_person(&parts[i], &parts[j], priors) {
+        if i == j || !is_one_person(moved_m, &parts[i], &parts[j], priors) {
             continue;
         }
         join(parts, i, j);
@@ -130,7 +117,7 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
 
 /// Gives the points of pieces to the expected people whose bodies are nowhere: legs where the beams pass below the
 /// hips, or the few points that others let through. Without an expected person such pieces are nobody.
-pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
+pub(super) fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
     let people: Vec<&Prior> = priors.iter().filter(|prior| prior.confirmed).collect();
     let off_m = |part: &Part, k: usize| people[k].position_m.distance(part.mean_m());
     let is_near = |part: &Part, k: usize| off_m(part, k) < LIMB_M + people[k].position_sigma_m.min(LIMB_M);
@@ -178,14 +165,20 @@ fn tidy(parts: &mut Vec<Part>) {
     parts.iter_mut().for_each(|part| part.points.sort_unstable());
 }
 
-fn is_one_person(a: &Part, b: &Part, priors: &[Prior]) -> bool {
+fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> bool {
     let apart_m = a.mean_m().distance(b.mean_m());
     if apart_m < ONE_PERSON_M {
         return !are_expected_apart(a.mean_m(), b.mean_m(), priors);
     }
     // A leg in mid-stride stands apart from its body, is low, and shows less.
     let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
-    apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m
+    let is_leg = apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m;
+    is_leg || is_arm(moved_m, small, large) && !is_somebody(small, priors)
+}
+
+/// True where a confirmed person is expected.
+fn is_somebody(part: &Part, priors: &[Prior]) -> bool {
+    priors.iter().any(|prior| prior.confirmed && prior.position_m.distance(part.mean_m()) < EXPECTED_M)
 }
 
 /// True when each of the two is where another confirmed person is expected.
@@ -291,7 +284,7 @@ mod tests {
     fn people(points_m: &[DVec3], priors: &[Prior]) -> usize {
         let mut parts = Vec::new();
         split(points_m, priors, (0..points_m.len() as u32).collect(), &mut parts);
-        merge(&mut parts, priors);
+        merge(points_m, &mut parts, priors);
         parts.len()
     }
 
@@ -344,7 +337,7 @@ mod tests {
         points_m.extend((0..8).map(|i| DVec3::new(0.4, 0.0, 0.1 * f64::from(i))));
         let mut parts =
             vec![Part::new(&points_m, (0..40).collect()), Part::new(&points_m, (40..48).collect())];
-        merge(&mut parts, &[]);
+        merge(&points_m, &mut parts, &[]);
         assert_eq!(parts.len(), 1);
         assert_eq!(parts[0].points.len(), 48);
     }
