@@ -38,3 +38,51 @@ fn head_m(moved_m: &[DVec3], part: &Part) -> DVec2 {
     let (sum_m, n) = high.fold((DVec2::ZERO, 0.0), |(sum_m, n), p| (sum_m + p.truncate(), n + 1.0));
     sum_m / f64::max(n, 1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Somebody of 1.75 m who stands at x = 0: 40 points from the floor to the head.
+    fn body() -> Vec<DVec3> {
+        let round = |i: u32| DVec2::from_angle(f64::from(i) * 2.4) * if i > 36 { 0.07 } else { 0.15 };
+        (0..40).map(|i| round(i).extend(0.05 + 0.0435 * f64::from(i))).collect()
+    }
+
+    /// From the shoulder to the hand, stretched out along x to one side.
+    fn arm(side: f64) -> Vec<DVec3> {
+        (0..12)
+            .map(|i| DVec3::new(side * (0.3 + 0.05 * f64::from(i)), 0.0, 1.4 - 0.02 * f64::from(i)))
+            .collect()
+    }
+
+    fn parts(points_m: &[&[DVec3]]) -> (Vec<DVec3>, Vec<Part>) {
+        let all = points_m.concat();
+        let mut from = 0;
+        let parts = points_m.iter().map(|points| {
+            let own = from..from + points.len() as u32;
+            from = own.end;
+            Part::new(&all, own.collect())
+        });
+        let parts = parts.collect();
+        (all, parts)
+    }
+
+    #[test]
+    fn a_stretched_arm_is_its_owners_and_another_person_is_not() {
+        let (points_m, both) = parts(&[&body(), &arm(1.0)]);
+        assert!(is_arm(&points_m, &both[1], &both[0]) && !is_arm(&points_m, &both[0], &both[1]));
+        let other: Vec<DVec3> = body().iter().map(|p| *p + DVec3::X * 0.6).collect();
+        let (points_m, both) = parts(&[&body(), &other]);
+        assert!(!is_arm(&points_m, &both[1], &both[0]) && !have_one_head(&points_m, &both[0], &both[1]));
+    }
+
+    #[test]
+    fn halves_of_somebody_with_both_arms_out_have_one_head() {
+        let whole = [body(), arm(1.0), arm(-1.0)].concat();
+        let (left, right): (Vec<DVec3>, Vec<DVec3>) = whole.iter().partition(|p| p.x < 0.0);
+        let (points_m, halves) = parts(&[&left, &right]);
+        assert!(halves[0].mean_m().distance(halves[1].mean_m()) > 0.42, "they look like two");
+        assert!(have_one_head(&points_m, &halves[0], &halves[1]));
+    }
+}

@@ -49,7 +49,7 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
     }
     let cluster = &all.points;
     let expected_m = expected(moved_m, priors, cluster);
-    let mut people = means(moved_m, cluster, expected_m)
+    let mut people = means(moved_m, cluster, expected_m.clone())
         .filter(|people| are_people(people, EXPECTED_HALVES_M))
         .unwrap_or_else(|| vec![all.clone()]);
     // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
@@ -57,7 +57,7 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
     while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
         && are_people(&more, HALVES_M)
         && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
-        && !are_of_one_body(moved_m, &more)
+        && !(expected_m.len() < 2 && are_of_one_body(moved_m, &more))
     {
         people = more;
     }
@@ -173,12 +173,16 @@ fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> boo
     // A leg in mid-stride stands apart from its body, is low, and shows less.
     let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
     let is_leg = apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m;
-    is_leg || is_arm(moved_m, small, large) && !is_somebody(small, priors)
+    is_leg || is_arm(moved_m, small, large) && !are_several(small, large, priors)
 }
 
-/// True where a confirmed person is expected.
-fn is_somebody(part: &Part, priors: &[Prior]) -> bool {
-    priors.iter().any(|prior| prior.confirmed && prior.position_m.distance(part.mean_m()) < EXPECTED_M)
+/// True where more than one confirmed person is expected within an arm's reach of two parts.
+fn are_several(a: &Part, b: &Part, priors: &[Prior]) -> bool {
+    let is_near = |prior: &&Prior| {
+        let off_m = |part: &Part| prior.position_m.distance(part.mean_m());
+        prior.confirmed && off_m(a).min(off_m(b)) < ARM_M
+    };
+    priors.iter().filter(is_near).count() > 1
 }
 
 /// True when each of the two is where another confirmed person is expected.

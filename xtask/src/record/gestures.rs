@@ -13,7 +13,9 @@ const SCENES: u64 = 20;
 /// People in a scene, and how long it lasts.
 const PEOPLE: u32 = 3;
 const SECONDS: f64 = 60.0;
-/// From the sensor; they step about by less than [`ABOUT_M`].
+/// They come from here, a metre a second, for who never walked is furniture.
+const COME_FROM_M: f64 = 11.8;
+/// Where they stand, from the sensor; they step about by less than [`ABOUT_M`].
 const FROM_M: f64 = 3.5;
 const TO_M: f64 = 7.5;
 const ABOUT_M: f64 = 0.4;
@@ -138,25 +140,26 @@ fn count(people: &[Row], tracks: &[Row]) -> Counted {
     }
 }
 
-/// `t_s,id,x_m,y_m` of people who stand around the middle and take a small step every few seconds.
+/// `t_s,id,x_m,y_m` of people who come, stand around the middle and take a small step every few seconds.
 fn scene(seed: u64) -> String {
     let mut draw = draws(seed);
     let mut people = Vec::new();
     for person in 0..PEOPLE {
         let angle = TAU / f64::from(PEOPLE) * f64::from(person) + 1.2 * draw();
         let radius_m = FROM_M + (TO_M - FROM_M) * draw();
-        let home = (radius_m * angle.cos(), radius_m * angle.sin());
-        let (mut at, mut goal, mut step_s) = (home, home, 1.0 + 2.0 * draw());
+        let on_ray = |radius_m: f64| (radius_m * angle.cos(), radius_m * angle.sin());
+        let (home, comes_s) = (on_ray(radius_m), COME_FROM_M - radius_m);
+        let (mut at, mut goal, mut step_s) = (on_ray(COME_FROM_M), home, comes_s + 1.0 + 2.0 * draw());
         let way = (0..=(10.0 * SECONDS) as u32).map(|k| {
-            let now = at;
-            if 0.1 * f64::from(k) >= step_s {
+            let (now, time_s) = (at, 0.1 * f64::from(k));
+            if time_s >= step_s {
                 let (turn, far_m) = (TAU * draw(), 0.1 + 0.2 * draw());
                 let near = |home_m: f64, to_m: f64| home_m + (to_m - home_m).clamp(-ABOUT_M, ABOUT_M);
                 goal = (near(home.0, at.0 + far_m * turn.cos()), near(home.1, at.1 + far_m * turn.sin()));
-                step_s = 0.1 * f64::from(k) + 2.0 + 3.0 * draw();
+                step_s = time_s + 2.0 + 3.0 * draw();
             }
-            let off_m = (goal.0 - at.0).hypot(goal.1 - at.1);
-            let share = (0.04 / off_m.max(0.04)).min(1.0);
+            let most_m = if time_s < comes_s { 0.1 } else { 0.04 };
+            let share = most_m / (goal.0 - at.0).hypot(goal.1 - at.1).max(most_m);
             at = (at.0 + (goal.0 - at.0) * share, at.1 + (goal.1 - at.1) * share);
             now
         });
