@@ -14,13 +14,14 @@ const HEAD_M: f64 = 0.2;
 /// Nobody's head is nearer than this to another's.
 const HEADS_M: f64 = 0.3;
 
-/// True when `small` may be an arm of `large`, which stands on the floor.
-pub(super) fn is_arm(moved_m: &[DVec3], small: &Part, large: &Part) -> bool {
+/// True when `small` may be an arm of `large`, which is known to be somebody or else seen to stand on the floor: beams may
+/// pass above the legs of who is near.
+pub(super) fn is_arm(moved_m: &[DVec3], small: &Part, large: &Part, is_known: bool) -> bool {
     let hand_m = HAND_SHARE * large.top_m;
     small.points.len() <= large.points.len()
         && small.mean_m().distance(large.mean_m()) < ARM_M
         && low_share(moved_m, small, hand_m) < LOW_SHARE
-        && low_share(moved_m, large, hand_m) >= LOW_SHARE
+        && (is_known || low_share(moved_m, large, hand_m) >= LOW_SHARE)
 }
 
 /// True when the highest points of both are of one head: halves of somebody whose arms are stretched out to both sides.
@@ -71,10 +72,13 @@ mod tests {
     #[test]
     fn a_stretched_arm_is_its_owners_and_another_person_is_not() {
         let (points_m, both) = parts(&[&body(), &arm(1.0)]);
-        assert!(is_arm(&points_m, &both[1], &both[0]) && !is_arm(&points_m, &both[0], &both[1]));
+        assert!(is_arm(&points_m, &both[1], &both[0], false));
+        assert!(!is_arm(&points_m, &both[0], &both[1], true));
         let other: Vec<DVec3> = body().iter().map(|p| *p + DVec3::X * 0.6).collect();
         let (points_m, both) = parts(&[&body(), &other]);
-        assert!(!is_arm(&points_m, &both[1], &both[0]) && !have_one_head(&points_m, &both[0], &both[1]));
+        assert!(
+            !is_arm(&points_m, &both[1], &both[0], true) && !have_one_head(&points_m, &both[0], &both[1])
+        );
     }
 
     #[test]

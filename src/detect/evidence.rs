@@ -57,7 +57,7 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
     while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
         && are_people(&more, HALVES_M)
         && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
-        && !(expected_m.len() < 2 && are_of_one_body(moved_m, &more))
+        && !(expected_m.len() < 2 && are_of_one_body(moved_m, &more, expected_m.len() == 1))
     {
         people = more;
     }
@@ -65,9 +65,10 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
 }
 
 /// True when two of them share a head, or one is another's arm.
-fn are_of_one_body(moved_m: &[DVec3], parts: &[Part]) -> bool {
-    let of_one =
-        |a: &Part, b: &Part| have_one_head(moved_m, a, b) || is_arm(moved_m, a, b) || is_arm(moved_m, b, a);
+fn are_of_one_body(moved_m: &[DVec3], parts: &[Part], is_known: bool) -> bool {
+    let of_one = |a: &Part, b: &Part| {
+        have_one_head(moved_m, a, b) || is_arm(moved_m, a, b, is_known) || is_arm(moved_m, b, a, is_known)
+    };
     parts.iter().enumerate().any(|(k, a)| parts[k + 1..].iter().any(|b| of_one(a, b)))
 }
 
@@ -173,16 +174,17 @@ fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> boo
     // A leg in mid-stride stands apart from its body, is low, and shows less.
     let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
     let is_leg = apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m;
-    is_leg || is_arm(moved_m, small, large) && !are_several(small, large, priors)
+    let known = expected_near(small, large, priors);
+    is_leg || known < 2 && is_arm(moved_m, small, large, known == 1)
 }
 
-/// True where more than one confirmed person is expected within an arm's reach of two parts.
-fn are_several(a: &Part, b: &Part, priors: &[Prior]) -> bool {
+/// How many confirmed people are expected within an arm's reach of two parts.
+fn expected_near(a: &Part, b: &Part, priors: &[Prior]) -> usize {
     let is_near = |prior: &&Prior| {
         let off_m = |part: &Part| prior.position_m.distance(part.mean_m());
         prior.confirmed && off_m(a).min(off_m(b)) < ARM_M
     };
-    priors.iter().filter(is_near).count() > 1
+    priors.iter().filter(is_near).count()
 }
 
 /// True when each of the two is where another confirmed person is expected.
