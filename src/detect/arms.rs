@@ -18,10 +18,11 @@ const HEADS_M: f64 = 0.3;
 /// pass above the legs of who is near.
 pub(super) fn is_arm(moved_m: &[DVec3], small: &Part, large: &Part, is_known: bool) -> bool {
     let hand_m = HAND_SHARE * large.top_m;
-    small.points.len() <= large.points.len()
+    let may_own = is_known
+        || small.points.len() <= large.points.len() && low_share(moved_m, large, hand_m) >= LOW_SHARE;
+    may_own
         && small.mean_m().distance(large.mean_m()) < ARM_M
         && low_share(moved_m, small, hand_m) < LOW_SHARE
-        && (is_known || low_share(moved_m, large, hand_m) >= LOW_SHARE)
 }
 
 /// True when the highest points of both are of one head: halves of somebody whose arms are stretched out to both sides.

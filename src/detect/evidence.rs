@@ -175,7 +175,9 @@ fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> boo
     let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
     let is_leg = apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m;
     let known = expected_near(small, large, priors);
-    is_leg || known < 2 && is_arm(moved_m, small, large, known == 1)
+    is_leg
+        || known < 2
+            && (is_arm(moved_m, small, large, known == 1) || is_arm(moved_m, large, small, known == 1))
 }
 
 /// How many confirmed people are expected within an arm's reach of two parts.
