@@ -2,6 +2,7 @@
 //! z up, floor at z = 0. Read from the `site` part of a configuration file; see `config/default.toml`.
 
 mod hall;
+mod optics;
 
 use std::collections::BTreeMap;
 
@@ -12,6 +13,7 @@ use crate::geometry::Pose;
 
 pub use hall::Hall;
 pub(crate) use hall::{doubled_area_m2, from_segment_m};
+pub use optics::{DarkCloth, MixedReturns, Pane, Surface};
 
 /// The place that is watched.
 ///
@@ -230,6 +232,18 @@ pub struct Simulation {
     /// Sensors that hang elsewhere than the site says, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub slip: BTreeMap<String, Slip>,
+    /// Sensors whose ranges are too long, by name: by how many metres.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub range_bias_m: BTreeMap<String, f64>,
+    /// Beams that meet an edge; without it they are lines.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mixed_returns: Option<MixedReturns>,
+    /// Who is hard to see.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dark_cloth: Option<DarkCloth>,
+    /// Glass and mirrors.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub panes: Vec<Pane>,
 }
 
 /// How a simulated sensor comes to hang elsewhere.

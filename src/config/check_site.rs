@@ -85,8 +85,9 @@ fn simulation(site: &Site) -> Result<(), Error> {
     let lost = lost.iter().map(of("lost_after_s", 0.0, f64::INFINITY));
     let slips = site.simulation.slip.iter().map(|(name, slip)| (name, &slip.after_s));
     let lost = lost.chain(slips.map(of("slip", 0.0, f64::INFINITY)));
+    let bias = site.simulation.range_bias_m.iter().map(of("range_bias_m", -1.0, 1.0));
     for (key, name, value, least, most) in
-        lost.chain(ahead.iter().map(of("clock_ahead_ms", -CLOCK_MS, CLOCK_MS)))
+        lost.chain(ahead.iter().map(of("clock_ahead_ms", -CLOCK_MS, CLOCK_MS))).chain(bias)
     {
         let key = format!("site.simulation.{key}.{name}");
         if !site.sensors.iter().any(|sensor| sensor.name == *name) {
@@ -94,6 +95,35 @@ fn simulation(site: &Site) -> Result<(), Error> {
             return Err(Error::new(format!("{key}: expected one of {}, found {name}", known.join(", "))));
         }
         within(&key, value, least, most)?;
+    }
+    optics(site)
+}
+
+fn optics(site: &Site) -> Result<(), Error> {
+    if let Some(mixed) = &site.simulation.mixed_returns {
+        within("site.simulation.mixed_returns.divergence_mrad", mixed.divergence_mrad, 0.0, 100.0)?;
+        within("site.simulation.mixed_returns.pulse_m", mixed.pulse_m, 0.0, 10.0)?;
+    }
+    if let Some(dark) = &site.simulation.dark_cloth {
+        within("site.simulation.dark_cloth.people", dark.people, 0.0, 1.0)?;
+        within("site.simulation.dark_cloth.dropout", dark.dropout, 0.0, 1.0)?;
+    }
+    for (i, pane) in site.simulation.panes.iter().enumerate() {
+        let key = |key: &str| format!("site.simulation.panes[{i}].{key}");
+        let [least, most] = site.hall.bounds_m();
+        for (end, [x_m, y_m]) in [("from_m", pane.from_m), ("to_m", pane.to_m)] {
+            within(&format!("{}, x (within the hall)", key(end)), x_m, least.x, most.x)?;
+            within(&format!("{}, y (within the hall)", key(end)), y_m, least.y, most.y)?;
+        }
+        if pane.from_m == pane.to_m {
+            let found = pane.to_m;
+            return Err(Error::new(format!(
+                "{}: expected another place than from_m, found {found:?}",
+                key("to_m")
+            )));
+        }
+        within(&key("bottom_m"), pane.bottom_m, 0.0, site.hall.height_m)?;
+        within(&key("top_m (above bottom_m)"), pane.top_m, pane.bottom_m, site.hall.height_m)?;
     }
     Ok(())
 }
@@ -170,9 +200,10 @@ fn size_m(site: &Site) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::site::{DarkCloth, Pane, Surface};
     use crate::{Config, Mode};
 
-    const SITES: [&str; 9] = [
+    const SITES: [&str; 10] = [
         include_str!("../../config/sites/hand-mounted.toml"),
         include_str!("../../config/sites/corridor.toml"),
         include_str!("../../config/sites/hexagon.toml"),
@@ -182,7 +213,11 @@ mod tests {
         include_str!("../../config/sites/lost-sensor.toml"),
         include_str!("../../config/sites/slipping-sensor.toml"),
         include_str!("../../config/sites/turned-sensor.toml"),
+        include_str!("../../config/sites/glass.toml"),
     ];
+
+    const PANE: Pane =
+        Pane { from_m: [0.0; 2], to_m: [3.0, 0.0], bottom_m: 0.0, top_m: 2.0, surface: Surface::Glass };
 
     #[test]
     fn every_site_that_ships_is_accepted() {
@@ -195,7 +230,7 @@ mod tests {
     #[test]
     fn what_cannot_be_is_refused_with_key_name_expected_and_found() {
         type Change = fn(&mut Site);
-        let wrong: [(Change, &str); 31] = [
+        let wrong: [(Change, &str); 34] = [
             (|s| s.hall.height_m = 0.0, "site.hall.height_m: expected more than 0 and 1000 at most, found 0"),
             (|s| s.hall.width_m = f64::NAN, "site.hall.width_m: expected more than 0"),
             (|s| s.sensors.clear(), "site.sensors: expected one or more, found none"),
@@ -271,6 +306,18 @@ mod tests {
             (
                 |s| s.simulation.clock_ahead_ms = [("door".to_owned(), 3.0)].into(),
                 "site.simulation.clock_ahead_ms.door: expected one of lidar_east, lidar_west, found door",
+            ),
+            (
+                |s| s.simulation.range_bias_m = [("lidar_west".to_owned(), 3.0)].into(),
+                "site.simulation.range_bias_m.lidar_west: expected -1 to 1, found 3",
+            ),
+            (
+                |s| s.simulation.dark_cloth = Some(DarkCloth { people: 0.5, dropout: 20.0 }),
+                "site.simulation.dark_cloth.dropout: expected 0 to 1, found 20",
+            ),
+            (
+                |s| s.simulation.panes = vec![Pane { to_m: [3.0, 18.0], ..PANE }],
+                "site.simulation.panes[0].to_m, y (within the hall): expected -17 to 17, found 18",
             ),
             (
                 |s| s.sensors[1].clock_offset_ms = f64::NAN,

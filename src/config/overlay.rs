@@ -52,7 +52,7 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 11] = [
+const OPTIONAL: [(&str, &str, &str); 15] = [
     ("site.hall", "outline_m", "an array"),
     ("site.sensors", "address", "a string"),
     ("site.sensors", "calibration", "a string"),
@@ -64,6 +64,10 @@ const OPTIONAL: [(&str, &str, &str); 11] = [
     ("site.simulation", "slip", "a table"),
     ("site.simulation", "entrances_m", "an array"),
     ("site.simulation", "places_m", "an array"),
+    ("site.simulation", "range_bias_m", "a table"),
+    ("site.simulation", "mixed_returns", "a table"),
+    ("site.simulation", "dark_cloth", "a table"),
+    ("site.simulation", "panes", "an array"),
 ];
 
 type Complain<'a> = &'a dyn Fn(usize, String) -> Error;

@@ -1,7 +1,9 @@
 //! One person more, or one fewer? A cluster is split as long as its parts lie farther apart than the halves of one
 //! body, and parts nearer than two bodies can stand become one. Where people are expected moves both thresholds.
 
+use super::arms::{ARM_M, have_one_head, is_arm};
 use super::guided::owners;
+use super::part::Part;
 use super::{Cluster, Prior};
 use crate::geometry::{DVec2, DVec3};
 
@@ -34,34 +36,9 @@ const BESIDE_M: f64 = 0.30;
 /// Points that deviate more than this along their longest axis are more than four people in a row.
 const CROWD_M: f64 = 0.7;
 
-/// A part of the foreground that may be a person.
-#[derive(Debug, Clone)]
-pub struct Part {
-    /// Indices of its points, ascending.
-    pub points: Cluster,
-    /// True for points that are somebody's only because one is expected there.
-    pub expected: bool,
-    /// The person of the priors whose points these are, where that was found by who stands where.
-    owner: Option<usize>,
-    sum_m: DVec2,
-    top_m: f64,
-}
-
-impl Part {
-    fn new(moved_m: &[DVec3], points: Cluster) -> Self {
-        let sum_m = points.iter().map(|&i| moved_m[i as usize].truncate()).sum();
-        let top_m = points.iter().map(|&i| moved_m[i as usize].z).fold(0.0, f64::max);
-        Self { points, expected: false, owner: None, sum_m, top_m }
-    }
-
-    fn mean_m(&self) -> DVec2 {
-        self.sum_m / self.points.len().max(1) as f64
-    }
-}
-
 /// Splits a cluster as long as one person more is likelier; parts go to `parts`. `moved_m` are all points, each
 /// moved behind the surface that its sensor saw.
-pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut Vec<Part>) {
+pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut Vec<Part>) {
     if cluster.len() < 2 * POINTS_MIN {
         parts.push(Part::new(moved_m, cluster));
         return;
@@ -88,10 +65,11 @@ pub fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut 
     }
     let mut people = guided.unwrap_or_else(|| vec![all.clone()]);
     // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
-    // are never counted: two of them may be one person or two.
+    // are never counted: two of them may be one person or two. Nor are arms.
     while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
         && are_people(&more, HALVES_M)
         && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
+        && !(known.len() < 2 && are_of_one_body(moved_m, &more, known.len() == 1))
     {
         people = more;
     }
@@ -132,16 +110,24 @@ fn among_known(moved_m: &[DVec3], priors: &[Prior], known: &[usize], cluster: &[
     }
 }
 
+/// True when two of them share a head, or one is another's arm.
+fn are_of_one_body(moved_m: &[DVec3], parts: &[Part], is_known: bool) -> bool {
+    let of_one = |a: &Part, b: &Part| {
+        have_one_head(moved_m, a, b) || is_arm(moved_m, a, b, is_known) || is_arm(moved_m, b, a, is_known)
+    };
+    parts.iter().enumerate().any(|(k, a)| parts[k + 1..].iter().any(|b| of_one(a, b)))
+}
+
 /// True when all stand apart and show enough.
 fn are_people(parts: &[Part], apart_m: f64) -> bool {
     let apart = |k: usize, a: &Part| parts[k + 1..].iter().all(|b| a.mean_m().distance(b.mean_m()) > apart_m);
     parts.iter().enumerate().all(|(k, a)| a.points.len() >= POINTS_MIN && apart(k, a))
 }
 
-/// Joins parts that are one person, nearest first: those nearer than two people can stand, and legs that lost
+/// Joins parts that are one person, nearest first: those nearer than two people can stand, and legs and arms that lost
 /// their body.
-pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
-    let reach_m = ONE_PERSON_M.max(LIMB_M);
+pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
+    let reach_m = ONE_PERSON_M.max(LIMB_M).max(ARM_M);
     let mut order: Vec<usize> = (0..parts.len()).collect();
     order.sort_by(|&a, &b| parts[a].mean_m().x.total_cmp(&parts[b].mean_m().x));
     let mut candidates = Vec::new();
@@ -167,7 +153,7 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
     };
     for (_, i, j) in candidates {
         let (i, j) = (root(&into, i), root(&into, j));
-        if i == j || !is_one_person(&parts[i], &parts[j], priors) {
+        if i == j || !is_one_person(moved_m, &parts[i], &parts[j], priors) {
             continue;
         }
         join(parts, i, j);
@@ -178,7 +164,7 @@ pub fn merge(parts: &mut Vec<Part>, priors: &[Prior]) {
 
 /// Gives the points of pieces to the expected people whose bodies are nowhere: legs where the beams pass below the
 /// hips, or the few points that others let through. Without an expected person such pieces are nobody.
-pub fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
+pub(super) fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
     let confirmed: Vec<usize> = (0..priors.len()).filter(|&k| priors[k].confirmed).collect();
     let people: Vec<&Prior> = confirmed.iter().map(|&k| &priors[k]).collect();
     let off_m = |part: &Part, k: usize| people[k].position_m.distance(part.mean_m());
@@ -238,7 +224,7 @@ fn tidy(parts: &mut Vec<Part>) {
     parts.iter_mut().for_each(|part| part.points.sort_unstable());
 }
 
-fn is_one_person(a: &Part, b: &Part, priors: &[Prior]) -> bool {
+fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> bool {
     let apart_m = a.mean_m().distance(b.mean_m());
     if a.owner.is_some() && b.owner.is_some() {
         return false;
@@ -248,7 +234,20 @@ fn is_one_person(a: &Part, b: &Part, priors: &[Prior]) -> bool {
     }
     // A leg in mid-stride stands apart from its body, is low, and shows less.
     let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
-    apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m
+    let is_leg = apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m;
+    let known = expected_near(small, large, priors);
+    is_leg
+        || known < 2
+            && (is_arm(moved_m, small, large, known == 1) || is_arm(moved_m, large, small, known == 1))
+}
+
+/// How many confirmed people are expected within an arm's reach of two parts.
+fn expected_near(a: &Part, b: &Part, priors: &[Prior]) -> usize {
+    let is_near = |prior: &&Prior| {
+        let off_m = |part: &Part| prior.position_m.distance(part.mean_m());
+        prior.confirmed && off_m(a).min(off_m(b)) < ARM_M
+    };
+    priors.iter().filter(is_near).count()
 }
 
 /// True when each of the two is where another confirmed person is expected.
@@ -354,7 +353,7 @@ mod tests {
     fn people(points_m: &[DVec3], priors: &[Prior]) -> usize {
         let mut parts = Vec::new();
         split(points_m, priors, (0..points_m.len() as u32).collect(), &mut parts);
-        merge(&mut parts, priors);
+        merge(points_m, &mut parts, priors);
         parts.len()
     }
 
@@ -400,7 +399,7 @@ mod tests {
         let known = [prior(0.0, 0.0), prior(0.36, 0.0), prior(0.72, 0.0)];
         let mut parts = Vec::new();
         split(&points_m, &known, (0..points_m.len() as u32).collect(), &mut parts);
-        merge(&mut parts, &known);
+        merge(&points_m, &mut parts, &known);
         give_pieces(&points_m, &mut parts, &known);
         assert_eq!(parts.len(), 3);
         assert!(parts.iter().any(|part| part.expected && (80..83).all(|i| part.points.contains(&i))));
@@ -430,7 +429,7 @@ mod tests {
         points_m.extend((0..8).map(|i| DVec3::new(0.4, 0.0, 0.1 * f64::from(i))));
         let mut parts =
             vec![Part::new(&points_m, (0..40).collect()), Part::new(&points_m, (40..48).collect())];
-        merge(&mut parts, &[]);
+        merge(&points_m, &mut parts, &[]);
         assert_eq!(parts.len(), 1);
         assert_eq!(parts[0].points.len(), 48);
     }

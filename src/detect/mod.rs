@@ -13,6 +13,8 @@ mod background;
 pub mod features;
 mod dp_means;
 mod guided;
+mod part;
+mod arms;
 mod evidence;
 mod split_merge;
 #[doc(hidden)] // The model of the body axis, for its fit and for the command that shows it.

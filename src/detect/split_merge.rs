@@ -2,8 +2,8 @@
 
 use super::cluster::PlanGrid;
 use super::dp_means::MergeMean;
-use super::evidence::Part;
 use super::features::away;
+use super::part::Part;
 use super::{Cluster, Point, Prior, dp_means, evidence};
 use crate::Site;
 use crate::config::{ClusterMethod, DetectConfig, Mechanism};
@@ -127,7 +127,7 @@ impl Clusterer {
         for component in self.components.drain(..) {
             evidence::split(&self.moved_m, priors, component, &mut self.parts);
         }
-        evidence::merge(&mut self.parts, priors);
+        evidence::merge(&self.moved_m, &mut self.parts, priors);
         evidence::give_pieces(&self.moved_m, &mut self.parts, priors);
         let all = self.parts.drain(..).filter(|p| p.expected || p.points.len() >= self.radius.points_min);
         clusters.extend(all.map(|part| part.points));

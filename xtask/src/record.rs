@@ -4,6 +4,8 @@
 mod book;
 mod calibrate;
 mod crowds;
+mod gestures;
+mod glass;
 mod house;
 mod living;
 mod locked;
@@ -41,7 +43,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 34] = [
+const JOBS: [Job; 36] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -58,6 +60,8 @@ const JOBS: [Job; 34] = [
     job("speed", "how long a frame takes, in every mode", Needs::Nothing, house::speed),
     job("growth", "how long a step takes with more people and access points", Needs::Nothing, house::growth),
     job("living", "furniture put in, people who stand, no empty scan", Needs::Nothing, living::living),
+    job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", Needs::Nothing, glass::glass),
+    job("gestures", "people who talk with their hands beside a sensor", Needs::Nothing, gestures::gestures),
     job("live", "ten minutes live, three times over, the page open", Needs::Asking, house::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", Needs::Asking, nodes::nodes),
     job("halls", "1 to 64 halls on one host", Needs::Asking, nodes::halls),

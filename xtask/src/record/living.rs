@@ -76,7 +76,7 @@ fn crossing(more: &[&str]) -> Vec<String> {
 }
 
 /// Trajectories as files of the scratch folder, and the words that replay them.
-fn walked(book: &Book, name: &str, ways: &[String]) -> Result<Vec<String>> {
+pub(super) fn walked(book: &Book, name: &str, ways: &[String]) -> Result<Vec<String>> {
     let mut words = vec!["--trajectories".to_owned()];
     for (k, way) in ways.iter().enumerate() {
         let file = book.scratch(&format!("{name}-{k:02}.csv"));
@@ -87,7 +87,7 @@ fn walked(book: &Book, name: &str, ways: &[String]) -> Result<Vec<String>> {
 }
 
 /// Simulates into a folder of the scratch folder; its path.
-fn simulated(book: &Book, name: &str, how: &[String]) -> Result<String> {
+pub(super) fn simulated(book: &Book, name: &str, how: &[String]) -> Result<String> {
     let out = book.scratch(&format!("sim-{name}")).to_string_lossy().into_owned();
     let words = ["simulate", "--csv", "--out", &out].into_iter().map(str::to_owned).chain(how.to_vec());
     book.quietly(&words.map(OsString::from).collect::<Vec<_>>())?;
@@ -184,16 +184,16 @@ fn look(people: &[Row], tracks: &[Row]) -> Looked {
 }
 
 /// A row of `people` or of `tracks`.
-struct Row {
-    scene: u32,
-    frame: u32,
-    id: u64,
-    x_m: f64,
-    y_m: f64,
-    confirmed: bool,
+pub(super) struct Row {
+    pub(super) scene: u32,
+    pub(super) frame: u32,
+    pub(super) id: u64,
+    pub(super) x_m: f64,
+    pub(super) y_m: f64,
+    pub(super) confirmed: bool,
 }
 
-fn read(path: &str) -> Result<Vec<Row>> {
+pub(super) fn read(path: &str) -> Result<Vec<Row>> {
     let text = fs::read_to_string(path).map_err(|e| format!("{path}: {e}"))?;
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
@@ -276,7 +276,7 @@ fn stand(seed: u64) -> String {
 }
 
 /// Numbers from 0 to 1 that a seed determines: a linear congruential generator (Knuth, MMIX), its upper bits.
-fn draws(seed: u64) -> impl FnMut() -> f64 {
+pub(super) fn draws(seed: u64) -> impl FnMut() -> f64 {
     let mut state = FIRST_SEED + seed;
     move || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -322,7 +322,7 @@ fn rings(seconds: f64, rings: &[(u32, f64, f64)]) -> Vec<Vec<(f64, f64)>> {
 }
 
 /// `t_s,id,x_m,y_m`.
-fn table(people: &[Vec<(f64, f64)>]) -> String {
+pub(super) fn table(people: &[Vec<(f64, f64)>]) -> String {
     let mut text = "t_s,id,x_m,y_m\n".to_owned();
     for k in 0..people.first().map_or(0, Vec::len) {
         for (id, way) in people.iter().enumerate() {

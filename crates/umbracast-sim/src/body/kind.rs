@@ -22,12 +22,22 @@ pub enum Kind {
     Wheelchair,
     /// An adult who moves as a motion capture does.
     CmuWalk,
+    /// An adult who talks with both hands.
+    Gesturing,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Plain, Self::Bag, Self::Phone, Self::Pockets, Self::Child, Self::Wheelchair, Self::CmuWalk];
+    pub const ALL: [Self; 8] = [
+        Self::Plain,
+        Self::Bag,
+        Self::Phone,
+        Self::Pockets,
+        Self::Child,
+        Self::Wheelchair,
+        Self::CmuWalk,
+        Self::Gesturing,
+    ];
 
     /// As it is written on the command line.
     pub fn name(self) -> &'static str {
@@ -39,6 +49,7 @@ impl Kind {
             Self::Child => "child",
             Self::Wheelchair => "wheelchair",
             Self::CmuWalk => "cmu-walk",
+            Self::Gesturing => "gesturing",
         }
     }
 }

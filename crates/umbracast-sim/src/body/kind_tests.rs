@@ -173,6 +173,23 @@ fn hands_in_pockets_do_not_swing() {
 }
 
 #[test]
+fn who_gestures_reaches_out_while_standing_and_lets_the_hands_hang_while_walking() {
+    for seed in 0..10 {
+        let walker = walker(Kind::Gesturing, seed);
+        let span = |steps: Range<i64>| {
+            let wide =
+                |step: i64| bounds(&walker, &mesh(&walker, step), 3..7).size_m().truncate().max_element();
+            steps.map(wide).fold(0.0, f64::max)
+        };
+        let (walking_m, standing_m) = (span(100..250), span(330..390));
+        assert!(
+            standing_m > 0.75 && walking_m < 0.75 && standing_m > walking_m + 0.1,
+            "{standing_m} {walking_m}"
+        );
+    }
+}
+
+#[test]
 fn a_child_is_small_and_takes_short_steps() {
     for seed in 0..30 {
         let (child, adult) = (walker(Kind::Child, seed), walker(Kind::Plain, seed));

@@ -9,6 +9,7 @@ mod feet;
 mod walk;
 pub mod kind;
 mod things;
+mod gestures;
 mod recorded;
 mod walker;
 mod bodies;

@@ -7,6 +7,7 @@ use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};
 
 use super::build::Build;
+use super::gestures::Gestures;
 use super::kind::Kind;
 use super::recorded::Gait;
 use super::shape::{Shape, Surface};
@@ -39,6 +40,8 @@ pub struct Walker {
     shape: Shape,
     pub(super) walk: Walk,
     holds: Holds,
+    /// In place of what the hands hold.
+    gestures: Option<Gestures>,
     /// Height of the hip joints of who sits.
     seat_m: Option<f64>,
     /// In place of the published gait.
@@ -76,6 +79,7 @@ impl Walker {
             build,
             walk,
             holds: things.holds,
+            gestures: (kind == Kind::Gesturing).then(|| Gestures::draw(seed)),
             seat_m: things.seat_m,
             gait: None,
             upright,
@@ -143,7 +147,11 @@ impl Walker {
         let upper = walk::upper_body(&instant, &self.build);
         let pelvis = PelvisPose::new(state.position_m, instant.heading_rad, &upper, instant.hip_height_m);
         let feet = walk::foot_poses(&self.walk, &instant, &self.build);
-        Some((Pose::new(&self.build, instant.heading_rad, &upper, &pelvis, &feet, &self.holds), state))
+        let holds = match &self.gestures {
+            Some(gestures) => gestures.holds(&self.build, time_ns, instant.speed_mps),
+            None => self.holds,
+        };
+        Some((Pose::new(&self.build, instant.heading_rad, &upper, &pelvis, &feet, &holds), state))
     }
 
     /// Who sits rolls along, still.

@@ -6,6 +6,8 @@ use umbracast::Site;
 use umbracast::geometry::{DVec2, DVec3, Pose};
 use umbracast::lidar::{Model, RangeImage, Turn};
 
+use super::panes::{Meets, Mirrored, Panes};
+
 /// Azimuths that a packet tells apart unless a sensor's columns repeat: hundredths of a degree.
 const TURN_CDEG: u32 = 36_000;
 
@@ -15,6 +17,8 @@ const CEILING: u8 = 60;
 const WALL: u8 = 55;
 const PILLAR: u8 = 45;
 const FURNITURE: u8 = 35;
+/// Dust on glass, and what comes straight back.
+const PANE: u8 = 10;
 
 /// Ranges and reflectivities of all beams at all azimuths of the head, at `beam * azimuths + azimuth`: a frame reads
 /// one beam after the other in even strides.
@@ -24,31 +28,40 @@ pub struct HallImage {
     range_m: Vec<f32>,
     /// Percent.
     reflectivity: Vec<u8>,
+    /// Empty in a hall without panes.
+    mirrored: Vec<Mirrored>,
 }
 
 impl HallImage {
     /// Traces the hall from a sensor that hangs within it.
     pub fn trace(site: &Site, model: &Model, site_from_sensor: &Pose) -> Self {
-        let hall = Solids::new(site);
+        let (hall, panes) = (Solids::new(site), Panes::new(&site.simulation.panes));
         let (count, first_cdeg) = model.turn.map_or((TURN_CDEG, 0.0), |turn| (turn.columns, turn.first_cdeg));
         let rays = model.beams.len() * count as usize;
         let (mut ranges_m, mut reflectivities) = (Vec::with_capacity(rays), Vec::with_capacity(rays));
+        let mut mirrored = Vec::with_capacity(if panes.is_empty() { 0 } else { rays });
         let azimuth_rad = |i| first_cdeg * (TAU / 36_000.0) + f64::from(i) * (TAU / f64::from(count));
         let azimuths: Vec<(f64, f64)> = (0..count).map(|i| azimuth_rad(i).sin_cos()).collect();
         for beam in model.beams.iter() {
             for &azimuth in &azimuths {
                 let (origin_m, direction) = beam.ray(azimuth);
-                let (range_m, reflectivity) =
-                    hall.cast(site_from_sensor.point(origin_m), site_from_sensor.direction(direction));
+                let ray = (site_from_sensor.point(origin_m), site_from_sensor.direction(direction));
+                let (range_m, reflectivity) = if panes.is_empty() {
+                    hall.cast(ray.0, ray.1)
+                } else {
+                    let (range_m, reflectivity, pane) = hall.cast_at_panes(&panes, ray.0, ray.1);
+                    mirrored.push(pane);
+                    (range_m, reflectivity)
+                };
                 ranges_m.push(range_m as f32);
                 reflectivities.push(reflectivity);
             }
         }
-        Self { turn: model.turn, range_m: ranges_m, reflectivity: reflectivities }
+        Self { turn: model.turn, range_m: ranges_m, reflectivity: reflectivities, mirrored }
     }
 
-    /// Range and reflectivity of what beam `b` of column `c` meets.
-    pub fn at(&self, image: &RangeImage, c: usize, b: usize) -> (f32, u8) {
+    /// Range and reflectivity of what beam `b` of column `c` meets, and the pane that shows it.
+    pub fn at(&self, image: &RangeImage, c: usize, b: usize) -> (f32, u8, Mirrored) {
         let (azimuth, count) = match self.turn {
             None => (image.azimuth_cdeg(c, b), TURN_CDEG),
             Some(turn) => {
@@ -58,7 +71,13 @@ impl HallImage {
             }
         };
         let pixel = b * count as usize + azimuth as usize;
-        (self.range_m[pixel], self.reflectivity[pixel])
+        let mirrored = self.mirrored.get(pixel).copied().unwrap_or(Mirrored::NONE);
+        (self.range_m[pixel], self.reflectivity[pixel], mirrored)
+    }
+
+    /// Whether any pixel may show a reflection.
+    pub fn has_panes(&self) -> bool {
+        !self.mirrored.is_empty()
     }
 }
 
@@ -109,6 +128,27 @@ impl Solids {
             );
         }
         nearest
+    }
+
+    /// The same where light may go on through glass or be thrown back, once; infinitely far where nothing comes back.
+    fn cast_at_panes(&self, panes: &Panes, origin_m: DVec3, direction: DVec3) -> (f64, u8, Mirrored) {
+        let (solid_m, reflectivity) = self.cast(origin_m, direction);
+        let Some(met) = panes.first(origin_m, direction, solid_m) else {
+            return (solid_m, reflectivity, Mirrored::NONE);
+        };
+        match met.does(solid_m) {
+            Meets::Pane => (met.range_m, PANE, Mirrored::NONE),
+            Meets::Through => (solid_m, reflectivity, Mirrored::NONE),
+            Meets::Reflection { reach_m } => {
+                // A hair before the pane: what it hangs on is not before it.
+                let from_m = origin_m + direction * met.range_m + met.reflected * 1e-6;
+                let (beyond_m, reflectivity) = self.cast(from_m, met.reflected);
+                let range_m = met.range_m + beyond_m;
+                let range_m = if range_m <= reach_m { range_m } else { f64::INFINITY };
+                let mirrored = Mirrored { pane: met.pane, at_m: met.range_m as f32, reach_m: reach_m as f32 };
+                (range_m, reflectivity, mirrored)
+            }
+        }
     }
 
     fn room(&self, origin_m: DVec3, direction: DVec3) -> (f64, u8) {

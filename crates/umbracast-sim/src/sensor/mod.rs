@@ -1,20 +1,23 @@
 //! Simulated LiDARs that give true sensor packets.
 //!
 //! The hall stands still and is traced once (`hall`); a frame looks it up and draws only the people into it
-//! (`raster`), each column at the instant it fires (`head`). Then come noise, drop-outs and limits, and the
+//! (`raster`), each column at the instant it fires (`head`), and where panes reflect, once more as their reflections
+//! (`panes`). Then come edges, noise, drop-outs and limits, and the
 //! packet codec, so that a simulated sensor and a real one enter the pipeline by the same door.
 
 mod head;
+mod panes;
 mod hall;
 mod view;
 mod raster;
+mod edges;
 mod noise;
 mod survey;
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use umbracast::geometry::DVec3;
+use umbracast::geometry::{DVec3, Pose};
 use umbracast::lidar::{Model, Packet, packet};
 use umbracast::site::Sensor;
 use umbracast::{Error, Site};
@@ -22,6 +25,7 @@ use umbracast::{Error, Site};
 use self::hall::HallImage;
 use self::head::Head;
 use self::noise::Noise;
+use self::panes::Panes;
 use self::raster::Painter;
 pub use self::survey::{Seen, Survey};
 use self::view::{NOBODY, View};
@@ -36,16 +40,24 @@ pub struct Sensors {
 #[derive(Debug, Clone)]
 struct Simulated {
     head: Head,
-    hall: Arc<HallImage>,
-    painter: Painter,
+    outlook: Outlook,
     noise: Noise,
     /// Packets that are not wholly within are not sent.
     powered_ns: Range<i64>,
-    /// From this time on it hangs elsewhere: what it sees of the hall then, and of people.
-    slipped: Option<(i64, Arc<HallImage>, Painter)>,
+    /// From this time on it hangs elsewhere, and sees this.
+    slipped: Option<(i64, Outlook)>,
     /// Its clock before true time.
     ahead_ns: i64,
     open: OpenPacket,
+}
+
+/// What is seen from one place.
+#[derive(Debug, Clone)]
+struct Outlook {
+    hall: Arc<HallImage>,
+    painter: Painter,
+    /// One a pane: draws what it reflects.
+    reflected: Vec<Painter>,
 }
 
 /// The packet whose columns have not all fired yet.
@@ -64,7 +76,7 @@ impl Sensors {
     /// A sensor model that cannot be simulated, a sensor that does not turn or hangs outside the hall.
     pub fn new(site: &Site, seed: u64) -> Result<Self, Error> {
         let simulate = |(number, sensor): (usize, &Sensor)| {
-            Simulated::new(site, sensor, Noise::new(sensor, site.simulation.dropout, seed, number as u64))
+            Simulated::new(site, sensor, Noise::new(sensor, &site.simulation, seed, number as u64))
                 .map_err(|error| error.within(format_args!("site.sensors.{}", sensor.name)))
         };
         let sensors = site.sensors.iter().enumerate().map(simulate).collect::<Result<_, _>>()?;
@@ -121,13 +133,10 @@ impl Simulated {
         let site_from_sensor = sensor.site_from_sensor();
         let head = Head::new(model, sensor);
         let slipped = site.simulation.slip.get(&sensor.name).map(|slip| {
-            let pose = slip.slipped(&site_from_sensor);
-            let hall = Arc::new(HallImage::trace(site, &head.model, &pose));
-            ((slip.after_s * 1e9) as i64, hall, Painter::new(&pose, &head))
+            ((slip.after_s * 1e9) as i64, Outlook::new(site, &slip.slipped(&site_from_sensor), &head))
         });
         Ok(Self {
-            hall: Arc::new(HallImage::trace(site, &head.model, &site_from_sensor)),
-            painter: Painter::new(&site_from_sensor, &head),
+            outlook: Outlook::new(site, &site_from_sensor, &head),
             head,
             noise,
             powered_ns: 0..i64::MAX,
@@ -139,21 +148,23 @@ impl Simulated {
 
     fn frame(&mut self, index: u64, walkers: &[Walker], returns: &mut [u32]) -> Vec<Packet> {
         let mut view = self.look(index, walkers);
-        self.noise.measure(index, &mut view.image);
+        self.noise.measure(index, &mut view);
         self.send(&view, returns)
     }
 
     /// What is really there.
     fn look(&mut self, index: u64, walkers: &[Walker]) -> View {
-        let (hall, painter) = match &mut self.slipped {
-            Some((after_ns, hall, painter)) if index as i64 * umbracast::STEP_NS >= *after_ns => {
-                (hall, painter)
-            }
-            _ => (&mut self.hall, &mut self.painter),
+        let outlook = match &mut self.slipped {
+            Some((after_ns, outlook)) if index as i64 * umbracast::STEP_NS >= *after_ns => outlook,
+            _ => &mut self.outlook,
         };
-        let mut view = View::of_hall(hall, &self.head, index);
-        for (person, walker) in walkers.iter().enumerate() {
-            painter.draw(walker, person as u32, &mut view);
+        let mut view = View::of_hall(&outlook.hall, &self.head, index);
+        for (pane, painter) in (0..).zip(std::iter::once(&mut outlook.painter).chain(&mut outlook.reflected))
+        {
+            view.pane = pane;
+            for (person, walker) in walkers.iter().enumerate() {
+                painter.draw(walker, person as u32, &mut view);
+            }
         }
         view
     }
@@ -199,6 +210,22 @@ impl Simulated {
         let sent_ns = columns[columns.len() - 1].time_ns;
         columns.iter_mut().for_each(|column| column.time_ns += self.ahead_ns);
         Some(packet::encode(&self.head.model, &columns, &range_m, &reflectivity, sent_ns))
+    }
+}
+
+impl Outlook {
+    fn new(site: &Site, site_from_sensor: &Pose, head: &Head) -> Self {
+        let painter = Painter::new(site_from_sensor, head);
+        let reflected = |reflection: Pose| {
+            let mut painter = painter.clone();
+            painter.hang(site_from_sensor.inverse().after(&reflection));
+            painter
+        };
+        Self {
+            hall: Arc::new(HallImage::trace(site, &head.model, site_from_sensor)),
+            reflected: Panes::new(&site.simulation.panes).reflections().map(reflected).collect(),
+            painter,
+        }
     }
 }
 

@@ -1,10 +1,11 @@
 //! From true ranges to measured ones: noise, drop-outs and the limits of the sensor.
 
-use rand::Rng;
+use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
-use umbracast::lidar::RangeImage;
-use umbracast::site::Sensor;
+use umbracast::site::{DarkCloth, MixedReturns, Sensor, Simulation};
 
+use super::edges;
+use super::view::{NOBODY, View};
 use crate::random::stream;
 
 /// How one sensor errs. Every frame has generators of its own, and every ray takes one draw whether or not
@@ -12,18 +13,24 @@ use crate::random::stream;
 #[derive(Debug, Clone)]
 pub struct Noise {
     range_noise_m: f32,
+    range_bias_m: f32,
     dropout: f64,
+    mixed_returns: Option<MixedReturns>,
+    dark_cloth: Option<DarkCloth>,
     range_limits_m: std::ops::RangeInclusive<f32>,
     seed: u64,
     sensor: u64,
 }
 
 impl Noise {
-    /// For the sensor that stands at place `number` in the site, of whose returns a share drops out.
-    pub fn new(sensor: &Sensor, dropout: f64, seed: u64, number: u64) -> Self {
+    /// For the sensor that stands at place `number` in the site.
+    pub fn new(sensor: &Sensor, simulation: &Simulation, seed: u64, number: u64) -> Self {
         Self {
             range_noise_m: sensor.range_noise_m as f32,
-            dropout,
+            range_bias_m: simulation.range_bias_m.get(&sensor.name).map_or(0.0, |&bias_m| bias_m as f32),
+            dropout: simulation.dropout,
+            mixed_returns: simulation.mixed_returns,
+            dark_cloth: simulation.dark_cloth,
             // Nearer than a packet's unit of 2 mm is no return.
             range_limits_m: sensor.range_min_m.max(0.002) as f32..=sensor.range_max_m as f32,
             seed,
@@ -42,18 +49,44 @@ impl Noise {
     }
 
     /// Turns true ranges into measured ones; 0 where nothing comes back.
-    pub fn measure(&self, frame: u64, image: &mut RangeImage) {
+    pub fn measure(&self, frame: u64, view: &mut View) {
         let scene_and_sensor = stream(self.seed, "sensor", self.sensor).next_u64();
+        if let Some(mixed) = &self.mixed_returns {
+            edges::mix(view, mixed, &mut stream(scene_and_sensor, "edges", frame));
+        }
+        if let Some(dark) = &self.dark_cloth {
+            self.swallow(dark, view, &mut stream(scene_and_sensor, "dark cloth", frame));
+        }
+        let image = &mut view.image;
         let mut range_draws = stream(scene_and_sensor, "range noise", frame);
         let mut loss_draws = stream(scene_and_sensor, "drop-outs", frame);
         // The draw is below this for the given share of 64-bit numbers; the cast saturates.
         let lost_below = (self.dropout * 2.0_f64.powi(64)) as u64;
         for (range_m, reflectivity) in image.range_m.iter_mut().zip(&mut image.reflectivity) {
             let noise: f32 = StandardNormal.sample(&mut range_draws);
-            *range_m += self.range_noise_m * noise;
+            *range_m += self.range_bias_m + self.range_noise_m * noise;
             let lost = loss_draws.next_u64() < lost_below;
             if lost || !self.range_limits_m.contains(range_m) {
                 (*range_m, *reflectivity) = (0.0, 0);
+            }
+        }
+    }
+
+    /// Loses a share of what comes back of those who wear dark cloth: the same people for every sensor.
+    fn swallow(&self, dark: &DarkCloth, view: &mut View, draws: &mut impl Rng) {
+        let mut wears: Vec<Option<bool>> = Vec::new();
+        for (range_m, &owner) in view.image.range_m.iter_mut().zip(&view.owner) {
+            let is_lost = draws.random::<f64>() < dark.dropout;
+            if owner == NOBODY || !is_lost {
+                continue;
+            }
+            let person = owner as usize;
+            if wears.len() <= person {
+                wears.resize(person + 1, None);
+            }
+            let draw = || stream(self.seed, "wears dark cloth", owner.into()).random::<f64>() < dark.people;
+            if *wears[person].get_or_insert_with(draw) {
+                *range_m = f32::INFINITY;
             }
         }
     }

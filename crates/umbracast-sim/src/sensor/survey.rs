@@ -42,10 +42,10 @@ impl Survey {
     /// With the sensors of that site, in its order.
     pub fn new(site: &Site, sensors: &Sensors) -> Self {
         let lookout = |(simulated, sensor): (&Simulated, &umbracast::site::Sensor)| {
-            let view = View::of_hall(&simulated.hall, &simulated.head, 0);
+            let view = View::of_hall(&simulated.outlook.hall, &simulated.head, 0);
             Lookout {
                 site_from_sensor: sensor.site_from_sensor(),
-                painter: simulated.painter.clone(),
+                painter: simulated.outlook.painter.clone(),
                 noise: simulated.noise.clone(),
                 hall_m: view.image.range_m.clone(),
                 view,

@@ -223,7 +223,7 @@ fn noise_and_drop_outs_have_the_given_statistics() {
     let simulated = &mut sensors.sensors[0];
     let mut view = simulated.look(0, &[]);
     let truth = view.image.range_m.clone();
-    simulated.noise.measure(0, &mut view.image);
+    simulated.noise.measure(0, &mut view);
     let errors: Vec<f64> = truth
         .iter()
         .zip(&view.image.range_m)

@@ -4,6 +4,7 @@ use umbracast::lidar::RangeImage;
 
 use super::hall::HallImage;
 use super::head::Head;
+use super::panes::Mirrored;
 
 /// Owner of a pixel that shows the hall.
 pub const NOBODY: u32 = u32::MAX;
@@ -19,7 +20,11 @@ pub struct View {
     pub first_column: u64,
     /// Azimuth of the first column, not wrapped.
     pub first_cdeg: f64,
+    /// The number of the pane whose reflections are being shown, 0 for what is seen straight.
+    pub pane: u8,
     step_cdeg: f64,
+    /// Empty in a hall without panes.
+    mirrored: Vec<Mirrored>,
 }
 
 impl View {
@@ -31,10 +36,15 @@ impl View {
         let columns = head.reported(columns);
         let rays = columns.len() * beams.len();
         let mut image = RangeImage { beams, columns, range_m: vec![0.0; rays], reflectivity: vec![0; rays] };
+        let mut mirrored = vec![Mirrored::NONE; if hall.has_panes() { rays } else { 0 }];
         for b in 0..image.beams.len() {
             for c in 0..image.columns.len() {
                 let pixel = c * image.beams.len() + b;
-                (image.range_m[pixel], image.reflectivity[pixel]) = hall.at(&image, c, b);
+                let (range_m, reflectivity, pane) = hall.at(&image, c, b);
+                (image.range_m[pixel], image.reflectivity[pixel]) = (range_m, reflectivity);
+                if let Some(mirrored) = mirrored.get_mut(pixel) {
+                    *mirrored = pane;
+                }
             }
         }
         Self {
@@ -42,7 +52,9 @@ impl View {
             owner: vec![NOBODY; rays],
             first_column,
             first_cdeg: head.turned_cdeg(head.time_ns(first_column)),
+            pane: 0,
             step_cdeg: head.rate_cdeg_per_ns * head.model.column_period_ns,
+            mirrored,
         }
     }
 
@@ -56,13 +68,22 @@ impl View {
         self.first_cdeg + column * self.step_cdeg
     }
 
-    /// A surface of a body at `range_m`: shown where nothing nearer is.
+    /// A surface of a body at `range_m`: shown where nothing nearer is. A reflection is nobody's body.
     pub fn show(&mut self, column: usize, beam: usize, range_m: f32, reflectivity: u8, owner: u32) {
         let pixel = column * self.image.beams.len() + beam;
-        if range_m < self.image.range_m[pixel] {
+        if range_m < self.image.range_m[pixel] && self.reaches(pixel, range_m) {
             self.image.range_m[pixel] = range_m;
             self.image.reflectivity[pixel] = reflectivity;
-            self.owner[pixel] = owner;
+            self.owner[pixel] = if self.pane == 0 { owner } else { NOBODY };
+        }
+    }
+
+    /// Whether light goes so far where a pane may be in its way.
+    fn reaches(&self, pixel: usize, range_m: f32) -> bool {
+        let Mirrored { pane, at_m, reach_m } = self.mirrored.get(pixel).copied().unwrap_or(Mirrored::NONE);
+        match self.pane {
+            0 => range_m < at_m,
+            shown => shown == pane && range_m > at_m && range_m <= reach_m,
         }
     }
 }
