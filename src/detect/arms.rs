@@ -3,10 +3,15 @@
 use super::part::Part;
 use crate::geometry::{DVec2, DVec3};
 
-/// The mean of an arm's points is nearer than this to that of its owner's: half the span of arms of a tall adult.
-pub(super) const ARM_M: f64 = 0.9;
-/// Hands hang no lower than this share of the stature (Drillis and Contini 1966: fingertips .377).
+/// The mean of an arm's points is nearer than this to that of its owner's: half the span of arms is some 0.9 m, of which the
+/// points are the outer part.
+pub(super) const ARM_M: f64 = 0.75;
+/// Hands hang no lower than this share of the stature.
 const HAND_SHARE: f64 = 0.37;
+/// A raised hand is no higher than this share of the stature.
+const RAISED_SHARE: f64 = 1.2;
+/// Of the points of a body an arm has so many at most: who stands behind somebody shows more.
+const ARM_SHARE: f64 = 0.5;
 /// Of a body that stands, more of the points are below that; of an arm with a hip beside it, fewer.
 const LOW_SHARE: f64 = 0.15;
 /// Points so near to the highest are the head's.
@@ -18,9 +23,11 @@ const HEADS_M: f64 = 0.3;
 /// pass above the legs of who is near.
 pub(super) fn is_arm(moved_m: &[DVec3], small: &Part, large: &Part, is_known: bool) -> bool {
     let hand_m = HAND_SHARE * large.top_m;
-    let may_own = is_known
-        || small.points.len() <= large.points.len() && low_share(moved_m, large, hand_m) >= LOW_SHARE;
-    may_own
+    let is_less = small.points.len() as f64 <= ARM_SHARE * large.points.len() as f64;
+    let may_own = is_known || low_share(moved_m, large, hand_m) >= LOW_SHARE;
+    is_less
+        && may_own
+        && small.top_m < RAISED_SHARE * large.top_m
         && small.mean_m().distance(large.mean_m()) < ARM_M
         && low_share(moved_m, small, hand_m) < LOW_SHARE
 }

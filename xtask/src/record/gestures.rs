@@ -118,7 +118,8 @@ fn count(people: &[Row], tracks: &[Row]) -> Counted {
         let (mut found, mut given) = (Vec::new(), Vec::new());
         for (_, person, track) in pairs {
             if !found.contains(&person) && !given.contains(&track) {
-                (found.push(person), given.push(track));
+                found.push(person);
+                given.push(track);
                 own.insert((key.0, person), track);
                 ids.push((key.0, person, track));
             }

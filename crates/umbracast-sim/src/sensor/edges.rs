@@ -1,8 +1,8 @@
 //! Beams have a width: one that meets an edge sees two surfaces.
 //!
 //! Where both are within a pulse's length of each other, their echoes run together and the range lies between them, by
-//! the power that comes back of each; else the sensor tells of the stronger (Tuley, Hebert, Thorpe 2005, "Analysis and
-//! removal of artifacts in 3-D LADAR data"). Velodyne's manual for the VLP-16: 3.0 mrad across, 6 ns, hence 0.9 m.
+//! the power that comes back of each; else the sensor tells of the stronger. Both width and length are the site file's to
+//! say: 3 mrad and 6 ns, hence 0.9 m, are what we take a spinning sensor to have.
 //!
 //! Edges are looked for along a beam's sweep, where columns lie about a beam's width apart, and somewhere between two of
 //! them. Beams lie ten times as far above each other as they are thick.

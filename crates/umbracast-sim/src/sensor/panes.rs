@@ -11,9 +11,9 @@ use umbracast::site::{Pane, Surface};
 /// Refractive index of window glass.
 const INDEX: f64 = 1.5;
 /// A beam nearer to the perpendicular comes straight back from a pane: half the divergence of a beam and of a receiver,
-/// and what a pane is out of plane. Foster et al. 2013 ("VisAGGE") see glass over a few degrees.
+/// and what a pane is out of plane. Assumed: 3.6 degrees.
 const GLINT_COS: f64 = 0.998;
-/// Share of a sheet's spots that are dirty enough to be seen, and their size.
+/// Share of a sheet's spots that are dirty enough to be seen, and their size; assumed.
 const DIRTY: u64 = 10;
 const SPOT_M: f64 = 0.05;
 /// A pane this near to a surface is on it.
