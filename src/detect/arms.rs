@@ -90,6 +90,14 @@ mod tests {
     }
 
     #[test]
+    fn the_other_of_a_pair_whose_legs_are_hidden_is_no_arm() {
+        let beside: Vec<DVec3> = body().iter().filter(|p| p.z > 0.75).map(|p| *p + DVec3::X * 0.6).collect();
+        let (points_m, both) = parts(&[&body(), &beside]);
+        assert!(low_share(&points_m, &both[1], 0.6) < LOW_SHARE, "nothing of the legs is to be seen");
+        assert!(!is_arm(&points_m, &both[1], &both[0], true));
+    }
+
+    #[test]
     fn halves_of_somebody_with_both_arms_out_have_one_head() {
         let whole = [body(), arm(1.0), arm(-1.0)].concat();
         let (left, right): (Vec<DVec3>, Vec<DVec3>) = whole.iter().partition(|p| p.x < 0.0);

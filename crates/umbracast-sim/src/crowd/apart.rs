@@ -20,7 +20,7 @@ const ROUNDS_OF_PAIRS: usize = 20;
 /// So much less than the room does no harm.
 const SLACK_M: f64 = 0.005;
 
-/// Moves people apart until nobody's axis is nearer to another's than [`ROOM_M`]. Who has room stays where he is, to the
+/// Moves people apart until nobody's axis is nearer to another's than `ROOM_M`. Who has room stays where he is, to the
 /// bit. Returns how far somebody was moved at most, in metres.
 pub fn move_apart(crowd: &mut Crowd) -> f64 {
     let mut people: Vec<Moved> = crowd.trajectories.iter().map(Moved::of).collect();
