@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use umbracast::geometry::DVec2;
 use umbracast::lidar::{Column, packet};
-use umbracast::site::Rotation;
+use umbracast::site::{Pane, Rotation, Surface};
 use umbracast::{Config, Health, STEP_NS};
 
 use super::oracle::Oracle;
@@ -294,6 +294,41 @@ fn a_surveyed_body_gives_the_returns_that_it_gives_in_a_scene() {
     assert!((one[0].returns - other[0].returns * 1.0).abs() < 0.3 * one[0].returns, "{one:?} {other:?}");
     let (low_m, high_m) = one[0].span_m.unwrap();
     assert!(low_m < 0.3 && (1.4..2.0).contains(&high_m), "{low_m} to {high_m}");
+}
+
+#[test]
+fn a_person_before_a_mirror_is_shown_behind_it_as_nobodys_body() {
+    let mut site = site();
+    site.sensors.truncate(1);
+    let sensor = &mut site.sensors[0];
+    (sensor.position_m, sensor.rotation_deg) =
+        ([0.0, -4.0, 1.5], Rotation { yaw: 90.0, pitch: 0.0, roll: 0.0 });
+    let mirror =
+        Pane { from_m: [-3.0, 6.0], to_m: [3.0, 6.0], bottom_m: 0.0, top_m: 2.5, surface: Surface::Mirror };
+    site.simulation.panes = vec![mirror];
+    let mut sensors = Sensors::new(&site, 0).unwrap();
+    let walkers = [walker(0, f64::to_radians(60.0), 3.0)];
+    let empty = sensors.sensors[0].look(4, &[]);
+    let view = sensors.sensors[0].look(4, &walkers);
+    let site_from_sensor = site.sensors[0].site_from_sensor();
+    let (mut straight, mut reflected) = (0, 0);
+    for c in 0..view.image.columns.len() {
+        for b in 0..view.image.beams.len() {
+            let pixel = c * view.image.beams.len() + b;
+            let range_m = view.image.range_m[pixel];
+            if range_m == empty.image.range_m[pixel] {
+                continue;
+            }
+            let point_m = site_from_sensor.point(view.image.point_m(c, b, f64::from(range_m)));
+            let is_behind = point_m.y > 6.0;
+            let body_m = if is_behind { DVec3::new(point_m.x, 12.0 - point_m.y, point_m.z) } else { point_m };
+            let off_m = oracle::distance_m(&walkers[0], view.image.time_ns(c, b), body_m);
+            assert!(off_m < 1e-3, "{point_m} is {off_m} m from the body");
+            assert_eq!(view.owner[pixel], if is_behind { NOBODY } else { 0 });
+            *(if is_behind { &mut reflected } else { &mut straight }) += 1;
+        }
+    }
+    assert!(straight > 100 && reflected > 20, "{straight} straight, {reflected} reflected");
 }
 
 #[test]
