@@ -142,6 +142,8 @@ pub struct NodeHealth {
     pub wire_ms: [f64; 2],
     /// Whether it leads where several do the same.
     pub leads: bool,
+    /// What tells its site file's halls apart: nodes that work together have the same.
+    pub site: u64,
     /// What was skipped since the start.
     pub health: Health,
 }
@@ -279,6 +281,7 @@ impl Message for NodeHealth {
         f.f64_array("latency_ms", &mut self.latency_ms);
         f.f64_array("wire_ms", &mut self.wire_ms);
         f.bool("leads", &mut self.leads);
+        f.u64("site", &mut self.site);
         f.one("health", &mut self.health);
     }
 }

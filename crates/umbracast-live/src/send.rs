@@ -106,6 +106,7 @@ pub fn ahead(
 ) -> impl Iterator<Item = Arrived> + Send + 'static {
     let (made, coming) = mpsc::sync_channel(AHEAD);
     std::thread::spawn(move || {
+        give_way();
         // Nobody takes them any more: the end.
         for packet in packets {
             if made.send(packet).is_err() {
@@ -114,6 +115,13 @@ pub fn ahead(
         }
     });
     coming.into_iter()
+}
+
+/// Lets other threads run before this one: sensors of a hall have a computer of their own, and simulated ones shall not
+/// delay who listens to them. Only Linux gives a thread a priority, and where it refuses nothing is lost.
+fn give_way() {
+    #[cfg(target_os = "linux")]
+    let _ = rustix::process::nice(10);
 }
 
 /// The packets of a simulated scene in the order in which they are sent.
@@ -134,6 +142,7 @@ pub fn strolling(
     let nobody = Crowd { trajectories: Vec::new(), duration_ns: 0 };
     let mut scene = Scene::in_hall(nobody, &site, &sensors, seed).starting_at(first);
     std::thread::spawn(move || {
+        give_way();
         for leg in 0.. {
             let begins_ns = (first as i64 + leg * LEG_S as i64 * STEPS_PER_S) * STEP_NS;
             let scene = Scene::truth_only(stroll.leg(LEG_S).later(begins_ns), &site, seed);

@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use umbracast::Error;
+use sha2::{Digest, Sha256};
+use umbracast::{Error, Site};
 use umbracast_io::fields;
 use umbracast_io::nodes::NodeHealth;
 use zenoh::{Session, Wait};
@@ -47,8 +48,8 @@ impl Node {
         Some(now.bytes_out.saturating_sub(bytes) as f64 / (now.up_s - up_s).max(f64::MIN_POSITIVE))
     }
 
-    /// What is not as it should be, in words.
-    pub fn troubles(&self) -> Vec<String> {
+    /// What is not as it should be, in words. `site` is what most nodes of its hall say.
+    pub fn troubles(&self, site: Option<u64>) -> Vec<String> {
         let Some(health) = &self.health else { return vec!["says nothing".to_owned()] };
         let counted = [
             (health.frames_skipped, "frames skipped"),
@@ -61,8 +62,29 @@ impl Node {
         if !health.health.is_clean() {
             troubles.push("input skipped".to_owned());
         }
+        if site.is_some_and(|site| site != health.site) {
+            troubles.push("another site than most".to_owned());
+        }
         troubles
     }
+}
+
+impl Hall {
+    /// The site of most of its nodes; of as many, the one with the least number.
+    pub fn site(&self) -> Option<u64> {
+        let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
+        for health in self.nodes.values().filter_map(|node| node.health.as_ref()) {
+            *counts.entry(health.site).or_default() += 1;
+        }
+        counts.into_iter().rev().max_by_key(|&(_, count)| count).map(|(site, _)| site)
+    }
+}
+
+/// A number by which nodes see that they were given the same site: the first bytes of a digest of all that it says.
+pub fn site_number(site: &Site) -> u64 {
+    let text = serde_json::to_vec(site).unwrap_or_default(); // Plain data: cannot fail.
+    let digest = Sha256::digest(&text);
+    digest.iter().take(8).fold(0, |number, &byte| number << 8 | u64::from(byte))
 }
 
 /// What tokens and words of health say together. A word comes with its key; of one node the later replaces the earlier.
@@ -145,7 +167,7 @@ pub fn text(halls: &BTreeMap<String, Hall>) -> String {
                 health.frames,
                 node.bytes_per_s().unwrap_or(0.0) / 1000.0,
                 health.latency_ms[1],
-                node.troubles().join(", "),
+                node.troubles(hall.site()).join(", "),
             ); // To a string: cannot fail.
         }
     }
@@ -154,7 +176,7 @@ pub fn text(halls: &BTreeMap<String, Hall>) -> String {
 
 /// The same for programs.
 pub fn json(halls: &BTreeMap<String, Hall>) -> Value {
-    let of_node = |(id, node): (&String, &Node)| {
+    let of_node = |site: Option<u64>, id: &String, node: &Node| {
         let health = node.health.clone().unwrap_or_default();
         let value = json!({
             "roles": node.roles,
@@ -174,12 +196,14 @@ pub fn json(halls: &BTreeMap<String, Hall>) -> Value {
             "latency_p50_ms": health.latency_ms[0],
             "latency_p99_ms": health.latency_ms[1],
             "health": health.health,
-            "troubles": node.troubles(),
+            "troubles": node.troubles(site),
         });
         (id.clone(), value)
     };
     let of_hall = |(name, hall): (&String, &Hall)| {
-        (name.clone(), Value::Object(hall.nodes.iter().map(of_node).collect()))
+        let site = hall.site();
+        let nodes = hall.nodes.iter().map(|(id, node)| of_node(site, id, node));
+        (name.clone(), Value::Object(nodes.collect()))
     };
     Value::Object(halls.iter().map(of_hall).collect())
 }
@@ -187,6 +211,7 @@ pub fn json(halls: &BTreeMap<String, Hall>) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use umbracast::Config;
 
     fn word(key: &str, time_ns: i64, cpu_s: f64, frames_skipped: u64) -> (String, NodeHealth) {
         let up_s = time_ns as f64 * 1e-9;
@@ -207,10 +232,10 @@ mod tests {
         let halls = halls(&tokens, words);
         let t1 = &halls["a"].nodes["t1"];
         assert_eq!((t1.roles.len(), t1.cores()), (2, Some(0.5)), "between its last two words");
-        assert_eq!(t1.troubles(), ["3 frames skipped"]);
+        assert_eq!(t1.troubles(None), ["3 frames skipped"]);
         let s1 = &halls["b"].nodes["s1"];
         assert_eq!(
-            (s1.troubles(), s1.sensors.first().map(String::as_str)),
+            (s1.troubles(None), s1.sensors.first().map(String::as_str)),
             (vec!["says nothing".to_owned()], Some("east"))
         );
         assert!(halls["c"].nodes["dead"].roles.is_empty());
@@ -218,6 +243,23 @@ mod tests {
         assert_eq!(text.lines().count(), 4);
         assert!(text.contains("cast,track") && text.contains("gone") && text.contains("3 frames skipped"));
         assert_eq!(json(&halls)["a"]["t1"]["cores"], 0.5);
+    }
+
+    #[test]
+    fn a_node_with_another_site_file_than_the_rest_is_told() {
+        let numbers = [site_number(&Config::default().site), {
+            let mut other = Config::default().site;
+            other.access_points[0].position_m[2] += 0.01;
+            site_number(&other)
+        }];
+        let node = |site: usize| {
+            let health = NodeHealth { site: numbers[site], ..NodeHealth::default() };
+            Node { health: Some(health), ..Node::default() }
+        };
+        let nodes = [("a", 0), ("b", 1), ("c", 0)].map(|(id, site)| (id.to_owned(), node(site)));
+        let hall = Hall { nodes: nodes.into() };
+        let troubles: Vec<usize> = hall.nodes.values().map(|n| n.troubles(hall.site()).len()).collect();
+        assert_eq!(troubles, [0, 1, 0]);
     }
 
     #[test]

@@ -1,26 +1,34 @@
-//! The front end, beside the sensors: packets to foreground, which is what leaves the host in place of clouds.
+//! The front end, beside the sensors: packets, or the clouds of a driver, to foreground, which is what leaves the host.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use umbracast::config::BackgroundMethod;
 use umbracast::detect::{Background, Prior};
-use umbracast::lidar::{Assembler, Views};
+use umbracast::lidar::{Assembler, Cloud, Scan, Views, sensor_model};
 use umbracast::mounting::Mountings;
-use umbracast::{Config, Error, Frame, Health, Site};
+use umbracast::site::Sensor;
+use umbracast::{Config, Error, Frame, Health, STEP_NS, Site};
 use umbracast_io::nodes::{Foreground, Priors};
+use umbracast_io::point_cloud::PointCloud;
 use umbracast_live::HostClock;
 use umbracast_live::receive::Arrived;
 
 /// Without an empty scan, a front end waits so long for the priors of its frame while a tracker is there.
 const PRIORS_WAIT: Duration = Duration::from_millis(50);
+/// A clock that is so far back has been set anew.
+const LEAP_NS: i64 = 1_000_000_000;
 /// A tracker that has been silent for so long is not waited for.
 const TRACKER_SILENT_NS: i64 = 1_000_000_000;
 
-/// Packets in, foreground out.
+/// Packets or clouds in, foreground out.
 #[derive(Debug)]
 pub struct Front {
     assembler: Assembler,
+    /// Of a front end that takes clouds: its sensor,
+    of_clouds: Option<Sensor>,
+    /// and the time of its last frame.
+    last_ns: Option<i64>,
     mountings: Mountings,
     background: Background,
     /// Place in the site of each sensor that the assembler knows.
@@ -70,7 +78,15 @@ impl Front {
                 own.len()
             )));
         }
-        let sensors = own.iter().map(|&s| config.site.sensors[s].clone()).collect();
+        let sensors: Vec<Sensor> = own.iter().map(|&s| config.site.sensors[s].clone()).collect();
+        let of_clouds = sensors.iter().find(|sensor| takes_clouds(sensor)).cloned();
+        if let Some(sensor) = of_clouds.as_ref().filter(|_| own.len() > 1) {
+            return Err(Error::new(format!(
+                "sensor {:?} is known by its clouds: expected a front end of its own, found one of {} sensors",
+                sensor.name,
+                own.len()
+            )));
+        }
         let mut mountings = Mountings::new(&config.detect, &config.site);
         let mut background = Background::new(&config.detect, &config.site);
         let mut health = Health::default();
@@ -80,6 +96,8 @@ impl Front {
         let knows = !empty.is_empty() || config.detect.background == BackgroundMethod::Voxels;
         Ok(Self {
             assembler: Assembler::new(&Site { sensors, ..config.site.clone() })?,
+            of_clouds,
+            last_ns: None,
             mountings,
             background,
             own: own.to_vec(),
@@ -97,6 +115,28 @@ impl Front {
         let Some(sensor) = self.own.iter().position(|&s| s == arrived.sensor) else { return };
         self.assembler.push(sensor, &arrived.packet, &mut self.health);
         self.drain(sink);
+    }
+
+    /// Takes a cloud and gives it to `sink` as the frame of the nearest tenth of a second, in which it ends. A cloud of a frame
+    /// that was given already is late, also where the driver's clock has leapt back by less than a second.
+    pub fn push_cloud(&mut self, cloud: PointCloud, mut sink: impl FnMut(Foreground)) {
+        let Some(sensor) = &self.of_clouds else { return };
+        let over_ns = cloud.points.iter().map(|point| point.time_ns).max().unwrap_or(cloud.stamp_ns);
+        let time_ns = over_ns.saturating_add(STEP_NS / 2).div_euclid(STEP_NS).saturating_mul(STEP_NS);
+        self.health.points_invalid += cloud.dropped;
+        if self.last_ns.is_some_and(|last_ns| (last_ns.saturating_sub(LEAP_NS)..=last_ns).contains(&time_ns))
+        {
+            self.health.packets_late += 1;
+            return;
+        }
+        self.last_ns = Some(time_ns);
+        let scan = Scan {
+            sensor: self.own[0],
+            site_from_sensor: sensor.site_from_sensor(),
+            cloud: Cloud::Unorganised(cloud.points),
+        };
+        let index = time_ns.div_euclid(STEP_NS).unsigned_abs();
+        sink(self.foreground(&Frame { index, time_ns, scans: vec![scan] }));
     }
 
     /// At the end of the packets: what is open.
@@ -150,6 +190,11 @@ impl Front {
         self.priors_late += u64::from(!in_time && !self.priors_wait.is_zero());
         priors
     }
+}
+
+/// Whether a sensor sends no packets that are understood here, so that its driver's clouds stand for it.
+pub fn takes_clouds(sensor: &Sensor) -> bool {
+    sensor_model(&sensor.model) == Some("points")
 }
 
 impl Expected {

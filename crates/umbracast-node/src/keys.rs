@@ -9,7 +9,6 @@ use crate::role::Role;
 /// | key | who writes | what |
 /// |---|---|---|
 /// | `sensor/NAME/foreground` | front end | new points and views of one frame |
-/// | `sensor/NAME/health` | front end | what it skipped, once a second |
 /// | `priors` | tracker that leads | where people are expected in the next frame |
 /// | `followed` | tracker that leads | everybody followed, for a forecast in another process |
 /// | `state` | tracker that leads | what a tracker needs to go on, twice a second; query: the newest that is known |

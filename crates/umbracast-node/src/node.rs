@@ -8,7 +8,8 @@ use std::time::Duration;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Frame, Health};
 use umbracast_io::fields;
-use umbracast_io::nodes::{NodeHealth, Priors};
+use umbracast_io::nodes::{Foreground, NodeHealth, Priors};
+use umbracast_io::point_cloud::PointCloud;
 use umbracast_live::latency::Latencies;
 use umbracast_live::queue::{Queue, WhenFull};
 use umbracast_live::receive::{Arrived, Door, Receivers};
@@ -20,7 +21,8 @@ use zenoh::pubsub::Subscriber;
 
 use crate::back::{Back, Counted};
 use crate::chain::Row;
-use crate::front::{Expected, Front};
+use crate::fleet;
+use crate::front::{Expected, Front, takes_clouds};
 use crate::hall::{Hall, Outlet, Urgency};
 use crate::role::Role;
 use crate::ros2;
@@ -29,6 +31,8 @@ use crate::watch::Watch;
 
 /// Packets that wait for the front end: a second of four HDL-32E.
 const PACKETS_WAITING: usize = 8192;
+/// Clouds that wait for it: the newest are worth most.
+const CLOUDS_WAITING: usize = 3;
 /// How often those are looked for whom a replay waits for.
 const LOOK: Duration = Duration::from_millis(50);
 /// What is there is known to all others so much later.
@@ -64,7 +68,8 @@ pub struct Settings {
 pub enum Source {
     /// Sockets.
     Doors(Vec<Door>),
-    /// Topics of a domain of ROS 2, one for each sensor, whose place in the site stands before it.
+    /// Topics of a domain of ROS 2, one for each sensor, whose place in the site stands before it: of packets, or of clouds for
+    /// a sensor that is known by them.
     Ros2(u32, Vec<(usize, String)>),
     /// A recording, so many times as fast as it was, once front ends of all sensors and all stages are there.
     Replay(Box<dyn Iterator<Item = Arrived> + Send>, f64),
@@ -73,9 +78,9 @@ pub enum Source {
 /// A node's account.
 #[derive(Debug, Clone, Default)]
 pub struct Summary {
-    /// Packets that came.
+    /// Packets, or clouds, that came.
     pub packets: u64,
-    /// Packets that were given up because the front end was busy.
+    /// Those that were given up because the front end was busy.
     pub packets_lost: u64,
     /// Frames of the front end, of the stages, or told to those who look on.
     pub frames: u64,
@@ -109,6 +114,7 @@ pub struct Node {
     stop: Arc<AtomicBool>,
     receivers: Option<Receivers>,
     packets: Option<Arc<Queue<Arrived>>>,
+    clouds: Option<Arc<Queue<PointCloud>>>,
     front: Option<JoinHandle<()>>,
     fed: Option<JoinHandle<()>>,
     front_counted: Arc<FrontCounted>,
@@ -120,6 +126,7 @@ pub struct Node {
     recorder: Option<Arc<Recorder>>,
     record_status: Arc<Mutex<RecordStatus>>,
     stages: Vec<Role>,
+    site: u64,
     started_ns: i64,
     clock: HostClock,
     health: Vec<Outlet>,
@@ -131,8 +138,9 @@ pub struct Node {
 /// What the front end counts.
 #[derive(Debug, Default)]
 struct FrontCounted {
+    /// Packets, or clouds.
     packets: AtomicU64,
-    /// Messages of drivers that hold no packets.
+    /// Messages of drivers that hold none.
     broken: AtomicU64,
     frames: AtomicU64,
     priors_late: AtomicU64,
@@ -168,6 +176,7 @@ impl Node {
             stop: Arc::default(),
             receivers: None,
             packets: None,
+            clouds: None,
             front: None,
             fed: None,
             front_counted: Arc::default(),
@@ -177,6 +186,7 @@ impl Node {
             drivers: Vec::new(),
             recorder,
             record_status,
+            site: fleet::site_number(&config.site),
             started_ns: clock.now_ns(),
             clock,
             health: Vec::new(),
@@ -252,21 +262,43 @@ impl Node {
         let name = crate::network::chunk(&config.site.sensors[own[0]].name)
             .map_err(|e| e.within("site.sensors: name"))?;
         let outlet = self.hall.outlet(&self.hall.keys().foreground(&name), Urgency::Points)?;
-        let packets = Arc::new(Queue::new(PACKETS_WAITING, WhenFull::DropNewest));
-        let (queue, counted) = (packets.clone(), self.front_counted.clone());
-        let recorder = self.recorder.clone();
-        self.front = Some(std::thread::spawn(move || {
-            let publish = |mut foreground: umbracast_io::nodes::Foreground| {
-                outlet.put(&mut foreground);
-                counted.frames.fetch_add(1, Ordering::Relaxed);
-                let took = Duration::from_nanos((clock.now_ns() - foreground.closed_ns).max(0) as u64);
-                lock(&counted.latency).add(took);
-                *lock(&counted.health) = foreground.health;
+        let counted = self.front_counted.clone();
+        let publish = move |mut foreground: Foreground| {
+            outlet.put(&mut foreground);
+            counted.frames.fetch_add(1, Ordering::Relaxed);
+            let took = Duration::from_nanos((clock.now_ns() - foreground.closed_ns).max(0) as u64);
+            lock(&counted.latency).add(took);
+            *lock(&counted.health) = foreground.health;
+        };
+        let counted = self.front_counted.clone();
+        let taken = move |front: &Front| {
+            counted.packets.fetch_add(1, Ordering::Relaxed);
+            counted.priors_late.store(front.priors_late(), Ordering::Relaxed);
+        };
+        if let Some(&sensor) = own.iter().find(|&&s| takes_clouds(&config.site.sensors[s])) {
+            let Source::Ros2(domain, topics) = source else {
+                let name = &config.site.sensors[sensor].name;
+                return Err(Error::new(format!(
+                    "sensor {name:?} is known by its clouds: expected a topic of them, found none"
+                )));
             };
+            let clouds = Arc::new(Queue::new(CLOUDS_WAITING, WhenFull::DropOldest));
+            self.read_clouds(domain, &topics[0].1, &clouds)?;
+            self.clouds = Some(clouds.clone());
+            self.front = Some(std::thread::spawn(move || {
+                while let Some(cloud) = clouds.pop() {
+                    front.push_cloud(cloud, &publish);
+                    taken(&front);
+                }
+            }));
+            return Ok(());
+        }
+        let packets = Arc::new(Queue::new(PACKETS_WAITING, WhenFull::DropNewest));
+        let (queue, recorder) = (packets.clone(), self.recorder.clone());
+        self.front = Some(std::thread::spawn(move || {
             while let Some(arrived) = queue.pop() {
-                counted.packets.fetch_add(1, Ordering::Relaxed);
                 front.push(&arrived, &publish);
-                counted.priors_late.store(front.priors_late(), Ordering::Relaxed);
+                taken(&front);
                 if let Some(recorder) = &recorder {
                     recorder.packet(arrived);
                 }
@@ -275,23 +307,47 @@ impl Node {
         }));
         match source {
             Source::Doors(doors) => self.receivers = Some(Receivers::start(&doors, clock, &packets)?),
-            Source::Ros2(domain, topics) => {
-                let node = ros2::Node::new(self.hall.session(), domain, "", "umbracast_sensor")?;
-                for (sensor, topic) in topics {
-                    let (queue, counted) = (packets.clone(), self.front_counted.clone());
-                    self.drivers.extend(ros2::packets(&node, &topic, move |packet| match packet {
-                        Some(packet) => queue.push(Arrived { sensor, packet }),
-                        None => drop(counted.broken.fetch_add(1, Ordering::Relaxed)),
-                    })?);
-                }
-                self.driven = Some(node);
-            }
+            Source::Ros2(domain, topics) => self.read_packets(domain, topics, &packets)?,
             Source::Replay(recorded, rate) => {
                 let names = config.site.sensors.iter().map(|sensor| sensor.name.clone()).collect();
                 self.fed = Some(self.replay(recorded, rate, own.to_vec(), names, packets.clone()));
             }
         }
         self.packets = Some(packets);
+        Ok(())
+    }
+
+    fn read_packets(
+        &mut self,
+        domain: u32,
+        topics: Vec<(usize, String)>,
+        packets: &Arc<Queue<Arrived>>,
+    ) -> Result<(), Error> {
+        let node = ros2::Node::new(self.hall.session(), domain, "", "umbracast_sensor")?;
+        for (sensor, topic) in topics {
+            let (queue, counted) = (packets.clone(), self.front_counted.clone());
+            self.drivers.extend(ros2::packets(&node, &topic, move |packet| match packet {
+                Some(packet) => queue.push(Arrived { sensor, packet }),
+                None => drop(counted.broken.fetch_add(1, Ordering::Relaxed)),
+            })?);
+        }
+        self.driven = Some(node);
+        Ok(())
+    }
+
+    fn read_clouds(
+        &mut self,
+        domain: u32,
+        topic: &str,
+        clouds: &Arc<Queue<PointCloud>>,
+    ) -> Result<(), Error> {
+        let node = ros2::Node::new(self.hall.session(), domain, "", "umbracast_sensor")?;
+        let (queue, counted) = (clouds.clone(), self.front_counted.clone());
+        self.drivers.push(ros2::clouds(&node, topic, move |cloud| match cloud {
+            Some(cloud) => queue.push(cloud),
+            None => drop(counted.broken.fetch_add(1, Ordering::Relaxed)),
+        })?);
+        self.driven = Some(node);
         Ok(())
     }
 
@@ -355,7 +411,8 @@ impl Node {
         let front = &self.front_counted;
         let mut summary = Summary {
             packets: front.packets.load(Ordering::Relaxed),
-            packets_lost: self.packets.as_ref().map_or(0, |packets| packets.lost()),
+            packets_lost: self.packets.as_ref().map_or(0, |packets| packets.lost())
+                + self.clouds.as_ref().map_or(0, |clouds| clouds.lost()),
             frames: front.frames.load(Ordering::Relaxed),
             priors_late: front.priors_late.load(Ordering::Relaxed),
             broken: front.broken.load(Ordering::Relaxed),
@@ -408,6 +465,7 @@ impl Node {
             latency_ms: ms(&summary.latency),
             wire_ms: ms(&summary.wire),
             leads: summary.leads,
+            site: self.site,
             health: summary.health,
         };
         self.health.iter().for_each(|outlet| outlet.put(&mut health));
@@ -422,6 +480,9 @@ impl Node {
         self.drivers.clear();
         if let Some(packets) = &self.packets {
             packets.close();
+        }
+        if let Some(clouds) = &self.clouds {
+            clouds.close();
         }
         for thread in [self.front.take(), self.fed.take()].into_iter().flatten() {
             let _ = thread.join(); // One that panicked is a bug; the others end all the same.

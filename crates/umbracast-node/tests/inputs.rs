@@ -4,7 +4,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use umbracast::geometry::DVec2;
-use umbracast::{Config, STEP_NS};
+use umbracast::lidar::Assembler;
+use umbracast::{Config, Health, STEP_NS};
 use umbracast_io::nodes::{Followed, Foreground};
 use umbracast_io::{fields, messages};
 use umbracast_live::HostClock;
@@ -106,4 +107,39 @@ fn packets_of_drivers_give_foreground() {
     }
     let summary = node.stop();
     assert_eq!((summary.broken, summary.health.is_clean()), (1, true), "{:?}", summary.health);
+}
+
+#[test]
+fn clouds_of_a_driver_give_foreground_by_the_tenth_of_a_second() {
+    let (hall, mut config) = (hall(), Config::default());
+    config.site.sensors.truncate(1);
+    let crowd = Stroll::new(Preset::Orca03, 3, &Ground::circle(12.5), 7).leg(1);
+    let (mut scene, mut assembler) =
+        (Scene::new(crowd, &config.site, 7).unwrap(), Assembler::new(&config.site).unwrap());
+    config.site.sensors[0].model = "points".to_owned();
+    let foreground = heard::<Foreground>(&hall, "sensor/*/foreground");
+    let source = Source::Ros2(3, vec![(0, "/lidar/points".to_owned())]);
+    let node = Node::start(hall.clone(), settings(&[Role::Sensor], &config, source)).unwrap();
+    let driver = ros2::Node::new(hall.session(), 3, "", "driver").unwrap();
+    let mut publisher = driver.publisher("/lidar/points", &messages::CLOUD).unwrap();
+    let mut health = Health::default();
+    while let Some(simulated) = scene.next_frame() {
+        simulated.packets[0].iter().for_each(|packet| assembler.push(0, packet, &mut health));
+        while let Some(frame) = assembler.pop() {
+            let cloud = messages::cloud(frame.time_ns - STEP_NS, "lidar", &frame.scans[0]);
+            publisher.publish(1, cloud.clone()).unwrap();
+            let message = foreground.recv_timeout(SOON).expect("a frame");
+            assert_eq!((message.time_ns, message.views.len()), (frame.time_ns, 1));
+            // Once more: the same frame.
+            publisher.publish(1, cloud).unwrap();
+        }
+    }
+    publisher.publish(1, b"no message".to_vec()).unwrap();
+    while node.summary().broken == 0 {
+        std::thread::yield_now();
+    }
+    let summary = node.stop();
+    assert!(summary.frames > 5, "{}", summary.frames);
+    // Health is that of the last frame, before which all clouds but its own had come twice.
+    assert_eq!((summary.packets, summary.health.packets_late), (2 * summary.frames, summary.frames - 1));
 }

@@ -69,13 +69,22 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
     words.extend(["--json".into(), "--quiet".into(), "--serve".into(), "127.0.0.1:8600".into()]);
     words.extend(["--record".into(), argument(&folder)]);
     let said: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
-    book.command(&format!("umbracast {}", said.join(" ")));
+    book.command(&format!("umbracast {} & nice -n 19 chromium --headless ...", said.join(" ")));
     let mut live = Command::new(book.umbracast());
     let live = live.args(&words).stdout(Stdio::piped()).stderr(Stdio::null());
     let live = live.spawn().map_err(|e| format!("umbracast: {e}"))?;
     sleep(Duration::from_secs(2));
-    let mut browser = Command::new("chromium");
-    browser.args(["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"]);
+    // Who looks has a computer of his own: here he takes what is left.
+    let mut browser = Command::new("nice");
+    browser.args([
+        "-n",
+        "19",
+        "chromium",
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--remote-debugging-port=0",
+    ]);
     browser.arg("http://127.0.0.1:8600/").stdout(Stdio::null()).stderr(Stdio::null());
     let page = browser.spawn();
     let mut resident_kb = Vec::new();

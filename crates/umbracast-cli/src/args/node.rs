@@ -42,7 +42,8 @@ pub struct Node {
     #[arg(long, value_name = "PORT", conflicts_with = "from")]
     pub port: Option<u16>,
     /// Packets from these topics of ROS 2 in place of sockets, one for each sensor of the front end, as drivers publish them:
-    /// velodyne_msgs/VelodyneScan or umbracast_msgs/SensorPackets. The domain is that of [network.ros2], else 0.
+    /// velodyne_msgs/VelodyneScan or umbracast_msgs/SensorPackets; sensor_msgs/PointCloud2 for a sensor whose model is
+    /// "points". The domain is that of [network.ros2], else 0.
     #[arg(long, value_name = "TOPIC", value_delimiter = ',', conflicts_with_all = ["from", "port"])]
     pub ros2: Vec<String>,
     /// Packets of this recording in place of sockets, at the pace they came, once front ends of all sensors and all stages

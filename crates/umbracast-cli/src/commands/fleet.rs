@@ -29,7 +29,7 @@ pub fn run(args: &args::Fleet, common: &Common) -> Result<Ending, Error> {
         true => say::line(format_args!("{:#}", fleet::json(&halls))),
         false => say::line(fleet::text(&halls).trim_end()),
     }
-    let nodes = || halls.values().flat_map(|hall| hall.nodes.values());
-    let well = nodes().count() > 0 && nodes().all(|node| node.troubles().is_empty());
+    let is_well = |hall: &fleet::Hall| hall.nodes.values().all(|node| node.troubles(hall.site()).is_empty());
+    let well = halls.values().any(|hall| !hall.nodes.is_empty()) && halls.values().all(is_well);
     Ok(if well { Ending::Done } else { Ending::Wrong })
 }
