@@ -19,7 +19,7 @@ const FRAMES: usize = 6 * THERE;
 fn to_and_fro() -> Crowd {
     let position = |person: usize, step: usize| {
         let turn = std::f64::consts::PI * step as f64 / (10 * THERE) as f64;
-        let side = if person % 2 == 0 { -6.0 } else { 2.0 };
+        let side = if person.is_multiple_of(2) { -6.0 } else { 2.0 };
         DVec2::new(side + 1.8 * turn.cos(), LINES_M * (person as f64 - 0.5 * (PEOPLE - 1) as f64))
     };
     let trajectory = |person: usize| Trajectory {
