@@ -52,6 +52,9 @@ pub struct Mountings {
     sensors: Vec<Mounting>,
     frames: u32,
     moved: Vec<usize>,
+    /// Returns that are looked at, and the sums over those of each surface.
+    points_m: Vec<DVec3>,
+    sums: Vec<Sums>,
 }
 
 /// A plane: points on it have `normal . p = off_m`.
@@ -88,6 +91,8 @@ impl Mountings {
             sensors: site.sensors.iter().filter(|_| config.follow_sensors).map(mounting).collect(),
             frames: 0,
             moved: Vec::new(),
+            points_m: Vec::new(),
+            sums: Vec::new(),
         }
     }
 
@@ -130,9 +135,11 @@ impl Mountings {
         else {
             return;
         };
-        let points_m = sampled(image, self.frames);
+        self.points_m.clear();
+        self.points_m.extend(sampled(image, self.frames));
         let before = mounting.doubted.take();
-        let Some(found) = fitted(&points_m, &mounting.given, &mounting.used, &self.surfaces) else { return };
+        let Mounting { given, used, .. } = &*mounting;
+        let Some(found) = fitted(&self.points_m, given, used, &self.surfaces, &mut self.sums) else { return };
         let near = |a: &Six, b: &Six, turn_rad: f64, shift_m: f64| {
             let off = |axes: std::ops::Range<usize>| axes.map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
             off(0..3) < turn_rad && off(3..6) < shift_m
@@ -167,13 +174,13 @@ fn surfaces(hall: &Hall) -> Vec<Surface> {
 }
 
 /// Some of the returns of a revolution, others each time, in the sensor's frame.
-fn sampled(image: &RangeImage, turn: u32) -> Vec<DVec3> {
+fn sampled(image: &RangeImage, turn: u32) -> impl Iterator<Item = DVec3> {
     let beams = image.beams.len().max(1);
     let every = (image.columns.len() * beams).div_ceil(RETURNS).max(1);
     let columns = (turn as usize % every..image.columns.len()).step_by(every);
-    let rays = columns.flat_map(|c| (0..beams).map(move |b| (c, b)));
-    let ranges = rays.filter_map(|(c, b)| Some((c, b, *image.range_m.get(c * beams + b)?)));
-    ranges.filter(|ray| ray.2 > 0.0).map(|(c, b, range_m)| image.point_m(c, b, f64::from(range_m))).collect()
+    let rays = columns.flat_map(move |c| (0..beams).map(move |b| (c, b)));
+    let ranges = rays.filter_map(move |(c, b)| Some((c, b, *image.range_m.get(c * beams + b)?)));
+    ranges.filter(|ray| ray.2 > 0.0).map(|(c, b, range_m)| image.point_m(c, b, f64::from(range_m)))
 }
 
 fn corrected(given: &Pose, by: &Six) -> Pose {
@@ -187,10 +194,16 @@ fn corrected(given: &Pose, by: &Six) -> Pose {
 }
 
 /// The difference from `given` that lays returns on surfaces; `None` where these are not the hall's.
-fn fitted(points_m: &[DVec3], given: &Pose, start: &Six, surfaces: &[Surface]) -> Option<Six> {
+fn fitted(
+    points_m: &[DVec3],
+    given: &Pose,
+    start: &Six,
+    surfaces: &[Surface],
+    sums: &mut Vec<Sums>,
+) -> Option<Six> {
     let mut by = *start;
     let mut on = (0, 0);
-    let mut sums = vec![Sums::default(); surfaces.len()];
+    sums.resize(surfaces.len(), Sums::default());
     for gate_m in GATES_M {
         let pose = corrected(given, &by);
         sums.fill(Sums::default());
@@ -207,7 +220,7 @@ fn fitted(points_m: &[DVec3], given: &Pose, start: &Six, surfaces: &[Surface]) -
                 on = (on.0 + 1, on.1 + usize::from(s == 0));
             }
         }
-        let step = solved(&sums, &by, surfaces)?;
+        let step = solved(sums, &by, surfaces)?;
         by.iter_mut().zip(step).for_each(|(by, step)| *by += step);
     }
     (on.0 as f64 >= SHARE_MIN * points_m.len() as f64 && on.1 >= FLOOR_MIN).then_some(by)
@@ -307,7 +320,7 @@ mod tests {
         let given = site.sensors[0].site_from_sensor();
         let turn = turn_deg * std::f64::consts::PI / 180.0;
         let truth = corrected(&given, &[turn.x, turn.y, turn.z, shift_m.x, shift_m.y, shift_m.z]);
-        fitted(&returns(&truth, hall), &given, &[0.0; 6], &surfaces(&site.hall))
+        fitted(&returns(&truth, hall), &given, &[0.0; 6], &surfaces(&site.hall), &mut Vec::new())
     }
 
     #[test]

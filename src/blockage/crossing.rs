@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::body_model::Slice;
 use super::figure::{Band, Figure, Joint, Rod};
-use super::lanes::{WORD, larger, smaller};
+use super::lanes::{WORD, larger, smaller, word_of};
 use super::rays::Rays;
 use super::shadows::Meeting;
 use super::trajectories::Trajectories;
@@ -21,7 +21,9 @@ type Lane = [f32; WORD];
 /// axis, x ahead and y to the left.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Crossing {
-    samples: Vec<u32>,
+    /// The numbers of those that were taken.
+    samples: [u32; WORD],
+    taken: usize,
     /// Where the body's swaying axis is, which way it faces, and where the ray ends, then what is worked out of it.
     axis: [Lane; 2],
     own: [Lane; 2],
@@ -58,16 +60,36 @@ impl Crossing {
         asked: &[u32],
         blocked: &mut [u32],
     ) {
-        let step = meeting.step as usize;
-        let base_m = rays.to_mean_m(other, step);
+        let base_m = rays.to_mean_m(other, meeting.step as usize);
         self.start_z = rays.start_m.z as f32;
+        let gait = &other.gait;
         for word in words {
             let mut left = asked[word];
+            if left == 0 {
+                continue;
+            }
+            let of_step = meeting.step as usize * (other.samples / WORD) + word;
+            let axis_m = [0, 1].map(|i| word_of(&gait.axis_m[i], of_step));
+            let own = [0, 1].map(|i| word_of(&gait.own[i], of_step));
+            let end_m = [0, 1, 2].map(|i| word_of(&rays.end_m[i], word));
+            let (height_m, width) = (word_of(&other.height_m, word), word_of(&other.width_scale, word));
+            let (swing_hz, wave_hz) = (word_of(&gait.swing_hz, word), word_of(&gait.wave_hz, of_step));
             while left != 0 {
-                let k = word * WORD + left.trailing_zeros() as usize;
+                // Both are below anyway: so nothing is asked of the arrays' ends.
+                let (k, lane) = (left.trailing_zeros() as usize % WORD, self.taken % WORD);
                 left &= left - 1;
-                self.gather(rays, other, base_m, k, step * other.samples + k);
-                if self.samples.len() == WORD {
+                for i in 0..2 {
+                    self.axis[i][lane] = base_m[i] + axis_m[i][k];
+                    self.own[i][lane] = own[i][k];
+                }
+                for i in 0..3 {
+                    self.end[i][lane] = end_m[i][k];
+                }
+                (self.height[lane], self.width[lane]) = (height_m[k], width[k]);
+                (self.swing[lane], self.wave[lane]) = (swing_hz[k], wave_hz[k]);
+                self.samples[lane] = (word * WORD + k) as u32;
+                self.taken += 1;
+                if self.taken == WORD {
                     self.answer(figure, part, meeting.band, blocked);
                 }
             }
@@ -75,33 +97,17 @@ impl Crossing {
         self.answer(figure, part, meeting.band, blocked);
     }
 
-    /// Takes a sample out of the arrays of rays and body.
-    #[inline(always)]
-    fn gather(&mut self, rays: &Rays, other: &Trajectories, base_m: [f32; 2], k: usize, of_step: usize) {
-        let (lane, gait) = (self.samples.len(), &other.gait);
-        for i in 0..2 {
-            self.axis[i][lane] = base_m[i] + gait.axis_m[i][of_step];
-            self.own[i][lane] = gait.own[i][of_step];
-        }
-        for i in 0..3 {
-            self.end[i][lane] = rays.end_m[i][k];
-        }
-        (self.height[lane], self.width[lane]) = (other.height_m[k], other.width_scale[k]);
-        (self.swing[lane], self.wave[lane]) = (gait.swing_hz[k], gait.wave_hz[of_step]);
-        self.samples.push(k as u32);
-    }
-
     /// Asks those that were taken.
     #[inline(always)]
     fn answer(&mut self, figure: &Figure, part: Part, band: Band, blocked: &mut [u32]) {
-        if self.samples.is_empty() {
+        if self.taken == 0 {
             return;
         }
         self.cross(figure, part, band);
-        for (sample, miss) in self.samples.iter().zip(&self.miss) {
+        for (sample, miss) in self.samples[..self.taken].iter().zip(&self.miss) {
             blocked[*sample as usize / WORD] |= u32::from(*miss <= 0.0) << (*sample as usize % WORD);
         }
-        self.samples.clear();
+        self.taken = 0;
     }
 
     #[inline(always)]
@@ -130,7 +136,7 @@ impl Crossing {
     /// How many lanes are in use, up to whole registers.
     #[inline(always)]
     fn lanes(&self) -> usize {
-        self.samples.len().next_multiple_of(REGISTER).min(WORD)
+        self.taken.next_multiple_of(REGISTER).min(WORD)
     }
 
     #[inline(always)]

@@ -36,17 +36,21 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// No part of it is farther from the body's position, as a share of the height.
-    pub(super) fn reach(&self, width_max: f64, fastest_hz: f64) -> f64 {
+    /// No part of it is farther from the body's position, as a share of the height, where its arms are no farther than that.
+    #[inline(always)]
+    pub(super) fn reach(&self, width_max: f64, arms: f64) -> f64 {
         let half = f64::from(larger(self.around[0], self.around[1]));
         let trunk = half * width_max + f64::from(self.ahead.abs() + self.ahead_by);
+        trunk.max(arms) + f64::from(self.sway)
+    }
+
+    /// The same of the arms, which are one of [`RODS`] choices in every stretch of slices.
+    pub(super) fn arms_reach(&self, width_max: f64, fastest_hz: f64) -> f64 {
         let joint = |[fixed, swings, out]: [f32; 3]| {
             let ahead = fastest_hz * f64::from(fixed.abs() + swings.abs());
             (ahead * ahead + f64::from(out * out)).sqrt()
         };
-        let arms =
-            self.joints.map(joint).into_iter().fold(0.0, f64::max) + f64::from(self.radius) * width_max;
-        trunk.max(arms) + f64::from(self.sway)
+        self.joints.map(joint).into_iter().fold(0.0, f64::max) + f64::from(self.radius) * width_max
     }
 }
 
@@ -85,8 +89,9 @@ impl Figure {
     pub(super) fn plan_of(&self, band: Band) -> usize {
         let slices = &self.slices;
         let last = slices.len().saturating_sub(1);
-        let low = slices[..last].iter().take_while(|slice| slice.top < band.low).count();
-        let high = slices[..last].iter().take_while(|slice| slice.top <= band.high).count();
+        // Slices stand one upon another.
+        let low: usize = slices[..last].iter().map(|slice| usize::from(slice.top < band.low)).sum();
+        let high: usize = slices[..last].iter().map(|slice| usize::from(slice.top <= band.high)).sum();
         let rods =
             self.rods.iter().enumerate().map(|(i, rod)| usize::from(rod.is_within(band)) << i).sum::<usize>();
         (low * slices.len() + high.max(low)) * RODS + rods
@@ -124,7 +129,7 @@ impl Figure {
 }
 
 /// Which of the two rods: two bits.
-const RODS: usize = 4;
+pub(super) const RODS: usize = 4;
 
 /// A radius of what is not there.
 const NOWHERE: f32 = -1e3;

@@ -18,14 +18,14 @@ impl Phases {
     /// Of a von Mises distribution.
     pub fn new(gait: &GaitPhase) -> Self {
         let width_rad = TAU / PHASES as f64;
-        let density = |i: usize| {
+        let densities: [f64; PHASES] = std::array::from_fn(|i| {
             let off_rad = (i as f64 + 0.5) * width_rad - PI;
             (gait.concentration * (off_rad.cos() - 1.0)).exp()
-        };
-        let total: f64 = (0..PHASES).map(density).sum();
+        });
+        let total: f64 = densities.iter().sum();
         let mut sum = 0.0;
-        let shares = std::array::from_fn(|i| {
-            sum += density(i) / total;
+        let shares = densities.map(|density| {
+            sum += density / total;
             sum
         });
         Self { first_rad: gait.phase_rad - PI, shares }

@@ -7,6 +7,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::figure::{Band, Figure};
+use super::spread::Spread;
 use super::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
@@ -148,7 +149,7 @@ impl Shadows {
                 if bundle.is_aside(&seen, p.reach_m + spread.radius_m) {
                     continue;
                 }
-                let spreads_m = bundle.sides.map(|side| spread.along_m(side));
+                let spreads_m = bundle.spreads_m(spread);
                 let of = |reach_m: f64| {
                     bundle.share(&seen, reach_m, spreads_m).and_then(|share| self.band(rises_m, share, p))
                 };
@@ -204,12 +205,12 @@ impl Meeting {
 /// All rays from an access point to the samples of a person, in plan view.
 struct Bundle {
     start_m: DVec2,
-    /// Unit vectors along their middle, back, to the left and to the right; and how long the middle is.
-    sides: [DVec2; 4],
+    /// The unit vector along their middle, and how long that is.
+    along: DVec2,
     length_m: f64,
     /// Shares of the shortest and of the longest of them in a metre.
     per_m: [f64; 2],
-    /// How far the rays' ends lie from the middle's, to each side.
+    /// How far the rays' ends lie from the middle's: along it, back, to the left and to the right.
     ends_m: [f64; 4],
 }
 
@@ -221,28 +222,36 @@ struct Seen {
 
 impl Bundle {
     fn of_second(ap_m: DVec3, q: &Trajectories, ue_reach_m: f64) -> Self {
-        Self::new(ap_m, q.second.center_m, |_| q.second.radius_m + ue_reach_m)
+        Self::new(ap_m, q.second.center_m, |_| [q.second.radius_m + ue_reach_m; 2])
     }
 
     #[inline(always)]
     fn of_step(ap_m: DVec3, q: &Trajectories, step: usize, ue_reach_m: f64) -> Self {
-        Self::new(ap_m, q.mean_m[step], |side| q.spread[step].along_m(side) + ue_reach_m)
+        Self::new(ap_m, q.mean_m[step], |side| q.spread[step].both_ways_m(side).map(|m| m + ue_reach_m))
     }
 
     #[inline(always)]
-    fn new(ap_m: DVec3, end_m: DVec2, reach_m: impl Fn(DVec2) -> f64) -> Self {
+    fn new(ap_m: DVec3, end_m: DVec2, both_ways_m: impl Fn(DVec2) -> [f64; 2]) -> Self {
         let way_m = end_m - ap_m.truncate();
         let along = way_m.normalize_or(DVec2::X);
-        let sides = [along, -along, along.perp(), -along.perp()];
-        let (length_m, ends_m) = (way_m.length(), sides.map(reach_m));
+        let ([fore, back], [left, right]) = (both_ways_m(along), both_ways_m(along.perp()));
+        let (length_m, ends_m) = (way_m.length(), [fore, back, left, right]);
         let per_m = [length_m - ends_m[1], length_m + ends_m[0]].map(|length_m| 1.0 / length_m);
-        Self { start_m: ap_m.truncate(), sides, length_m, per_m, ends_m }
+        Self { start_m: ap_m.truncate(), along, length_m, per_m, ends_m }
     }
 
     #[inline(always)]
     fn seen(&self, place_m: DVec2) -> Seen {
-        let (along, from_start_m) = (self.sides[0], place_m - self.start_m);
+        let (along, from_start_m) = (self.along, place_m - self.start_m);
         Seen { way_m: along.dot(from_start_m), off_m: along.perp_dot(from_start_m) }
+    }
+
+    /// How far somebody's samples spread to each of the four sides.
+    #[inline(always)]
+    fn spreads_m(&self, spread: &Spread) -> [f64; 4] {
+        let ([fore, back], [left, right]) =
+            (spread.both_ways_m(self.along), spread.both_ways_m(self.along.perp()));
+        [fore, back, left, right]
     }
 
     /// True where no ray can come as near as this.

@@ -43,10 +43,10 @@ impl Spread {
         Self { most_m, radius_m: farthest_m / COS_SIXTEENTH }
     }
 
-    /// No sample lies farther along this unit vector, which is put together from the two of the eight directions
-    /// beside it.
+    /// No sample lies farther along this unit vector nor, second, along its opposite: put together from the two of the eight
+    /// directions beside it.
     #[inline(always)]
-    pub(super) fn along_m(&self, direction: DVec2) -> f64 {
+    pub(super) fn both_ways_m(&self, direction: DVec2) -> [f64; 2] {
         let (x, y) = (direction.x.abs(), direction.y.abs());
         let (right, up) = (direction.x >= 0.0, direction.y >= 0.0);
         let diagonal = match (right, up) {
@@ -55,10 +55,20 @@ impl Spread {
             (false, false) => 5,
             (true, false) => 7,
         };
-        match x > y {
-            true => (x - y) * self.most_m[if right { 0 } else { 4 }] + y * self.most_m[diagonal],
-            false => (y - x) * self.most_m[if up { 2 } else { 6 }] + x * self.most_m[diagonal],
-        }
+        let (straight, off, share) = match x > y {
+            true => (if right { 0 } else { 4 }, x - y, y),
+            false => (if up { 2 } else { 6 }, y - x, x),
+        };
+        [0, 4].map(|turned| {
+            let most_m = |i: usize| self.most_m[(i + turned) % 8];
+            off * most_m(straight) + share * most_m(diagonal)
+        })
+    }
+
+    /// The first of them.
+    #[cfg(test)]
+    fn along_m(&self, direction: DVec2) -> f64 {
+        self.both_ways_m(direction)[0]
     }
 }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use super::body;
 use super::draws::Draws;
-use super::figure::Figure;
+use super::figure::{Figure, RODS};
 use super::lanes::{WORD, cos_sin, larger, smaller};
 use super::numbers::Numbers;
 use super::phases::Phases;
@@ -217,7 +217,11 @@ impl Trajectories {
         let (height_m, width) = (self.heights_m[1], f64::from(largest(&self.width_scale)).max(1.0));
         let fastest_hz = body::relative_speed_hz(f64::from(largest(&self.speed_mps)), height_m);
         self.reach_of_m.clear();
-        self.reach_of_m.extend(figure.plans.iter().map(|plan| height_m * plan.reach(width, fastest_hz)));
+        let arms: [f64; RODS] = std::array::from_fn(|i| {
+            figure.plans.get(i).map_or(0.0, |plan| plan.arms_reach(width, fastest_hz))
+        });
+        let plans = figure.plans.chunks_exact(RODS).flat_map(|of_stretch| of_stretch.iter().zip(&arms));
+        self.reach_of_m.extend(plans.map(|(plan, arms)| height_m * plan.reach(width, *arms)));
         self.reach_m = self.reach_of_m.iter().fold(0.0, |a, b| b.max(a));
         let ends = self.mean_m.iter();
         let (least, most) =

@@ -4,6 +4,8 @@
 //! at mirrored places. It ships as `models/body_axis.toml`; data and scores are in the card beside it. It was
 //! fitted on simulated returns by `umbracast train axis`.
 
+use std::array::from_fn;
+
 use serde::Deserialize;
 
 use super::features::{AxisFeatures, EVEN, ODD};
@@ -80,8 +82,59 @@ impl AxisModel {
 
     /// Ground point of the body axis, and the covariance of its error, m^2.
     pub fn locate(&self, view: &AxisFeatures) -> (DVec2, [[f64; 2]; 2]) {
-        let (own, mirrored) =
-            (self.forward(&view.even, &view.odd), self.forward(&view.even, &view.odd.map(|x| -x)));
+        Network::of(self.clone()).locate(view)
+    }
+
+    /// The inputs of the network: as many standard deviations off their means.
+    pub fn inputs(&self, even: &[f64; EVEN], odd: &[f64; ODD]) -> [f64; EVEN + ODD] {
+        from_fn(|i| {
+            let input = if i < EVEN {
+                (even[i] - self.even_mean[i]) / self.even_scale[i]
+            } else {
+                odd[i - EVEN] / self.odd_scale[i - EVEN]
+            };
+            input.clamp(-INPUT_LIMIT, INPUT_LIMIT)
+        })
+    }
+}
+
+/// So many hidden units are summed up side by side.
+const UNITS: usize = 16;
+
+/// The model as it is asked: hidden units side by side, so that sums run in vector registers.
+#[derive(Debug, Clone)]
+pub(super) struct Network {
+    model: AxisModel,
+    units: Vec<Units>,
+}
+
+/// Some hidden units; of those that are not there every weight is 0.
+#[derive(Debug, Clone)]
+struct Units {
+    of_inputs: [[f64; UNITS]; EVEN + ODD],
+    bias: [f64; UNITS],
+    to_outputs: [[f64; UNITS]; OUTPUTS],
+}
+
+impl Network {
+    pub(super) fn of(model: AxisModel) -> Self {
+        let units = |first: usize| {
+            let of = |weight: &dyn Fn(usize) -> f64| -> [f64; UNITS] {
+                from_fn(|u| if first + u < model.hidden.len() { weight(first + u) } else { 0.0 })
+            };
+            Units {
+                of_inputs: from_fn(|i| of(&|u| model.hidden[u][i])),
+                bias: of(&|u| model.hidden_bias[u]),
+                to_outputs: from_fn(|o| of(&|u| model.output[o][u])),
+            }
+        };
+        let units = (0..model.hidden.len()).step_by(UNITS).map(units).collect();
+        Self { model, units }
+    }
+
+    /// See [`AxisModel::locate`].
+    pub(super) fn locate(&self, view: &AxisFeatures) -> (DVec2, [[f64; 2]; 2]) {
+        let [own, mirrored] = self.forward(view);
         let offset = DVec2::new(own[0] + mirrored[0], own[1] - mirrored[1]) * (0.5 * UNIT_M);
         let offset = offset.clamp_length_max(OFFSET_LIMIT_M);
         let variance = |i: usize| {
@@ -95,26 +148,30 @@ impl AxisModel {
         (view.base_m + a * offset.x + l * offset.y, covariance)
     }
 
-    /// The inputs of the network: as many standard deviations off their means.
-    pub fn inputs(&self, even: &[f64; EVEN], odd: &[f64; ODD]) -> [f64; EVEN + ODD] {
-        std::array::from_fn(|i| {
-            let input = if i < EVEN {
-                (even[i] - self.even_mean[i]) / self.even_scale[i]
-            } else {
-                odd[i - EVEN] / self.odd_scale[i - EVEN]
-            };
-            input.clamp(-INPUT_LIMIT, INPUT_LIMIT)
-        })
-    }
-
-    fn forward(&self, even: &[f64; EVEN], odd: &[f64; ODD]) -> [f64; OUTPUTS] {
-        let inputs = self.inputs(even, odd);
-        let mut outputs: [f64; OUTPUTS] = std::array::from_fn(|o| self.output_bias[o]);
-        for (u, (weights, bias)) in self.hidden.iter().zip(&self.hidden_bias).enumerate() {
-            let sum: f64 = weights.iter().zip(&inputs).map(|(w, x)| w * x).sum();
-            let unit = (sum + bias).tanh();
-            for (output, weights) in outputs.iter_mut().zip(&self.output) {
-                *output += weights[u] * unit;
+    /// What the network says of a view and of its mirror image, whose odd inputs have the other sign: the sums over the even
+    /// ones are the same.
+    fn forward(&self, view: &AxisFeatures) -> [[f64; OUTPUTS]; 2] {
+        let inputs = self.model.inputs(&view.even, &view.odd);
+        let bias: [f64; OUTPUTS] = from_fn(|o| self.model.output_bias[o]);
+        let mut outputs = [bias; 2];
+        for units in &self.units {
+            let mut own = [0.0; UNITS];
+            for (weights, x) in units.of_inputs[..EVEN].iter().zip(&inputs) {
+                (0..UNITS).for_each(|u| own[u] += weights[u] * x);
+            }
+            let mut mirrored = own;
+            for (weights, x) in units.of_inputs[EVEN..].iter().zip(&inputs[EVEN..]) {
+                for u in 0..UNITS {
+                    let product = weights[u] * x;
+                    own[u] += product;
+                    mirrored[u] -= product;
+                }
+            }
+            for (outputs, sums) in outputs.iter_mut().zip([own, mirrored]) {
+                for u in 0..UNITS {
+                    let unit = (sums[u] + units.bias[u]).tanh();
+                    (0..OUTPUTS).for_each(|o| outputs[o] += units.to_outputs[o][u] * unit);
+                }
             }
         }
         outputs

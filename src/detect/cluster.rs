@@ -14,6 +14,8 @@ pub struct PlanGrid {
     starts: Vec<u32>,
     /// Union-find over the cells.
     parents: Vec<u32>,
+    /// By rows above: where the neighbours of the last cell began.
+    begins: Vec<u32>,
 }
 
 impl PlanGrid {
@@ -47,6 +49,8 @@ impl PlanGrid {
         self.starts.push(self.keys.len() as u32);
         self.parents.clear();
         self.parents.extend(0..cells as u32);
+        self.begins.clear();
+        self.begins.resize(reach as usize + 1, 0);
         for a in 0..cells {
             self.join_neighbours(a, reach, points_m, radius_m);
         }
@@ -63,7 +67,15 @@ impl PlanGrid {
                 let key = self.keys[self.starts[b] as usize];
                 (key.0, key.1)
             };
-            let mut b = if dy == 0 { a + 1 } else { lower_bound(cells, |b| place(b) < from) };
+            let mut b = if dy == 0 { a + 1 } else { self.begins[dy as usize] as usize };
+            // Cells come in order, so their neighbours do, but where numbers of rows end.
+            if dy > 0 && b > 0 && place(b - 1) >= from {
+                b = 0;
+            }
+            while b < cells && place(b) < from {
+                b += 1;
+            }
+            self.begins[dy as usize] = b as u32;
             while b < cells && place(b) <= (from.0, column.saturating_add(reach)) {
                 let (root_a, root_b) = (find(&mut self.parents, a as u32), find(&mut self.parents, b as u32));
                 if root_a != root_b && self.touch(a, b, points_m, radius_m) {
@@ -117,16 +129,6 @@ fn find(parents: &mut [u32], mut cell: u32) -> u32 {
         cell = parents[cell as usize];
     }
     cell
-}
-
-/// First index in 0..n for which `before` no longer holds.
-fn lower_bound(n: usize, before: impl Fn(usize) -> bool) -> usize {
-    let (mut low, mut high) = (0, n);
-    while low < high {
-        let middle = (low + high) / 2;
-        if before(middle) { low = middle + 1 } else { high = middle }
-    }
-    low
 }
 
 #[cfg(test)]

@@ -36,6 +36,20 @@ const BESIDE_M: f64 = 0.30;
 /// Points that deviate more than this along their longest axis are more than four people in a row.
 const CROWD_M: f64 = 0.7;
 
+/// Kept from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Memory {
+    /// Parts from west to east.
+    order: Vec<usize>,
+    /// Pairs of parts near each other, with how far apart.
+    candidates: Vec<(f64, usize, usize)>,
+    into: Vec<usize>,
+    /// By prior: confirmed, and nobody's body is there.
+    without_body: Vec<bool>,
+    /// Lists of points that are no longer needed.
+    pub(super) spare: Vec<Cluster>,
+}
+
 /// Splits a cluster as long as one person more is likelier; parts go to `parts`. `moved_m` are all points, each
 /// moved behind the surface that its sensor saw.
 pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut Vec<Part>) {
@@ -45,8 +59,16 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
     }
     let all = Part::new(moved_m, cluster);
     let axis_m = long_axis(moved_m, &all);
-    let known = expected(moved_m, priors, &all.points);
     let is_crowd = axis_m.length() > CROWD_M;
+    // Most are one person alone, for whom nothing need be remembered.
+    if !is_crowd
+        && expected(moved_m, priors, &all.points).take(2).count() < 2
+        && !has_halves(moved_m, &all, axis_m)
+    {
+        parts.push(all);
+        return;
+    }
+    let known: Vec<usize> = expected(moved_m, priors, &all.points).collect();
     if is_crowd && known.is_empty() {
         // The work grows with the square of the people, so a crowd is halved first; whom the cut divides, the
         // merge makes whole again.
@@ -57,8 +79,11 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
         return;
     }
     let cluster = &all.points;
-    let expected_m = known.iter().map(|&k| priors[k].position_m).collect();
-    let guided = means(moved_m, cluster, expected_m).filter(|people| are_people(people, EXPECTED_HALVES_M));
+    let expected_m = || known.iter().map(|&k| priors[k].position_m).collect();
+    let guided = match is_crowd {
+        true => None,
+        false => means(moved_m, cluster, expected_m()).filter(|people| are_people(people, EXPECTED_HALVES_M)),
+    };
     if is_crowd || guided.is_none() && known.len() > 1 {
         among_known(moved_m, priors, &known, cluster, parts);
         return;
@@ -126,11 +151,13 @@ fn are_people(parts: &[Part], apart_m: f64) -> bool {
 
 /// Joins parts that are one person, nearest first: those nearer than two people can stand, and legs and arms that lost
 /// their body.
-pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
+pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], memory: &mut Memory) {
     let reach_m = ONE_PERSON_M.max(LIMB_M).max(ARM_M);
-    let mut order: Vec<usize> = (0..parts.len()).collect();
-    order.sort_by(|&a, &b| parts[a].mean_m().x.total_cmp(&parts[b].mean_m().x));
-    let mut candidates = Vec::new();
+    let Memory { order, candidates, into, spare, .. } = memory;
+    order.clear();
+    order.extend(0..parts.len());
+    order.sort_unstable_by(|&a, &b| parts[a].mean_m().x.total_cmp(&parts[b].mean_m().x).then(a.cmp(&b)));
+    candidates.clear();
     for (k, &i) in order.iter().enumerate() {
         for &j in &order[k + 1..] {
             let off_m = parts[j].mean_m() - parts[i].mean_m();
@@ -142,21 +169,22 @@ pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) 
             }
         }
     }
-    candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    candidates.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     // What was merged leaves an empty part that points to where it went.
-    let mut into: Vec<usize> = (0..parts.len()).collect();
+    into.clear();
+    into.extend(0..parts.len());
     let root = |into: &[usize], mut i: usize| {
         while into[i] != i {
             i = into[i];
         }
         i
     };
-    for (_, i, j) in candidates {
-        let (i, j) = (root(&into, i), root(&into, j));
+    for &(_, i, j) in &*candidates {
+        let (i, j) = (root(into, i), root(into, j));
         if i == j || !is_one_person(moved_m, &parts[i], &parts[j], priors) {
             continue;
         }
-        join(parts, i, j);
+        spare.push(join(parts, i, j));
         into[j] = i;
     }
     tidy(parts);
@@ -164,58 +192,58 @@ pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) 
 
 /// Gives the points of pieces to the expected people whose bodies are nowhere: legs where the beams pass below the
 /// hips, or the few points that others let through. Without an expected person such pieces are nobody.
-pub(super) fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior]) {
-    let confirmed: Vec<usize> = (0..priors.len()).filter(|&k| priors[k].confirmed).collect();
-    let people: Vec<&Prior> = confirmed.iter().map(|&k| &priors[k]).collect();
-    let off_m = |part: &Part, k: usize| people[k].position_m.distance(part.mean_m());
-    let is_near = |part: &Part, k: usize| off_m(part, k) < LIMB_M + people[k].position_sigma_m.min(LIMB_M);
-    let (bodies, pieces): (Vec<Part>, Vec<Part>) =
-        parts.drain(..).partition(|part| part.owner.is_some() || !is_piece(part));
-    let mut has_body = vec![false; people.len()];
-    for body in &bodies {
-        if let Some(owner) = body.owner {
-            confirmed
-                .iter()
-                .zip(&mut has_body)
-                .filter(|(k, _)| **k == owner)
-                .for_each(|(_, has)| *has = true);
-            continue;
-        }
-        let near = (0..people.len()).filter(|&k| is_near(body, k));
-        if let Some(k) = near.min_by(|&a, &b| off_m(body, a).total_cmp(&off_m(body, b))) {
-            has_body[k] = true;
+pub(super) fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], memory: &mut Memory) {
+    let Memory { without_body, .. } = memory;
+    let off_m = |part: &Part, k: usize| priors[k].position_m.distance(part.mean_m());
+    let is_near = |part: &Part, k: usize| off_m(part, k) < LIMB_M + priors[k].position_sigma_m.min(LIMB_M);
+    let confirmed = || (0..priors.len()).filter(|&k| priors[k].confirmed);
+    without_body.clear();
+    without_body.extend(priors.iter().map(|prior| prior.confirmed));
+    for body in parts.iter().filter(|part| !is_piece(part)) {
+        let near = confirmed().filter(|&k| is_near(body, k));
+        let nearest = || near.min_by(|&a, &b| off_m(body, a).total_cmp(&off_m(body, b)));
+        if let Some(k) = body.owner.or_else(nearest) {
+            without_body[k] = false;
         }
     }
-    let (near, far): (Vec<Part>, Vec<Part>) =
-        pieces.into_iter().partition(|piece| (0..people.len()).any(|k| !has_body[k] && is_near(piece, k)));
+    let is_theirs = |piece: &Part| confirmed().any(|k| without_body[k] && is_near(piece, k));
+    if !parts.iter().any(|part| is_piece(part) && is_theirs(part)) {
+        return;
+    }
+    let (near, others): (Vec<Part>, Vec<Part>) =
+        parts.drain(..).partition(|part| is_piece(part) && is_theirs(part));
+    parts.extend(others);
     let points: Cluster = near.into_iter().flat_map(|piece| piece.points).collect();
+    let people: Vec<&Prior> = priors.iter().filter(|prior| prior.confirmed).collect();
     let mut own = vec![Cluster::new(); people.len()];
     for (&i, owner) in points.iter().zip(owners(moved_m, &points, &people, PIECES_SIGMA_M)) {
-        if let Some(k) = owner.filter(|&k| !has_body[k]) {
+        if let Some(k) = owner {
             own[k].push(i);
         }
     }
-    parts.extend(bodies.into_iter().chain(far));
-    for mut points in own.into_iter().filter(|points| !points.is_empty()) {
-        points.sort_unstable();
-        parts.push(Part { expected: true, ..Part::new(moved_m, points) });
+    for (k, mut points) in confirmed().zip(own) {
+        if without_body[k] && !points.is_empty() {
+            points.sort_unstable();
+            parts.push(Part { expected: true, ..Part::new(moved_m, points) });
+        }
     }
 }
 
-/// True for what may be somebody's leg or head, but does not look like a whole person.
+/// True for what may be somebody's leg or head, but does not look like a whole person, and is not known to be somebody's.
 fn is_piece(part: &Part) -> bool {
-    part.points.len() < POINTS_MIN || part.top_m < FULL_BODY_TOP_M
+    part.owner.is_none() && (part.points.len() < POINTS_MIN || part.top_m < FULL_BODY_TOP_M)
 }
 
-/// Moves the points of part `j` to part `i`.
-fn join(parts: &mut [Part], i: usize, j: usize) {
-    let points = std::mem::take(&mut parts[j].points);
-    parts[i].points.extend(points);
+/// Moves the points of part `j` to part `i`; their list comes back.
+fn join(parts: &mut [Part], i: usize, j: usize) -> Cluster {
+    let mut points = std::mem::take(&mut parts[j].points);
+    parts[i].points.append(&mut points);
     let (sum_m, top_m) = (parts[j].sum_m, parts[j].top_m);
     parts[i].sum_m += sum_m;
     parts[i].top_m = parts[i].top_m.max(top_m);
     parts[i].owner = parts[i].owner.or(parts[j].owner);
     parts[i].expected |= parts[j].expected;
+    points
 }
 
 /// Drops what was joined to others.
@@ -234,11 +262,17 @@ fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> boo
     }
     // A leg in mid-stride stands apart from its body, is low, and shows less.
     let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
-    let is_leg = apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m;
-    let known = expected_near(small, large, priors);
-    is_leg
-        || known < 2
-            && (is_arm(moved_m, small, large, known == 1) || is_arm(moved_m, large, small, known == 1))
+    if apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m {
+        return true;
+    }
+    let may_be_arm =
+        |is_known: bool| is_arm(moved_m, small, large, is_known) || is_arm(moved_m, large, small, is_known);
+    // Whose body is known may be told from less, so what is no arm of such a one is nobody's.
+    may_be_arm(true)
+        && match expected_near(small, large, priors) {
+            0 => may_be_arm(false),
+            known => known == 1,
+        }
 }
 
 /// How many confirmed people are expected within an arm's reach of two parts.
@@ -262,11 +296,11 @@ fn are_expected_apart(a_m: DVec2, b_m: DVec2, priors: &[Prior]) -> bool {
 }
 
 /// Which confirmed people are expected within the cluster.
-fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> Vec<usize> {
+fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> impl Iterator<Item = usize> {
     let of = || cluster.iter().map(|&i| moved_m[i as usize].truncate());
     let bounds_m = |(least, most): (DVec2, DVec2), p: DVec2| (least.min(p), most.max(p));
     let (least_m, most_m) = of().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), bounds_m);
-    let is_inside = |prior: &Prior| {
+    let is_inside = move |prior: &Prior| {
         let at_m = prior.position_m;
         // Most people are elsewhere.
         let away_m = at_m - at_m.clamp(least_m, most_m);
@@ -274,7 +308,36 @@ fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> Vec<usize> 
             && away_m.length_squared() < EXPECTED_M * EXPECTED_M
             && of().any(|p| p.distance(at_m) < EXPECTED_M)
     };
-    (0..priors.len()).filter(|&k| is_inside(&priors[k])).collect()
+    (0..priors.len()).filter(move |&k| is_inside(&priors[k]))
+}
+
+/// True when both halves of a part, a step along this axis to either side of its middle, might be people: what [`means`] would
+/// make of them, without their points.
+fn has_halves(moved_m: &[DVec3], part: &Part, axis_m: DVec2) -> bool {
+    let mut means_m = [part.mean_m() - axis_m, part.mean_m() + axis_m];
+    let mut halves = [(DVec2::ZERO, 0.0, 0.0); 2];
+    for pass in 0..=PASSES {
+        halves = [(DVec2::ZERO, 0.0, 0.0); 2];
+        for point_m in part.points.iter().map(|&i| moved_m[i as usize]) {
+            let p = point_m.truncate();
+            let nearer = means_m[1].distance_squared(p) < means_m[0].distance_squared(p);
+            let (sum_m, points, top_m) = &mut halves[usize::from(nearer)];
+            *sum_m += p;
+            *points += 1.0;
+            *top_m = f64::max(*top_m, point_m.z);
+        }
+        if halves.iter().any(|(_, points, _)| *points == 0.0) {
+            return false;
+        }
+        // The last pass only shares out.
+        let last = std::mem::replace(&mut means_m, halves.map(|(sum_m, points, _)| sum_m / points));
+        if last == means_m || pass == PASSES {
+            break;
+        }
+    }
+    let is_person =
+        |(_, points, top_m): &(DVec2, f64, f64)| *points >= POINTS_MIN as f64 && *top_m >= FULL_BODY_TOP_M;
+    means_m[0].distance(means_m[1]) > HALVES_M && halves.iter().all(is_person)
 }
 
 /// The means of the parts, those of the longest replaced by two, half a step to either side of its middle.
@@ -309,10 +372,8 @@ fn means(moved_m: &[DVec3], cluster: &[u32], mut means_m: Vec<DVec2>) -> Option<
     }
     let nearest = |means_m: &[DVec2], i: u32| {
         let p = moved_m[i as usize].truncate();
-        let nearer = |&a: &usize, &b: &usize| {
-            means_m[a].distance_squared(p).total_cmp(&means_m[b].distance_squared(p))
-        };
-        (0..means_m.len()).min_by(nearer).unwrap_or(0)
+        let off_m2 = means_m.iter().map(|mean_m| mean_m.distance_squared(p)).enumerate();
+        off_m2.min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(mean, _)| mean)
     };
     for _ in 0..PASSES {
         let mut sums = vec![(DVec2::ZERO, 0.0); means_m.len()];
@@ -353,7 +414,7 @@ mod tests {
     fn people(points_m: &[DVec3], priors: &[Prior]) -> usize {
         let mut parts = Vec::new();
         split(points_m, priors, (0..points_m.len() as u32).collect(), &mut parts);
-        merge(points_m, &mut parts, priors);
+        merge(points_m, &mut parts, priors, &mut Memory::default());
         parts.len()
     }
 
@@ -399,8 +460,8 @@ mod tests {
         let known = [prior(0.0, 0.0), prior(0.36, 0.0), prior(0.72, 0.0)];
         let mut parts = Vec::new();
         split(&points_m, &known, (0..points_m.len() as u32).collect(), &mut parts);
-        merge(&points_m, &mut parts, &known);
-        give_pieces(&points_m, &mut parts, &known);
+        merge(&points_m, &mut parts, &known, &mut Memory::default());
+        give_pieces(&points_m, &mut parts, &known, &mut Memory::default());
         assert_eq!(parts.len(), 3);
         assert!(parts.iter().any(|part| part.expected && (80..83).all(|i| part.points.contains(&i))));
     }
@@ -411,8 +472,8 @@ mod tests {
         let points_m: Vec<DVec3> = leg(-0.3).chain(leg(0.3)).collect();
         let legs = || vec![Part::new(&points_m, (0..8).collect()), Part::new(&points_m, (8..16).collect())];
         let (mut known, mut unknown) = (legs(), legs());
-        give_pieces(&points_m, &mut known, &[prior(0.1, 0.0)]);
-        give_pieces(&points_m, &mut unknown, &[prior(3.0, 0.0)]);
+        give_pieces(&points_m, &mut known, &[prior(0.1, 0.0)], &mut Memory::default());
+        give_pieces(&points_m, &mut unknown, &[prior(3.0, 0.0)], &mut Memory::default());
         assert!(known.len() == 1 && known[0].expected && known[0].points.len() == 16);
         assert!(unknown.len() == 2 && !unknown[0].expected);
     }
@@ -429,7 +490,7 @@ mod tests {
         points_m.extend((0..8).map(|i| DVec3::new(0.4, 0.0, 0.1 * f64::from(i))));
         let mut parts =
             vec![Part::new(&points_m, (0..40).collect()), Part::new(&points_m, (40..48).collect())];
-        merge(&points_m, &mut parts, &[]);
+        merge(&points_m, &mut parts, &[], &mut Memory::default());
         assert_eq!(parts.len(), 1);
         assert_eq!(parts[0].points.len(), 48);
     }

@@ -31,7 +31,8 @@ pub struct AxisFeatures {
 }
 
 /// A point that has been moved.
-struct Seen {
+#[derive(Debug, Clone)]
+pub struct Seen {
     at_m: DVec2,
     z_m: f64,
     /// Horizontal, from the sensor.
@@ -48,10 +49,22 @@ impl AxisFeatures {
         shift_m: f64,
         velocity_mps: Option<DVec2>,
     ) -> Self {
-        let seen = moved(points, sensors_m, shift_m, velocity_mps);
+        Self::within(&mut Vec::new(), points, sensors_m, shift_m, velocity_mps)
+    }
+
+    /// The same in some memory.
+    pub fn within<'a>(
+        seen: &mut Vec<Seen>,
+        points: impl Iterator<Item = &'a Point> + Clone,
+        sensors_m: &[DVec3],
+        shift_m: f64,
+        velocity_mps: Option<DVec2>,
+    ) -> Self {
+        seen.clear();
+        seen.extend(moved(points, sensors_m, shift_m, velocity_mps));
         let n = seen.len().max(1) as f64;
         let base_m = seen.iter().map(|s| s.at_m).sum::<DVec2>() / n;
-        let main = main_sensor(&seen);
+        let main = main_sensor(seen);
         let of_main = || seen.iter().filter(|s| s.sensor == main);
         let away = of_main().map(|s| s.away).sum::<DVec2>().normalize_or(DVec2::X);
         let along = |v: DVec2| DVec2::new(v.dot(away), v.dot(away.perp()));
@@ -60,7 +73,7 @@ impl AxisFeatures {
         let mut bands = [const { Group::EMPTY }; BANDS.len() + 1];
         let [mut whole, mut trunk, mut others] = [const { Group::EMPTY }; 3];
         let mut others_away = DVec2::ZERO;
-        for s in &seen {
+        for s in &*seen {
             let off = along(s.at_m - base_m);
             let share = s.z_m / top_m;
             bands[BANDS.iter().filter(|&&upper| share >= upper).count()].add(off);
@@ -130,13 +143,13 @@ fn moved<'a>(
     sensors_m: &[DVec3],
     shift_m: f64,
     velocity_mps: Option<DVec2>,
-) -> Vec<Seen> {
+) -> impl Iterator<Item = Seen> {
     let n = points.clone().count().max(1) as f64;
     let first_ns = points.clone().map(|p| p.time_ns).min().unwrap_or_default();
-    let late_s = |p: &Point| (p.time_ns - first_ns) as f64 * 1e-9;
+    let late_s = move |p: &Point| (p.time_ns - first_ns) as f64 * 1e-9;
     let mean_s = points.clone().map(late_s).sum::<f64>() / n;
     let velocity_mps = velocity_mps.unwrap_or_default();
-    let seen = points.map(|p| {
+    points.map(move |p| {
         let at_m = p.position_m.truncate() - velocity_mps * (late_s(p) - mean_s);
         let sensor = sensors_m.get(usize::from(p.sensor));
         let sight_m = sensor.map_or(DVec2::ZERO, |s| at_m - s.truncate());
@@ -148,8 +161,7 @@ fn moved<'a>(
             range_m: sight_m.length(),
             sensor: p.sensor,
         }
-    });
-    seen.collect()
+    })
 }
 
 /// The sensor that saw most of the points; of equals the first.

@@ -20,57 +20,102 @@ const POINT_SIGMA_M: f64 = 0.2;
 /// that its sensor saw. k-means, where each person's place stays near the expected one and a body has a shape.
 /// Nobody's place is taken to be surer than `sigma_min_m`.
 pub fn owners(moved_m: &[DVec3], points: &[u32], people: &[&Prior], sigma_min_m: f64) -> Vec<Option<usize>> {
-    let variance = |prior: &Prior| prior.position_sigma_m.max(sigma_min_m).powi(2);
-    let mut places: Vec<(DVec2, f64)> =
-        people.iter().map(|prior| (prior.position_m, variance(prior))).collect();
-    let mut owners = Vec::new();
-    for _ in 0..PASSES {
-        let last = std::mem::take(&mut owners);
-        owners.extend(points.iter().map(|&i| owner(moved_m[i as usize], people, &places)));
-        if owners == last {
+    let mut known: Vec<Known> = people.iter().map(|prior| Known::new(prior, sigma_min_m)).collect();
+    let mut owners = vec![None; points.len()];
+    for pass in 0..PASSES {
+        let mut changed = pass == 0;
+        for (&i, owner) in points.iter().zip(&mut owners) {
+            let likeliest = likeliest(moved_m[i as usize], &known);
+            changed |= likeliest != *owner;
+            *owner = likeliest;
+        }
+        if !changed {
             break;
         }
-        for (k, (prior, place)) in people.iter().zip(&mut places).enumerate() {
-            let own = points.iter().zip(&owners).filter(|(_, owner)| **owner == Some(k));
-            let (sum_m, n) = own.fold((DVec2::ZERO, 0.0), |(sum_m, n), (&i, _)| {
-                (sum_m + moved_m[i as usize].truncate(), n + 1.0)
-            });
-            let before = variance(prior);
-            *place = (prior.position_m, before);
-            if n > 0.0 {
-                let gain = before / (before + MEAN_SIGMA_M.powi(2) + POINT_SIGMA_M.powi(2) / n);
-                *place = (prior.position_m + (sum_m / n - prior.position_m) * gain, before * (1.0 - gain));
-            }
+        known.iter_mut().for_each(|one| (one.sum_m, one.points) = (DVec2::ZERO, 0.0));
+        for (&i, k) in points.iter().zip(&owners).filter_map(|(i, owner)| Some((i, (*owner)?))) {
+            known[k].sum_m += moved_m[i as usize].truncate();
+            known[k].points += 1.0;
         }
+        known.iter_mut().for_each(Known::settle);
     }
     owners
 }
 
-/// The likeliest owner of a point.
-fn owner(point_m: DVec3, people: &[&Prior], places: &[(DVec2, f64)]) -> Option<usize> {
-    let cost = |(prior, &(place_m, variance)): (&&Prior, &(DVec2, f64))| {
-        let (along_m, across_m) = deviations_m(point_m.z / prior.height_m);
-        let (mut along, mut across) = (along_m.powi(2), across_m.powi(2));
-        let off_m = point_m.truncate() - place_m;
-        let mut heading = prior.velocity_mps;
-        if heading.length() < WALKS_FROM_MPS {
-            (along, across) = (0.5 * (along + across), 0.5 * (along + across));
-            heading = DVec2::X;
-        }
-        let heading = heading.normalize();
-        (along, across) = (along + variance, across + variance);
-        let squared = off_m.dot(heading).powi(2) / along + off_m.perp_dot(heading).powi(2) / across;
-        (squared, squared + (along * across).ln())
-    };
-    let all = people.iter().zip(places).map(cost).enumerate();
-    let near = all.filter(|(_, (squared, _))| *squared < GATE * GATE);
-    near.min_by(|(_, a), (_, b)| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+/// Somebody who is known, and where the points are taken to show him.
+struct Known<'a> {
+    prior: &'a Prior,
+    /// Unit vector; none of who stands.
+    heading: Option<DVec2>,
+    variance_m2: f64,
+    place_m: DVec2,
+    place_variance_m2: f64,
+    /// Points farther away are not his, whatever their height.
+    reach2_m2: f64,
+    sum_m: DVec2,
+    points: f64,
 }
+
+impl<'a> Known<'a> {
+    fn new(prior: &'a Prior, sigma_min_m: f64) -> Self {
+        let velocity_mps = prior.velocity_mps;
+        let variance_m2 = prior.position_sigma_m.max(sigma_min_m).powi(2);
+        Self {
+            prior,
+            heading: (velocity_mps.length() >= WALKS_FROM_MPS).then(|| velocity_mps.normalize()),
+            variance_m2,
+            place_m: prior.position_m,
+            place_variance_m2: variance_m2,
+            // With room for rounding. A place is never less sure than it was expected to be.
+            reach2_m2: 1.001 * GATE * GATE * (DEVIATION_MAX_M.powi(2) + variance_m2),
+            sum_m: DVec2::ZERO,
+            points: 0.0,
+        }
+    }
+
+    /// Between where he is expected and the mean of his points.
+    fn settle(&mut self) {
+        let before = self.variance_m2;
+        (self.place_m, self.place_variance_m2) = (self.prior.position_m, before);
+        let n = self.points;
+        if n > 0.0 {
+            let gain = before / (before + MEAN_SIGMA_M.powi(2) + POINT_SIGMA_M.powi(2) / n);
+            self.place_m = self.prior.position_m + (self.sum_m / n - self.prior.position_m) * gain;
+            self.place_variance_m2 = before * (1.0 - gain);
+        }
+    }
+
+    /// What it costs to take a point for his; none outside the gate.
+    fn cost(&self, point_m: DVec3) -> Option<f64> {
+        let off_m = point_m.truncate() - self.place_m;
+        if off_m.length_squared() > self.reach2_m2 {
+            return None;
+        }
+        let (along_m, across_m) = deviations_m(point_m.z / self.prior.height_m);
+        let (mut along, mut across) = (along_m.powi(2), across_m.powi(2));
+        if self.heading.is_none() {
+            (along, across) = (0.5 * (along + across), 0.5 * (along + across));
+        }
+        let heading = self.heading.unwrap_or(DVec2::X);
+        (along, across) = (along + self.place_variance_m2, across + self.place_variance_m2);
+        let squared = off_m.dot(heading).powi(2) / along + off_m.perp_dot(heading).powi(2) / across;
+        (squared < GATE * GATE).then(|| squared + (along * across).ln())
+    }
+}
+
+/// The likeliest owner of a point.
+fn likeliest(point_m: DVec3, known: &[Known]) -> Option<usize> {
+    let near = known.iter().enumerate().filter_map(|(k, one)| Some((k, one.cost(point_m)?)));
+    near.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(k, _)| k)
+}
+
+/// No deviation is larger.
+const DEVIATION_MAX_M: f64 = 0.28;
 
 /// How far a walking body's points lie from its axis along and across its way, at a share of its height: measured on
 /// simulated returns of people who walk alone.
 fn deviations_m(height_share: f64) -> (f64, f64) {
-    let along_m = (0.28 - 0.55 * height_share).clamp(0.08, 0.28);
+    let along_m = (DEVIATION_MAX_M - 0.55 * height_share).clamp(0.08, DEVIATION_MAX_M);
     (along_m, if (0.35..0.9).contains(&height_share) { 0.14 } else { 0.09 })
 }
 

@@ -1,8 +1,8 @@
 //! Position and boxes of one person.
 
-use super::axis::AxisModel;
+use super::axis::{AxisModel, Network};
 use super::evidence::FULL_BODY_TOP_M;
-use super::features::AxisFeatures;
+use super::features::{AxisFeatures, Seen};
 use super::limbs::LimbCovariance;
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
@@ -75,7 +75,9 @@ pub struct Measurer {
     /// Whether known people may be as long as a wheelchair.
     seated: bool,
     sensors_m: Vec<DVec3>,
-    axis: AxisModel,
+    axis: Network,
+    /// A person's points, moved.
+    seen: Vec<Seen>,
 }
 
 impl Measurer {
@@ -95,7 +97,8 @@ impl Measurer {
             size: if config.position == PositionMethod::BoxCenter { ADAPTED } else { OURS },
             seated: !config.without.contains(&Mechanism::ChildrenAndSeated),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
-            axis: AxisModel::shipped(),
+            axis: Network::of(AxisModel::shipped()),
+            seen: Vec::new(),
         }
     }
 
@@ -122,6 +125,7 @@ impl Measurer {
         detections: &mut Vec<Detection>,
     ) {
         detections.clear();
+        let mut seen = std::mem::take(&mut self.seen);
         for cluster in clusters {
             let aabb = Aabb::around(cluster.iter().map(|&i| points[i as usize].position_m));
             let expected = self.is_expected(&aabb, priors);
@@ -129,9 +133,11 @@ impl Measurer {
             let full_body = self.has_size_of_person(cluster.len(), &aabb)
                 && !(expected && aabb.max_m.z < FULL_BODY_TOP_M);
             if full_body || expected {
-                detections.push(Detection { full_body, ..self.detection(points, cluster, priors) });
+                let detection = self.detection_within(&mut seen, points, cluster, priors);
+                detections.push(Detection { full_body, ..detection });
             }
         }
+        self.seen = seen;
     }
 
     fn has_size_of_person(&self, points: usize, aabb: &Aabb) -> bool {
@@ -161,6 +167,16 @@ impl Measurer {
     /// Of points that are one person's, whatever their size; at least one.
     #[doc(hidden)] // For scores that know whose points they are.
     pub fn detection(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> Detection {
+        self.detection_within(&mut Vec::new(), points, cluster, priors)
+    }
+
+    fn detection_within(
+        &self,
+        seen: &mut Vec<Seen>,
+        points: &[Point],
+        cluster: &[u32],
+        priors: &[Prior],
+    ) -> Detection {
         let n = cluster.len() as f64;
         let of = || cluster.iter().map(|&i| &points[i as usize]);
         let aabb = Aabb::around(of().map(|p| p.position_m));
@@ -169,9 +185,12 @@ impl Measurer {
         let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
         let (position_m, z_m, covariance_m2) = match self.position {
             PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z, None),
-            PositionMethod::ShiftedMean => (self.features(points, cluster, &[]).base_m, mean_m.z, None),
+            PositionMethod::ShiftedMean => {
+                (self.features_within(seen, points, cluster, &[]).base_m, mean_m.z, None)
+            }
             PositionMethod::Fitted => {
-                let (position_m, covariance_m2) = self.axis.locate(&self.features(points, cluster, priors));
+                let features = self.features_within(seen, points, cluster, priors);
+                let (position_m, covariance_m2) = self.axis.locate(&features);
                 (position_m, mean_m.z, Some(covariance_m2))
             }
         };
@@ -200,11 +219,21 @@ impl Measurer {
     /// A cluster as the model of the body axis sees it; who walks there is the nearest of `priors`.
     #[doc(hidden)] // For the fit of the model of the body axis.
     pub fn features(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> AxisFeatures {
+        self.features_within(&mut Vec::new(), points, cluster, priors)
+    }
+
+    fn features_within(
+        &self,
+        memory: &mut Vec<Seen>,
+        points: &[Point],
+        cluster: &[u32],
+        priors: &[Prior],
+    ) -> AxisFeatures {
         let seen = cluster.iter().map(|&i| &points[i as usize]);
         let mean_m =
             seen.clone().map(|p| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
         let velocity_mps = nearest(mean_m, priors).map(|prior| prior.velocity_mps);
-        AxisFeatures::new(seen, &self.sensors_m, SHIFT_M, velocity_mps)
+        AxisFeatures::within(memory, seen, &self.sensors_m, SHIFT_M, velocity_mps)
     }
 }
 
@@ -216,8 +245,9 @@ fn diagonal_m(aabb: &Aabb) -> f64 {
 /// Who is known to walk here.
 fn nearest(at_m: DVec2, priors: &[Prior]) -> Option<&Prior> {
     let off_m = |prior: &Prior| prior.position_m.distance(at_m);
-    let who = priors.iter().filter(|p| p.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
-    who.filter(|prior| off_m(prior) < OWN_M)
+    let near =
+        priors.iter().filter(|p| p.confirmed).map(|p| (off_m(p), p)).filter(|(off_m, _)| *off_m < OWN_M);
+    near.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, who)| who)
 }
 
 /// The box along the points' own axes: extremes in object space (paper, section IV-A).

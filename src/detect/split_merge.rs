@@ -2,6 +2,7 @@
 
 use super::cluster::PlanGrid;
 use super::dp_means::MergeMean;
+use super::evidence::Memory;
 use super::features::away;
 use super::part::Part;
 use super::{Cluster, Point, Prior, dp_means, evidence};
@@ -29,6 +30,11 @@ const OURS: Radius =
     Radius { radius_m: 0.2, per_range: 0.005, shift_m: 0.1, points_min: evidence::POINTS_MIN };
 /// As hdl_people_tracking has it.
 const ADAPTED: Radius = Radius { radius_m: 0.2, per_range: 0.0, shift_m: 0.0, points_min: 16 };
+
+/// Of so many points is nearly everybody, unless he is beside a sensor: lists are made for that many at once.
+const POINTS_OF_ONE: usize = 512;
+/// So many lists that are no longer needed are kept.
+const SPARE_MAX: usize = 256;
 
 /// Groups foreground points into people.
 ///
@@ -59,6 +65,9 @@ pub struct Clusterer {
     labels: Vec<u32>,
     components: Vec<Cluster>,
     parts: Vec<Part>,
+    memory: Memory,
+    /// Clusters with the first point of each in the order of space.
+    firsts: Vec<([f64; 3], Cluster)>,
 }
 
 impl Clusterer {
@@ -85,6 +94,8 @@ impl Clusterer {
             labels: Vec::new(),
             components: Vec::new(),
             parts: Vec::new(),
+            memory: Memory::default(),
+            firsts: Vec::new(),
         }
     }
 
@@ -104,33 +115,36 @@ impl Clusterer {
     /// assert_eq!(clusters.len(), 2);
     /// ```
     pub fn clusters(&mut self, points: &[Point], priors: &[Prior], clusters: &mut Vec<Cluster>) {
-        clusters.clear();
+        self.memory.spare.append(clusters);
+        self.memory.spare.truncate(SPARE_MAX);
         self.components(points);
         match self.method {
             ClusterMethod::Evidence => self.by_evidence(if self.guided { priors } else { &[] }, clusters),
             ClusterMethod::Haselich => self.by_dp_means(points, MergeMean::Mean, clusters),
             ClusterMethod::HaselichAsShipped => self.by_dp_means(points, MergeMean::Sum, clusters),
         }
-        let first = |cluster: &Cluster| {
-            cluster
-                .iter()
-                .map(|&i| points[i as usize].position_m.to_array())
-                .min_by(order)
-                .unwrap_or_default()
+        let first = |cluster: Cluster| {
+            let places = cluster.iter().map(|&i| points[i as usize].position_m.to_array());
+            (places.min_by(order).unwrap_or_default(), cluster)
         };
-        clusters.sort_by(|a, b| order(&first(a), &first(b)));
+        self.firsts.extend(clusters.drain(..).map(first));
+        self.firsts.sort_unstable_by(|(a, one), (b, other)| order(a, b).then_with(|| one.cmp(other)));
+        clusters.extend(self.firsts.drain(..).map(|(_, cluster)| cluster));
     }
 
     /// Small components may be a limb of somebody, so what is too small is dropped last, and counts where somebody is
     /// expected.
     fn by_evidence(&mut self, priors: &[Prior], clusters: &mut Vec<Cluster>) {
+        let Self { moved_m, parts, memory, .. } = self;
         for component in self.components.drain(..) {
-            evidence::split(&self.moved_m, priors, component, &mut self.parts);
+            evidence::split(moved_m, priors, component, parts);
         }
-        evidence::merge(&self.moved_m, &mut self.parts, priors);
-        evidence::give_pieces(&self.moved_m, &mut self.parts, priors);
-        let all = self.parts.drain(..).filter(|p| p.expected || p.points.len() >= self.radius.points_min);
-        clusters.extend(all.map(|part| part.points));
+        evidence::merge(moved_m, parts, priors, memory);
+        evidence::give_pieces(moved_m, parts, priors, memory);
+        for part in parts.drain(..) {
+            let is_person = part.expected || part.points.len() >= self.radius.points_min;
+            if is_person { clusters.push(part.points) } else { memory.spare.push(part.points) }
+        }
     }
 
     fn by_dp_means(&mut self, points: &[Point], mean: MergeMean, clusters: &mut Vec<Cluster>) {
@@ -155,7 +169,13 @@ impl Clusterer {
         }
         let found =
             self.grid.components(&self.plan_m, &self.radius_m, self.radius.radius_m, &mut self.labels);
-        self.components.resize_with(found, Vec::new);
+        let spare = &mut self.memory.spare;
+        self.components.resize_with(found, || {
+            let mut list = spare.pop().unwrap_or_default();
+            list.clear();
+            list.reserve(POINTS_OF_ONE);
+            list
+        });
         for (&label, i) in self.labels.iter().zip(0..) {
             self.components[label as usize].push(i);
         }

@@ -7,6 +7,9 @@ use crate::geometry::Pose;
 
 /// Directions round a sensor, counted apart, so that a lost packet hides a sector only.
 pub const SECTORS: usize = 90;
+/// Of 24 or so in a sector.
+const COLUMNS_AT_ONCE: usize = 8;
+const HALF_TURN_CDEG: f32 = 18_000.0;
 
 /// What a frame's sensors could see, and when. Small beside the scans: what a host beside the sensors sends with their
 /// foreground.
@@ -145,13 +148,31 @@ impl Fan {
         fan
     }
 
+    /// The same as another, in the memory of this one.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.elevations_rad.clone_from(&other.elevations_rad);
+        self.columns = other.columns;
+    }
+
     fn take(&mut self, image: &RangeImage) {
         self.elevations_rad.clear();
         self.elevations_rad.extend(image.beams.iter().map(|beam| beam.elevation_rad));
         self.elevations_rad.sort_unstable_by(f64::total_cmp);
         self.columns.fill(0);
-        for column in &image.columns {
-            self.columns[sector((f64::from(column.azimuth_cdeg) * 0.01).to_radians())] += 1;
+        let of = |azimuth_cdeg: f32| sector((f64::from(azimuth_cdeg) * 0.01).to_radians());
+        for columns in image.columns.chunks(COLUMNS_AT_ONCE) {
+            let azimuths_cdeg = || columns.iter().map(|column| column.azimuth_cdeg);
+            let (least, most) = (
+                azimuths_cdeg().fold(f32::INFINITY, f32::min),
+                azimuths_cdeg().fold(f32::NEG_INFINITY, f32::max),
+            );
+            // Most columns fall into one sector with those beside them, and what lies between two azimuths less than half a
+            // turn apart that do is in it as well.
+            if most - least < HALF_TURN_CDEG && of(least) == of(most) {
+                self.columns[of(least)] += columns.len() as u32;
+            } else {
+                azimuths_cdeg().for_each(|azimuth_cdeg| self.columns[of(azimuth_cdeg)] += 1);
+            }
         }
     }
 }

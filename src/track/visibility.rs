@@ -19,6 +19,8 @@ const RETURNS_AT_HALF: f64 = 6.0;
 const SEEN_TOP_MIN_M: f64 = 0.5;
 /// Returns from a body in free sight of a sensor whose beams are unknown: enough to be found.
 const RETURNS_OF_UNKNOWN_BEAMS: f64 = 50.0;
+/// More than rounding takes from a share, and from a square metre.
+const ROUNDED: f64 = 1e-9;
 
 /// A body as sight knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +57,17 @@ struct Between {
     others: Vec<Body>,
     pillars: Vec<(DVec2, f64)>,
     furniture: Vec<Obb>,
+    /// Upright cylinders on the line to the left and to the right side of the body.
+    crossed: [Vec<Crossed>; 2],
+}
+
+/// An upright cylinder that a line of sight crosses.
+#[derive(Debug, Clone, Copy)]
+struct Crossed {
+    /// Shares of the line where it enters and leaves.
+    enter: f64,
+    leave: f64,
+    height_m: f64,
 }
 
 /// What a body gives.
@@ -107,7 +120,10 @@ impl Visibility {
                 Some(old) => *old = Eye { fan: old.fan.take(), ..eye },
                 None => self.eyes.push(eye),
             }
-            self.eyes[i].fan.clone_from(&view.fan);
+            match (&mut self.eyes[i].fan, &view.fan) {
+                (Some(own), Some(fan)) => own.copy_from(fan),
+                (own, fan) => own.clone_from(fan),
+            }
         }
     }
 
@@ -117,8 +133,14 @@ impl Visibility {
         let mut view =
             BodyView { beams_known: eyes.iter().all(|eye| eye.fan.is_some()), ..BodyView::default() };
         for eye in eyes {
+            let from = eye.origin_m.truncate();
+            let along = body.position_m - from;
+            // Most stand far beside the line that the segment is a part of.
+            let per_m = (1.0 + ROUNDED) * along.length();
             let near = |point: DVec2, radius: f64| {
-                from_segment_m(point, [eye.origin_m.truncate(), body.position_m]) < radius + BODY_RADIUS_M
+                let near_m = radius + BODY_RADIUS_M;
+                along.perp_dot(point - from).abs() <= near_m * per_m + ROUNDED
+                    && from_segment_m(point, [from, body.position_m]) < near_m
             };
             between.others.clear();
             between.others.extend(others.iter().filter(|o| *o != body && near(o.position_m, BODY_RADIUS_M)));
@@ -135,22 +157,23 @@ impl Visibility {
 
 impl Eye {
     /// Adds what a body gives to this sensor.
-    fn view(&self, body: &Body, between: &Between, view: &mut BodyView) {
+    fn view(&self, body: &Body, between: &mut Between, view: &mut BodyView) {
         let across = (body.position_m - self.origin_m.truncate()).perp().normalize_or_zero();
         let feet_m = [-0.5, 0.5].map(|side| body.position_m + across * (side * BODY_RADIUS_M));
         let z_m = |edge: usize| body.height_m * edge as f64 / SLICES as f64;
         let edges: [[Edge; SLICES + 1]; 2] =
             feet_m.map(|foot_m| std::array::from_fn(|edge| self.edge(foot_m.extend(z_m(edge)))));
+        between.cross(self.origin_m.truncate(), feet_m);
         for slice in 0..SLICES {
             let (low_m, high_m) = (z_m(slice), z_m(slice + 1));
-            for (foot_m, edges) in feet_m.iter().zip(&edges) {
+            for (side, (foot_m, edges)) in feet_m.iter().zip(&edges).enumerate() {
                 let beams = self.beams_between(&edges[slice], &edges[slice + 1]);
                 if beams == 0.0 {
                     continue;
                 }
                 let returns = beams * self.columns_on(&edges[slice]) * 0.5;
                 view.returns_alone += returns;
-                if between.hide(self.origin_m, foot_m.extend(0.5 * (low_m + high_m))) {
+                if between.hide(side, self.origin_m, foot_m.extend(0.5 * (low_m + high_m))) {
                     continue;
                 }
                 view.top_m = view.top_m.max(high_m);
@@ -202,12 +225,25 @@ struct Edge {
 }
 
 impl Between {
-    /// Does anything stand on the line from the eye to the target?
-    fn hide(&self, eye_m: DVec3, target_m: DVec3) -> bool {
-        let pillar = |p: &(DVec2, f64)| cylinder_hides(p.0, p.1, f64::INFINITY, eye_m, target_m);
-        let body = |o: &Body| cylinder_hides(o.position_m, BODY_RADIUS_M, o.height_m, eye_m, target_m);
-        self.pillars.iter().any(pillar)
-            || self.others.iter().any(body)
+    /// Finds out what stands on the lines from the eye to both sides of the body, as seen from above.
+    fn cross(&mut self, eye_m: DVec2, sides_m: [DVec2; 2]) {
+        let Self { others, pillars, crossed, .. } = self;
+        for (crossed, side_m) in crossed.iter_mut().zip(sides_m) {
+            let cross = |axis_m: DVec2, radius_m: f64, height_m: f64| {
+                let (enter, leave) = crossing(axis_m, radius_m, eye_m, side_m)?;
+                Some(Crossed { enter, leave, height_m })
+            };
+            crossed.clear();
+            crossed.extend(pillars.iter().filter_map(|p| cross(p.0, p.1, f64::INFINITY)));
+            crossed.extend(others.iter().filter_map(|o| cross(o.position_m, BODY_RADIUS_M, o.height_m)));
+        }
+    }
+
+    /// Does anything stand on the line from the eye to a target on that side of the body?
+    fn hide(&self, side: usize, eye_m: DVec3, target_m: DVec3) -> bool {
+        let z_m = |share: f64| eye_m.z + (target_m.z - eye_m.z) * share;
+        // Where the line leaves a cylinder it is lowest, if the eye looks down; where it enters, if up.
+        self.crossed[side].iter().any(|c| z_m(c.enter).min(z_m(c.leave)) < c.height_m)
             || self.furniture.iter().any(|f| hit_obb(f, eye_m, target_m).is_some())
     }
 }
@@ -224,25 +260,23 @@ fn beam_at(fan: &Fan, elevation_rad: f64) -> f64 {
     n as f64 - 0.5 + (elevation_rad - low) / (high - low)
 }
 
-/// Does an upright cylinder stand on the line from the eye to the target? One that holds the target does not.
-fn cylinder_hides(axis_m: DVec2, radius_m: f64, height_m: f64, eye_m: DVec3, target_m: DVec3) -> bool {
-    let (eye, target) = (eye_m.truncate(), target_m.truncate());
+/// Between which shares of its length the line from the eye to the target is within an upright cylinder, if at all. One
+/// that holds the target hides nothing.
+fn crossing(axis_m: DVec2, radius_m: f64, eye: DVec2, target: DVec2) -> Option<(f64, f64)> {
     let along = target - eye;
     let length_squared = along.length_squared();
     if length_squared == 0.0 || (target - axis_m).length() < radius_m {
-        return false;
+        return None;
     }
     let middle = (axis_m - eye).dot(along) / length_squared;
     let off_squared = (eye + along * middle - axis_m).length_squared();
     let half_squared = (radius_m * radius_m - off_squared) / length_squared;
     if half_squared <= 0.0 {
-        return false;
+        return None;
     }
-    // Where the line leaves the cylinder it is lowest, if the eye looks down; where it enters, if up.
     let half = half_squared.sqrt();
     let (enter, leave) = ((middle - half).max(0.0), (middle + half).min(1.0));
-    let z = |share: f64| eye_m.z + (target_m.z - eye_m.z) * share;
-    enter < leave && z(enter).min(z(leave)) < height_m
+    (enter < leave).then_some((enter, leave))
 }
 
 /// Chance that a body seen like this is detected, where it is `in_full_view` with every return (the shape of the curve
