@@ -26,6 +26,8 @@ pub(super) struct Crossing {
     axis: [Lane; 2],
     own: [Lane; 2],
     end: [Lane; 3],
+    /// Both heights of the ray are from the floor that the body stands on.
+    floor_m: f64,
     start_z: f32,
     height: Lane,
     width: Lane,
@@ -60,7 +62,8 @@ impl Crossing {
     ) {
         let step = meeting.step as usize;
         let base_m = rays.to_mean_m(other, step);
-        self.start_z = rays.start_m.z as f32;
+        self.floor_m = other.floor_m[step];
+        self.start_z = (rays.start_m.z - self.floor_m) as f32;
         for word in words {
             let mut left = asked[word];
             while left != 0 {
@@ -86,6 +89,7 @@ impl Crossing {
         for i in 0..3 {
             self.end[i][lane] = rays.end_m[i][k];
         }
+        self.end[2][lane] -= self.floor_m as f32;
         (self.height[lane], self.width[lane]) = (other.height_m[k], other.width_scale[k]);
         (self.swing[lane], self.wave[lane]) = (gait.swing_hz[k], gait.wave_hz[of_step]);
         self.samples.push(k as u32);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};
+use umbracast::site::Hall;
 
 use super::build::Build;
 use super::gestures::Gestures;
@@ -17,6 +18,10 @@ use super::{feet, gait, things};
 use crate::crowd::Trajectory;
 use crate::random::stream;
 
+/// A body rises from one level to the next over so much of its way, before the edge and behind it, in so many steps each.
+const CLIMB_M: f64 = 0.3;
+const CLIMB_STEPS: i32 = 6;
+
 /// Where a person is and how he stands, at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PersonState {
@@ -26,6 +31,8 @@ pub struct PersonState {
     pub velocity_mps: DVec2,
     /// The trunk's, held while standing.
     pub heading_rad: f64,
+    /// How high the floor is that the feet are on; climbing a step, between both levels.
+    pub floor_m: f64,
     /// Standing height with shoes; of who sits, the height of the head's top.
     pub height_m: f64,
 }
@@ -48,6 +55,8 @@ pub struct Walker {
     gait: Option<Arc<Gait>>,
     /// Standing (or sitting) upright at the origin, looking along x.
     upright: Pose,
+    /// Whose floor is not level.
+    hall: Option<Arc<Hall>>,
 }
 
 impl Walker {
@@ -83,6 +92,7 @@ impl Walker {
             seat_m: things.seat_m,
             gait: None,
             upright,
+            hall: None,
         }
     }
 
@@ -94,11 +104,19 @@ impl Walker {
         self
     }
 
+    /// The same body on this hall's floor.
+    #[must_use]
+    pub fn on_floor_of(mut self, hall: &Arc<Hall>) -> Self {
+        self.hall = (!hall.floors.is_empty()).then(|| hall.clone());
+        self
+    }
+
     /// The person's state, or `None` while not in the scene.
     pub fn state_at(&self, time_ns: i64) -> Option<PersonState> {
         let (position_m, velocity_mps) = self.trajectory.at(time_ns)?;
         let heading_rad = (self.walk.at(time_ns).heading_rad + PI).rem_euclid(TAU) - PI;
-        Some(PersonState { position_m, velocity_mps, heading_rad, height_m: self.height_m() })
+        let floor_m = self.floor_m(position_m, heading_rad);
+        Some(PersonState { position_m, velocity_mps, heading_rad, floor_m, height_m: self.height_m() })
     }
 
     fn height_m(&self) -> f64 {
@@ -109,8 +127,9 @@ impl Walker {
     /// is not in the scene.
     pub fn mesh_at(&self, time_ns: i64, vertices: &mut Vec<DVec3>) -> bool {
         vertices.clear();
-        let Some((pose, _)) = self.pose_at(time_ns) else { return false };
+        let Some((pose, state)) = self.pose_at(time_ns) else { return false };
         self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+        self.raise(state.position_m, state.heading_rad, vertices);
         true
     }
 
@@ -118,6 +137,7 @@ impl Walker {
     pub fn upright_mesh(&self, position_m: DVec2, heading_rad: f64, vertices: &mut Vec<DVec3>) {
         let pose = self.upright.moved(DVec2::ZERO, heading_rad, position_m);
         self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+        self.raise(position_m, heading_rad, vertices);
     }
 
     /// The walking mesh of `time_ns` moved so that its axis stands at `position_m` with `heading_rad`. Nothing
@@ -127,6 +147,23 @@ impl Walker {
         let Some((pose, state)) = self.pose_at(time_ns) else { return };
         let pose = pose.moved(state.position_m, heading_rad - state.heading_rad, position_m);
         self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+        self.raise(position_m, heading_rad, vertices);
+    }
+
+    /// Below the axis; up a step the body climbs over half a stride, to either side of the edge.
+    fn floor_m(&self, position_m: DVec2, heading_rad: f64) -> f64 {
+        let Some(hall) = &self.hall else { return 0.0 };
+        let ahead_m = DVec2::from_angle(heading_rad) * (CLIMB_M / f64::from(CLIMB_STEPS));
+        let under = |k: i32| hall.floor_m(position_m + ahead_m * f64::from(k));
+        (-CLIMB_STEPS..=CLIMB_STEPS).map(under).sum::<f64>() / f64::from(2 * CLIMB_STEPS + 1)
+    }
+
+    /// Puts a body that stands at z = 0 on the floor: upright, and on a ramp each foot at the height of its own place.
+    fn raise(&self, position_m: DVec2, heading_rad: f64, vertices: &mut [DVec3]) {
+        let Some(hall) = &self.hall else { return };
+        let floor_m = self.floor_m(position_m, heading_rad);
+        let slope = hall.floor_at(position_m).map_or(DVec2::ZERO, |i| DVec2::from_array(hall.floors[i].slope));
+        vertices.iter_mut().for_each(|v| v.z += floor_m + slope.dot(v.truncate() - position_m));
     }
 
     /// How the vertices of every mesh that this walker makes hang together.
