@@ -6,7 +6,7 @@ use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::pipeline::Outcome;
 use umbracast::site::Floor;
-use umbracast::{Health, Pipeline, Site};
+use umbracast::{Health, Pipeline, STEP_NS, Site};
 use umbracast_sim::crowd::{Crowd, Preset, strolling};
 use umbracast_sim::scene::{PersonTruth, Scene};
 
@@ -35,7 +35,7 @@ fn watched(hall: &Site, config: &Config, crowd: Crowd) -> Vec<(Outcome, Vec<Pers
         truths.push(frame.people);
         push(&mut assembler, frame.packets);
         while let Some(frame) = assembler.pop() {
-            let truth = truths[frame.index as usize].clone();
+            let truth = truths[(frame.time_ns / STEP_NS - 1) as usize].clone();
             seen.push((pipeline.step(&frame).clone(), truth));
         }
     }
@@ -73,7 +73,7 @@ fn a_hall_that_is_lifted_gives_the_same_people_and_links() {
         let below = watched(&config.site, &config, crowd());
         config.site = lifted(config.site);
         let above = watched(&config.site, &config, crowd());
-        assert_eq!((below.len(), above.len()), (30, 30));
+        assert!(below.len() == above.len() && below.len() > 27, "{} frames", below.len());
         let mut blocked = 0;
         for ((below, _), (above, _)) in below.iter().zip(&above) {
             assert_eq!(below.tracks.len(), above.tracks.len());

@@ -56,6 +56,14 @@ pub struct Floor {
 
 impl Floor {
     /// How high its plane is, also beyond its outline.
+    ///
+    /// ```
+    /// use umbracast::{geometry::DVec2, site::Floor};
+    ///
+    /// let outline_m = vec![[2.0, 0.0], [6.0, 0.0], [6.0, 4.0]];
+    /// let ramp = Floor { outline_m, height_m: 0.5, slope: [0.0, 0.125] };
+    /// assert_eq!(ramp.height_at_m(DVec2::new(3.0, 2.0)), 0.75);
+    /// ```
     pub fn height_at_m(&self, place_m: DVec2) -> f64 {
         let from_m = self.outline_m.first().copied().map_or(DVec2::ZERO, DVec2::from_array);
         self.height_m + DVec2::from_array(self.slope).dot(place_m - from_m)

@@ -18,9 +18,8 @@ use super::{feet, gait, things};
 use crate::crowd::Trajectory;
 use crate::random::stream;
 
-/// A body rises from one level to the next over so much of its way, before the edge and behind it, in so many steps each.
+/// A body climbs from one level to the next over so much of its way, before the edge and behind it.
 const CLIMB_M: f64 = 0.3;
-const CLIMB_STEPS: i32 = 6;
 
 /// Where a person is and how he stands, at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,7 +114,7 @@ impl Walker {
     pub fn state_at(&self, time_ns: i64) -> Option<PersonState> {
         let (position_m, velocity_mps) = self.trajectory.at(time_ns)?;
         let heading_rad = (self.walk.at(time_ns).heading_rad + PI).rem_euclid(TAU) - PI;
-        let floor_m = self.floor_m(position_m, heading_rad);
+        let floor_m = self.hall.as_ref().map_or(0.0, |hall| underfoot(hall, position_m, heading_rad).0);
         Some(PersonState { position_m, velocity_mps, heading_rad, floor_m, height_m: self.height_m() })
     }
 
@@ -150,20 +149,12 @@ impl Walker {
         self.raise(position_m, heading_rad, vertices);
     }
 
-    /// Below the axis; up a step the body climbs over half a stride, to either side of the edge.
-    fn floor_m(&self, position_m: DVec2, heading_rad: f64) -> f64 {
-        let Some(hall) = &self.hall else { return 0.0 };
-        let ahead_m = DVec2::from_angle(heading_rad) * (CLIMB_M / f64::from(CLIMB_STEPS));
-        let under = |k: i32| hall.floor_m(position_m + ahead_m * f64::from(k));
-        (-CLIMB_STEPS..=CLIMB_STEPS).map(under).sum::<f64>() / f64::from(2 * CLIMB_STEPS + 1)
-    }
-
     /// Puts a body that stands at z = 0 on the floor: upright, and on a ramp each foot at the height of its own place.
     fn raise(&self, position_m: DVec2, heading_rad: f64, vertices: &mut [DVec3]) {
-        let Some(hall) = &self.hall else { return };
-        let floor_m = self.floor_m(position_m, heading_rad);
-        let slope = hall.floor_at(position_m).map_or(DVec2::ZERO, |i| DVec2::from_array(hall.floors[i].slope));
-        vertices.iter_mut().for_each(|v| v.z += floor_m + slope.dot(v.truncate() - position_m));
+        if let Some(hall) = &self.hall {
+            let (floor_m, slope) = underfoot(hall, position_m, heading_rad);
+            vertices.iter_mut().for_each(|v| v.z += floor_m + slope.dot(v.truncate() - position_m));
+        }
     }
 
     /// How the vertices of every mesh that this walker makes hang together.
@@ -198,4 +189,29 @@ impl Walker {
         let feet = things::feet_on_rests(&self.build, state.position_m, heading_rad);
         Pose::new(&self.build, heading_rad, &still, &pelvis, &feet, &self.holds)
     }
+}
+
+/// How high the floor is below a body and how it rises, both on the mean along its way: so a step is climbed steadily.
+fn underfoot(hall: &Hall, position_m: DVec2, heading_rad: f64) -> (f64, DVec2) {
+    let ahead_m = DVec2::from_angle(heading_rad) * CLIMB_M;
+    let (from_m, way_m) = (position_m - ahead_m, 2.0 * ahead_m);
+    // Between the edges that it crosses all is linear.
+    let mut cuts = vec![0.0, 1.0];
+    for floor in &hall.floors {
+        let corners = floor.outline_m.iter().copied().map(DVec2::from_array);
+        for (a, b) in corners.clone().zip(corners.cycle().skip(1)) {
+            cuts.push(((a - from_m).perp_dot(b - a) / way_m.perp_dot(b - a)).clamp(0.0, 1.0));
+        }
+    }
+    cuts.retain(|share| !share.is_nan());
+    cuts.sort_by(f64::total_cmp);
+    let (mut floor_m, mut slope) = (0.0, DVec2::ZERO);
+    for piece in cuts.windows(2).filter(|piece| piece[0] < piece[1]) {
+        let middle_m = from_m + way_m * (0.5 * (piece[0] + piece[1]));
+        let length = piece[1] - piece[0];
+        floor_m += length * hall.floor_m(middle_m);
+        let here = hall.floor_at(middle_m);
+        slope += length * here.map_or(DVec2::ZERO, |i| DVec2::from_array(hall.floors[i].slope));
+    }
+    (floor_m, slope)
 }

@@ -38,7 +38,7 @@ fn ramps_platforms_and_who_walks_on_them_are_as_an_independent_caster_sees_them(
     let hall = Arc::new(site.hall.clone());
     let mut sensors = Sensors::new(&site, 0).unwrap();
     let walkers: Vec<Walker> = (0..10)
-        .map(|i| walker(i, 1.8 + f64::from(i) * 0.2, 9.5 - f64::from(i) * 0.4).on_floor_of(&hall))
+        .map(|i| walker(i, 1.8 + f64::from(i) * 0.2, 10.0 - f64::from(i) * 0.25).on_floor_of(&hall))
         .collect();
     let bodies = assert_as_the_oracle_sees(&site, &mut sensors, 7, 2, &walkers);
     assert!(bodies > 300, "{bodies} rays on bodies");
