@@ -141,7 +141,9 @@ impl Mountings {
         };
         let points_m = sampled(image, self.frames);
         let before = mounting.doubted.take();
-        let Some(found) = fitted(&points_m, &mounting.given, &mounting.used, &self.surroundings) else { return };
+        let Some(found) = fitted(&points_m, &mounting.given, &mounting.used, &self.surroundings) else {
+            return;
+        };
         let near = |a: &Six, b: &Six, turn_rad: f64, shift_m: f64| {
             let off = |axes: std::ops::Range<usize>| axes.map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
             off(0..3) < turn_rad && off(3..6) < shift_m
@@ -173,8 +175,7 @@ impl Surroundings {
             let normal = (to - from).normalize_or(DVec2::X).perp();
             Surface { normal: normal.extend(0.0), off_m: normal.dot(from), sigma_m: WALL_M }
         };
-        let mut surfaces: Vec<Surface> =
-            [floor, ceiling].into_iter().chain(hall.walls().map(wall)).collect();
+        let mut surfaces: Vec<Surface> = [floor, ceiling].into_iter().chain(hall.walls().map(wall)).collect();
         let level = surfaces.len();
         surfaces.extend(hall.floors.iter().map(|floor| {
             let normal = DVec3::new(-floor.slope[0], -floor.slope[1], 1.0).normalize();

@@ -95,7 +95,8 @@ fn a_hall_that_is_lifted_gives_the_same_people_and_links() {
 fn found(seen: &[(Outcome, Vec<PersonTruth>)], ramp: &Site) -> (f64, usize, f64) {
     let (mut all, mut of_who_is_there, mut tracks, mut height_errors_m) = (0, 0, 0, Vec::new());
     let steps_about = |at: DVec2| {
-        let near = [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y].map(|way| ramp.hall.floor_m(at + way * 0.7));
+        let near =
+            [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y].map(|way| ramp.hall.floor_m(at + way * 0.7));
         near.iter().any(|m| (m - ramp.hall.floor_m(at)).abs() > 0.1)
     };
     for (outcome, people) in seen.iter().skip(20) {
@@ -120,7 +121,8 @@ fn people_on_a_ramp_and_a_platform_are_followed_as_tall_as_they_are() {
     let mut untold = told.clone();
     untold.site.hall.floors.clear();
     let crowd = || strolling(Preset::Orca03, 8, 10.0, SEED, 6);
-    let [told, untold] = [&told, &untold].map(|config| found(&watched(&told.site, config, crowd()), &told.site));
+    let [told, untold] =
+        [&told, &untold].map(|config| found(&watched(&told.site, config, crowd()), &told.site));
     assert!(told.0 > 0.98 && told.1 == 0 && told.2 < 0.08, "{told:?}");
     assert!(untold.2 > told.2 + 0.05, "a pipeline that is not told thinks them taller: {untold:?}");
 }

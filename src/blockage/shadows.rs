@@ -140,7 +140,8 @@ impl Shadows {
             let p = &people[other as usize];
             let seen = second.seen(p.second.center_m);
             let share = second.share(&seen, p.reach_m, [p.second.radius_m; 4]);
-            other as usize != person && share.and_then(|share| self.band(rises_of_second_m, share, p, p.floors_m)).is_some()
+            other as usize != person
+                && share.and_then(|share| self.band(rises_of_second_m, share, p, p.floors_m)).is_some()
         });
         for step in 0..MOMENTS {
             let first = meetings.len();

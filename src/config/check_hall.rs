@@ -49,7 +49,9 @@ fn check_floor(i: usize, floor: &Floor, hall: &Hall) -> Result<(), Error> {
         true => Ok(()),
         false => {
             let key = key("outline_m");
-            Err(Error::new(format!("{key}: expected a piece of the hall, {least} to {most}, found one outside")))
+            Err(Error::new(format!(
+                "{key}: expected a piece of the hall, {least} to {most}, found one outside"
+            )))
         }
     }
 }

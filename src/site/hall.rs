@@ -89,7 +89,8 @@ impl Hall {
     /// Whether the floor has a step so near to a place that somebody there may stand on either level.
     pub(crate) fn has_step_about(&self, place_m: DVec2) -> bool {
         let here = self.floor_at(place_m);
-        let level_m = |floor: Option<usize>| floor.map_or(0.0, |floor| self.floors[floor].height_at_m(place_m));
+        let level_m =
+            |floor: Option<usize>| floor.map_or(0.0, |floor| self.floors[floor].height_at_m(place_m));
         let is_step = |away_m: DVec2| {
             let there = self.floor_at(place_m + away_m * STEP_REACH_M);
             there != here && (level_m(there) - level_m(here)).abs() > STEP_M

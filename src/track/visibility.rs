@@ -216,7 +216,8 @@ impl Between {
     /// Does anything stand on the line from the eye to the target?
     fn hide(&self, eye_m: DVec3, target_m: DVec3) -> bool {
         let pillar = |p: &(DVec2, f64)| cylinder_hides(p.0, p.1, f64::INFINITY, eye_m, target_m);
-        let body = |o: &Body| cylinder_hides(o.position_m, BODY_RADIUS_M, o.floor_m + o.height_m, eye_m, target_m);
+        let body =
+            |o: &Body| cylinder_hides(o.position_m, BODY_RADIUS_M, o.floor_m + o.height_m, eye_m, target_m);
         self.pillars.iter().any(pillar)
             || self.others.iter().any(body)
             || self.furniture.iter().any(|f| hit_obb(f, eye_m, target_m).is_some())

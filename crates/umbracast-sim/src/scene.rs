@@ -79,9 +79,8 @@ impl Scene {
     pub fn truth_only(crowd: Crowd, site: &Site, seed: u64) -> Self {
         let frames = (crowd.duration_ns / STEP_NS).max(0) as u64;
         let hall = Arc::new(site.hall.clone());
-        let body = |(number, way): (usize, Trajectory)| {
-            Walker::new(way, own_seed(seed, number)).on_floor_of(&hall)
-        };
+        let body =
+            |(number, way): (usize, Trajectory)| Walker::new(way, own_seed(seed, number)).on_floor_of(&hall);
         Self {
             site: site.clone(),
             seed,

@@ -27,8 +27,10 @@ pub fn constant_velocity_of_truth(truth: &TruthIndex, config: &Config) -> Said {
     let mut caster = Caster::new(&config.blockage, &config.site);
     let (mut said, mut blockages) = (Said::default(), Vec::new());
     for &frame in &truth.frames {
-        let tracks: Vec<Track> =
-            truth.people_of(frame).map(|row| true_track(truth, row, person_box(row, &config.site.hall))).collect();
+        let tracks: Vec<Track> = truth
+            .people_of(frame)
+            .map(|row| true_track(truth, row, person_box(row, &config.site.hall)))
+            .collect();
         let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
         caster.cast(&tracks, &forecasts, &mut blockages);
         said.add(frame, &blockages);
@@ -157,12 +159,7 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, hall: &H
 
 /// A track at the true positions of its person, now and at every step. The present is moved as well: a body
 /// turns as its trajectory does, and one from an estimate to the truth would turn it by the estimate's error.
-fn with_true_future(
-    truth: &TruthIndex,
-    own: &TrackRow,
-    now: &PeopleRow,
-    hall: &Hall,
-) -> (Track, Forecast) {
+fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow, hall: &Hall) -> (Track, Forecast) {
     let (aabb, obb) = box_moved_to(own, now, hall);
     let position_m = DVec2::new(now.x_m, now.y_m);
     let track = Track { position_m, aabb, obb, ..track_of(own) };
@@ -397,7 +394,10 @@ mod tests {
         assert_eq!((track.position_m, track.height_m), (DVec2::new(row.x_m, row.y_m), 1.9));
         assert_eq!(track.heading_rad, std::f64::consts::FRAC_PI_2);
         let slow = PeopleRow { vx_mps: 0.1, vy_mps: 0.0, ..row };
-        assert_eq!(with_true_state(&index, &own, &slow, &umbracast::Config::default().site.hall).heading_rad, own.heading_rad);
+        assert_eq!(
+            with_true_state(&index, &own, &slow, &umbracast::Config::default().site.hall).heading_rad,
+            own.heading_rad
+        );
     }
 
     #[test]

@@ -53,7 +53,10 @@ impl Survey {
                 view,
             }
         };
-        Self { hall: site.hall.clone(), lookouts: sensors.sensors.iter().zip(&site.sensors).map(lookout).collect() }
+        Self {
+            hall: site.hall.clone(),
+            lookouts: sensors.sensors.iter().zip(&site.sensors).map(lookout).collect(),
+        }
     }
 
     /// A body that stands at the origin and looks along x, as each sensor sees it in the first revolution of a
