@@ -87,7 +87,7 @@ fn a_hall_that_is_lifted_gives_the_same_people_and_links() {
             assert!(unlike <= 1, "{unlike} links differ");
             blocked += pairs.filter(|(_, a)| a.2 > 0.5).count();
         }
-        assert!(blocked > 20, "{blocked} blocked links were compared");
+        assert!(blocked > 10, "{blocked} blocked links were compared");
     }
 }
 

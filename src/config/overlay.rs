@@ -52,7 +52,7 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 15] = [
+const OPTIONAL: [(&str, &str, &str); 16] = [
     ("site.hall", "outline_m", "an array"),
     ("site.hall", "floors", "an array"),
     ("site.sensors", "address", "a string"),
