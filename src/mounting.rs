@@ -46,8 +46,7 @@ type Six = [f64; 6];
 /// Follows how every sensor hangs.
 #[derive(Debug, Clone)]
 pub struct Mountings {
-    /// The floor first.
-    surfaces: Vec<Surface>,
+    surroundings: Surroundings,
     /// None where sensors are not to be followed.
     sensors: Vec<Mounting>,
     frames: u32,
@@ -55,6 +54,16 @@ pub struct Mountings {
     /// Returns that are looked at, and the sums over those of each surface.
     points_m: Vec<DVec3>,
     sums: Vec<Sums>,
+}
+
+/// What sensors see of the hall.
+#[derive(Debug, Clone)]
+struct Surroundings {
+    hall: Hall,
+    /// The floor at z = 0, ceiling and walls, then floors of other heights in the hall's order.
+    surfaces: Vec<Surface>,
+    /// How many come before those.
+    level: usize,
 }
 
 /// A plane: points on it have `normal . p = off_m`.
@@ -87,7 +96,7 @@ impl Mountings {
             settled: false,
         };
         Self {
-            surfaces: surfaces(&site.hall),
+            surroundings: Surroundings::new(&site.hall),
             sensors: site.sensors.iter().filter(|_| config.follow_sensors).map(mounting).collect(),
             frames: 0,
             moved: Vec::new(),
@@ -139,7 +148,9 @@ impl Mountings {
         self.points_m.extend(sampled(image, self.frames));
         let before = mounting.doubted.take();
         let Mounting { given, used, .. } = &*mounting;
-        let Some(found) = fitted(&self.points_m, given, used, &self.surfaces, &mut self.sums) else { return };
+        let Some(found) = fitted(&self.points_m, given, used, &self.surroundings, &mut self.sums) else {
+            return;
+        };
         let near = |a: &Six, b: &Six, turn_rad: f64, shift_m: f64| {
             let off = |axes: std::ops::Range<usize>| axes.map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
             off(0..3) < turn_rad && off(3..6) < shift_m
@@ -161,16 +172,36 @@ impl Mountings {
     }
 }
 
-/// The hall's floor, ceiling and walls, each looking in.
-fn surfaces(hall: &Hall) -> Vec<Surface> {
-    let floor = Surface { normal: DVec3::Z, off_m: 0.0, sigma_m: FLOOR_M };
-    let ceiling = Surface { normal: -DVec3::Z, off_m: -hall.height_m, sigma_m: WALL_M };
-    // Counter-clockwise the hall lies to the left.
-    let wall = |[from, to]: [DVec2; 2]| {
-        let normal = (to - from).normalize_or(DVec2::X).perp();
-        Surface { normal: normal.extend(0.0), off_m: normal.dot(from), sigma_m: WALL_M }
-    };
-    [floor, ceiling].into_iter().chain(hall.walls().map(wall)).collect()
+impl Surroundings {
+    /// Each surface looks in.
+    fn new(hall: &Hall) -> Self {
+        let floor = Surface { normal: DVec3::Z, off_m: 0.0, sigma_m: FLOOR_M };
+        let ceiling = Surface { normal: -DVec3::Z, off_m: -hall.height_m, sigma_m: WALL_M };
+        // Counter-clockwise the hall lies to the left.
+        let wall = |[from, to]: [DVec2; 2]| {
+            let normal = (to - from).normalize_or(DVec2::X).perp();
+            Surface { normal: normal.extend(0.0), off_m: normal.dot(from), sigma_m: WALL_M }
+        };
+        let mut surfaces: Vec<Surface> = [floor, ceiling].into_iter().chain(hall.walls().map(wall)).collect();
+        let level = surfaces.len();
+        surfaces.extend(hall.floors.iter().map(|floor| {
+            let normal = DVec3::new(-floor.slope[0], -floor.slope[1], 1.0).normalize();
+            Surface { normal, off_m: normal.z * floor.height_at_m(DVec2::ZERO), sigma_m: FLOOR_M }
+        }));
+        Self { hall: hall.clone(), surfaces, level }
+    }
+
+    /// The surface that a point is nearest to, and how far before it. Of all floors only that below it counts.
+    fn nearest(&self, at_m: DVec3) -> Option<(usize, f64)> {
+        let off = |s: usize| self.surfaces[s].normal.dot(at_m) - self.surfaces[s].off_m;
+        let floor = self.hall.floor_at(at_m.truncate()).map_or(0, |floor| self.level + floor);
+        let all = std::iter::once(floor).chain(1..self.level).map(|s| (s, off(s)));
+        all.min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
+
+    fn is_floor(&self, surface: usize) -> bool {
+        surface == 0 || surface >= self.level
+    }
 }
 
 /// Some of the returns of a revolution, others each time, in the sensor's frame.
@@ -198,9 +229,10 @@ fn fitted(
     points_m: &[DVec3],
     given: &Pose,
     start: &Six,
-    surfaces: &[Surface],
+    surroundings: &Surroundings,
     sums: &mut Vec<Sums>,
 ) -> Option<Six> {
+    let surfaces = &surroundings.surfaces;
     let mut by = *start;
     let mut on = (0, 0);
     sums.resize(surfaces.len(), Sums::default());
@@ -210,14 +242,12 @@ fn fitted(
         on = (0, 0);
         for point in points_m {
             let at_m = pose.point(*point);
-            let off = |surface: &Surface| surface.normal.dot(at_m) - surface.off_m;
-            let offs = surfaces.iter().map(off).enumerate();
-            let Some((s, off_m)) = offs.min_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) else { continue };
+            let Some((s, off_m)) = surroundings.nearest(at_m) else { continue };
             if off_m.abs() < gate_m {
                 let (arm_m, normal) = (at_m - pose.translation_m, surfaces[s].normal);
                 let turn = arm_m.cross(normal);
                 sums[s].add(&[turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], off_m);
-                on = (on.0 + 1, on.1 + usize::from(s == 0));
+                on = (on.0 + 1, on.1 + usize::from(surroundings.is_floor(s)));
             }
         }
         let step = solved(sums, &by, surfaces)?;
@@ -298,7 +328,7 @@ mod tests {
     /// Returns of the default hall from a sensor that hangs at `pose`, some of them of people.
     fn returns(pose: &Pose, hall: &Hall) -> Vec<DVec3> {
         let back = pose.inverse();
-        let surfaces = surfaces(hall);
+        let surfaces = Surroundings::new(hall).surfaces;
         let ray = |k: usize| {
             let (azimuth, elevation) = (k as f64 * 2.399_963, -0.5 + 0.7 * (k as f64 * 0.618_034).fract());
             let ahead =
@@ -320,7 +350,7 @@ mod tests {
         let given = site.sensors[0].site_from_sensor();
         let turn = turn_deg * std::f64::consts::PI / 180.0;
         let truth = corrected(&given, &[turn.x, turn.y, turn.z, shift_m.x, shift_m.y, shift_m.z]);
-        fitted(&returns(&truth, hall), &given, &[0.0; 6], &surfaces(&site.hall), &mut Vec::new())
+        fitted(&returns(&truth, hall), &given, &[0.0; 6], &Surroundings::new(&site.hall), &mut Vec::new())
     }
 
     #[test]

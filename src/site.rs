@@ -1,5 +1,6 @@
 //! Where everything stands: hall, sensors, access points, and where on a body the UE is. SI units, site frame,
-//! z up, floor at z = 0. Read from the `site` part of a configuration file; see `config/default.toml`.
+//! z up, floor at z = 0 where the hall says no other. Read from the `site` part of a configuration file; see
+//! `config/default.toml`.
 
 mod hall;
 mod optics;
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
 
-pub use hall::Hall;
+pub use hall::{Floor, Hall};
 pub(crate) use hall::{doubled_area_m2, from_segment_m};
 pub use optics::{DarkCloth, MixedReturns, Pane, Surface};
 
@@ -40,6 +41,20 @@ pub struct Site {
     pub ue: Ue,
     /// What only a simulator reads.
     pub simulation: Simulation,
+}
+
+impl Site {
+    /// The UE of a body that stands at `position_m`, looks along `heading_rad` and is `height_m` tall, in the site frame.
+    ///
+    /// ```
+    /// use umbracast::geometry::{DVec2, DVec3};
+    ///
+    /// let site = umbracast::Config::default().site;
+    /// assert_eq!(site.ue_m(DVec2::new(2.0, 1.0), 0.0, 1.8), DVec3::new(2.0, 1.0, 0.9));
+    /// ```
+    pub fn ue_m(&self, position_m: DVec2, heading_rad: f64, height_m: f64) -> DVec3 {
+        self.ue.on_body(position_m, heading_rad, height_m) + DVec3::Z * self.hall.floor_m(position_m)
+    }
 }
 
 /// A round pillar.
@@ -339,12 +354,13 @@ pub struct Ue {
     pub forward_m: f64,
     /// Left of the body axis, metres.
     pub left_m: f64,
-    /// Above the floor as a share of the standing height.
+    /// Above the floor that is stood on, as a share of the standing height.
     pub height_share: f64,
 }
 
 impl Ue {
-    /// The UE of a body that stands at `position_m`, looks along `heading_rad` and is `height_m` tall.
+    /// The UE of a body that stands at `position_m`, looks along `heading_rad` and is `height_m` tall, above its feet: on
+    /// a floor at z = 0 its place.
     ///
     /// ```
     /// use umbracast::geometry::{DVec2, DVec3};

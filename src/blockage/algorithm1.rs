@@ -26,6 +26,15 @@ impl PersonBox {
         }
     }
 
+    /// Lifted, where it moves to a higher floor.
+    #[must_use]
+    pub fn raised_by(&self, up_m: f64) -> Self {
+        match self {
+            Self::Aabb(aabb) => Self::Aabb(aabb.raised_by(up_m)),
+            Self::Obb(obb) => Self::Obb(obb.raised_by(up_m)),
+        }
+    }
+
     /// The end of the ray: the centre of the box.
     pub fn center_m(&self) -> DVec3 {
         match self {

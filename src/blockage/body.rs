@@ -45,7 +45,7 @@ pub(super) fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
     gait::relative_speed_hz(speed_mps, height_m).min(FASTEST_HZ)
 }
 
-/// True when the segment meets the body; touching counts.
+/// True when the segment meets the body, which stands at z = 0; touching counts.
 pub fn blocks(body: &BodyModel, posture: &Posture, start_m: DVec3, end_m: DVec3) -> bool {
     let local = |v: DVec3| {
         let from_axis = v.truncate() - posture.position_m;

@@ -8,7 +8,7 @@ use super::steps::{heading_at, position_at};
 use crate::config::{BlockageConfig, BlockageMethod, BoxKind};
 use crate::forecast::Forecast;
 use crate::geometry::{DVec2, DVec3};
-use crate::site::Ue;
+use crate::site::{Hall, Ue};
 use crate::track::Track;
 use crate::{STEPS, Site};
 
@@ -37,6 +37,7 @@ pub struct Caster {
     numbers: Numbers,
     access_points_m: Vec<DVec3>,
     ue: Ue,
+    hall: Hall,
     sampler: Sampler,
 }
 
@@ -66,6 +67,7 @@ impl Caster {
             numbers,
             access_points_m: site.access_points.iter().map(|ap| ap.position()).collect(),
             ue: site.ue,
+            hall: site.hall.clone(),
         }
     }
 
@@ -126,7 +128,8 @@ impl Caster {
                 let place = |((track, forecast), person_box): (&(&Track, &Forecast), &PersonBox)| {
                     let position = position_at(track, forecast, step);
                     let turn = heading_at(track, forecast, step) - track.heading_rad;
-                    (position, person_box.moved_by(position - track.position_m, turn))
+                    let up_m = self.hall.floor_m(position) - self.hall.floor_m(track.position_m);
+                    (position, person_box.moved_by(position - track.position_m, turn).raised_by(up_m))
                 };
                 people.iter().zip(&boxes_now).map(place).collect()
             })

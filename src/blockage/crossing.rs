@@ -60,15 +60,17 @@ impl Crossing {
         asked: &[u32],
         blocked: &mut [u32],
     ) {
-        let base_m = rays.to_mean_m(other, meeting.step as usize);
-        self.start_z = rays.start_m.z as f32;
-        let gait = &other.gait;
+        let step = meeting.step as usize;
+        let base_m = rays.to_mean_m(other, step);
+        // Heights are from the floor that the body stands on.
+        let (gait, floor_m) = (&other.gait, other.floor_m[step]);
+        self.start_z = (rays.start_m.z - floor_m) as f32;
         for word in words {
             let mut left = asked[word];
             if left == 0 {
                 continue;
             }
-            let of_step = meeting.step as usize * (other.samples / WORD) + word;
+            let of_step = step * (other.samples / WORD) + word;
             let axis_m = [0, 1].map(|i| word_of(&gait.axis_m[i], of_step));
             let own = [0, 1].map(|i| word_of(&gait.own[i], of_step));
             let end_m = [0, 1, 2].map(|i| word_of(&rays.end_m[i], word));
@@ -85,6 +87,7 @@ impl Crossing {
                 for i in 0..3 {
                     self.end[i][lane] = end_m[i][k];
                 }
+                self.end[2][lane] -= floor_m as f32;
                 (self.height[lane], self.width[lane]) = (height_m[k], width[k]);
                 (self.swing[lane], self.wave[lane]) = (swing_hz[k], wave_hz[k]);
                 self.samples[lane] = (word * WORD + k) as u32;

@@ -20,7 +20,7 @@ use super::things::Things;
 use super::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::forecast::Forecast;
 use crate::geometry::DVec3;
-use crate::site::Ue;
+use crate::site::{Hall, Ue};
 use crate::track::Track;
 use crate::{STEP_S, STEPS, Site};
 
@@ -80,6 +80,7 @@ pub struct Sampler {
     rays: Rays,
     crossing: Crossing,
     link: Link,
+    hall: Hall,
     things: Things,
     causes: Causes,
 }
@@ -127,6 +128,7 @@ impl Sampler {
             rays: Rays::default(),
             crossing: Crossing::default(),
             link: Link::default(),
+            hall: site.hall.clone(),
             things: Things::new(site),
             causes: Causes::default(),
         }
@@ -185,6 +187,7 @@ impl Sampler {
                 .entry(track.id)
                 .or_insert_with(|| Draws::new(&self.quantiles, numbers.seed, track.id));
             self.people[self.present].fill(numbers, &self.figure, draws, self.samples, track, forecast);
+            self.people[self.present].stand_on(&self.hall);
             self.present += 1;
         }
         self.meetings.clear();
@@ -270,7 +273,8 @@ impl Sampler {
         }
         let (person, reach_m) = (&self.people[number], ue.forward_m.abs() + ue.left_m.abs());
         let disc = Disc { radius_m: person.second.radius_m + reach_m, ..person.second };
-        let in_way = self.things.look(ap, ap_m, disc, ue.height_share * person.heights_m[0]);
+        let lowest_m = ue.height_share * person.heights_m[0] + person.floors_m[0];
+        let in_way = self.things.look(ap, ap_m, disc, lowest_m);
         let things = in_way.then_some(&self.things);
         let known = Known { others: &self.link.firsts, samples: self.samples, person, number };
         let aim = |rays: &mut Rays, step: usize| rays.aim(ap_m, ue, person, step, 0..words);

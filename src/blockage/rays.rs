@@ -17,7 +17,7 @@ const ROOM_M: f32 = 1e-3;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rays {
     pub(super) start_m: DVec3,
-    /// By sample: where the ray ends.
+    /// By sample: where the ray ends; its height is the site's.
     pub(super) end_m: [Vec<f32>; 3],
     /// By sample: the unit vector to the end in plan view, and how far it is.
     to: [Vec<f32>; 2],
@@ -39,7 +39,7 @@ impl Rays {
         self.start_m = ap_m;
         let [base_x, base_y] = self.to_mean_m(person, step);
         let of_step = step * (person.samples / WORD);
-        let height_share = ue.height_share as f32;
+        let (height_share, floor_m) = (ue.height_share as f32, person.floor_m[step] as f32);
         let [end_x, end_y, end_z] = &mut self.end_m;
         let [to_x, to_y] = &mut self.to;
         for of in [&mut *end_x, end_y, end_z, to_x, to_y, &mut self.length_m] {
@@ -64,7 +64,7 @@ impl Rays {
             let (to_x, to_y) = (word_of_mut(to_x, word), word_of_mut(to_y, word));
             let length_m = word_of_mut(&mut self.length_m, word);
             for k in 0..WORD {
-                end_z[k] = height_share * height_m[k];
+                end_z[k] = height_share * height_m[k] + floor_m;
                 let length = (end_x[k] * end_x[k] + end_y[k] * end_y[k]).sqrt();
                 let per = 1.0 / larger(length, 1e-6);
                 (to_x[k], to_y[k], length_m[k]) = (end_x[k] * per, end_y[k] * per, length);

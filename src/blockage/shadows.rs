@@ -130,7 +130,10 @@ impl Shadows {
                 }
             }
         }
-        let rises_m = q.heights_m.map(|height_m| self.ue_height_share * height_m - self.ap_m.z);
+        let rises_m = |floors_m: [f64; 2]| {
+            [0, 1].map(|i| self.ue_height_share * q.heights_m[i] + floors_m[i] - self.ap_m.z)
+        };
+        let rises_of_second_m = rises_m(q.floors_m);
         let second = Bundle::of_second(self.ap_m, q, self.ue_reach_m);
         // Whom all rays of the second pass above is in nobody's way at any step.
         let mut candidates = std::mem::take(&mut self.candidates);
@@ -138,11 +141,13 @@ impl Shadows {
             let p = &people[other as usize];
             let seen = second.seen(p.second.center_m);
             let share = second.share(&seen, p.reach_m, [p.second.radius_m; 4]);
-            other as usize != person && share.and_then(|share| self.band(rises_m, share, p)).is_some()
+            other as usize != person
+                && share.and_then(|share| self.band(rises_of_second_m, share, p, p.floors_m)).is_some()
         });
         for step in 0..MOMENTS {
             let first = meetings.len();
             let bundle = Bundle::of_step(self.ap_m, q, step, self.ue_reach_m);
+            let rises_m = rises_m([q.floor_m[step]; 2]);
             for &other in &candidates {
                 let p = &people[other as usize];
                 let (seen, spread) = (bundle.seen(p.mean_m[step]), &p.spread[step]);
@@ -151,7 +156,8 @@ impl Shadows {
                 }
                 let spreads_m = bundle.spreads_m(spread);
                 let of = |reach_m: f64| {
-                    bundle.share(&seen, reach_m, spreads_m).and_then(|share| self.band(rises_m, share, p))
+                    let share = bundle.share(&seen, reach_m, spreads_m);
+                    share.and_then(|share| self.band(rises_m, share, p, [p.floor_m[step]; 2]))
                 };
                 let Some(band) = of(p.reach_m) else { continue };
                 // What is within those heights does not reach as far, so they are fewer still.
@@ -169,11 +175,18 @@ impl Shadows {
     }
 
     /// The heights at which rays may meet the body of `p` between two shares of their length; `None` where they pass above
-    /// it. `rises_m` are the least and the most of the rays over their whole length.
+    /// it. `rises_m` are the least and the most of the rays over their whole length, `floors_m` the same of the floor that
+    /// the body stands on.
     #[inline(always)]
-    fn band(&self, [least_m, most_m]: [f64; 2], (near, far): (f64, f64), p: &Trajectories) -> Option<Band> {
-        let low_m = self.ap_m.z + least_m * if least_m < 0.0 { far } else { near };
-        let high_m = self.ap_m.z + most_m * if most_m > 0.0 { far } else { near };
+    fn band(
+        &self,
+        [least_m, most_m]: [f64; 2],
+        (near, far): (f64, f64),
+        p: &Trajectories,
+        floors_m: [f64; 2],
+    ) -> Option<Band> {
+        let low_m = self.ap_m.z + least_m * if least_m < 0.0 { far } else { near } - floors_m[1];
+        let high_m = self.ap_m.z + most_m * if most_m > 0.0 { far } else { near } - floors_m[0];
         let [per_short, per_tall] = p.per_height;
         let low = low_m * if low_m > 0.0 { per_tall } else { per_short } - ROOM;
         let high = high_m * if high_m > 0.0 { per_short } else { per_tall } + ROOM;

@@ -34,17 +34,22 @@ struct Cuboid {
     /// Cosine and sine of its turn.
     turn: DVec2,
     half_m: DVec2,
+    floor_m: f64,
     top_m: f64,
 }
 
 impl Things {
     pub(super) fn new(site: &Site) -> Self {
         let hall = &site.hall;
-        let boxes = site.furniture.iter().map(|piece| Cuboid {
-            middle_m: DVec2::from_array(piece.position_m),
-            turn: DVec2::from_angle(piece.yaw_deg.to_radians()),
-            half_m: 0.5 * DVec2::new(piece.size_m[0], piece.size_m[1]),
-            top_m: piece.size_m[2],
+        let boxes = site.furniture.iter().map(|piece| {
+            let floor_m = hall.floor_m(DVec2::from_array(piece.position_m));
+            Cuboid {
+                middle_m: DVec2::from_array(piece.position_m),
+                turn: DVec2::from_angle(piece.yaw_deg.to_radians()),
+                half_m: 0.5 * DVec2::new(piece.size_m[0], piece.size_m[1]),
+                floor_m,
+                top_m: floor_m + piece.size_m[2],
+            }
         });
         let indoors =
             site.access_points.iter().map(|ap| hall.clearance_m(ap.position().truncate()) > -HUNG_M);
@@ -152,7 +157,7 @@ impl Cuboid {
         };
         cut(from.x, along.x, -self.half_m.x, self.half_m.x)
             && cut(from.y, along.y, -self.half_m.y, self.half_m.y)
-            && cut(start_m.z, z - start_m.z, 0.0, self.top_m)
+            && cut(start_m.z, z - start_m.z, self.floor_m, self.top_m)
     }
 }
 

@@ -17,6 +17,7 @@ use super::steps::{heading_at, position_at};
 use crate::forecast::Forecast;
 use crate::gait::{self, FOREMOST_RAD, GaitPhase, LEFTMOST_RAD, WALKS_FROM_MPS, sway_share};
 use crate::geometry::DVec2;
+use crate::site::Hall;
 use crate::track::Track;
 use crate::{STEP_S, STEPS};
 
@@ -45,6 +46,9 @@ pub(super) struct Trajectories {
     ahead: [DVec2; MOMENTS],
     /// By step and sample: from the step's mean.
     pub(super) off_m: [Vec<f32>; 2],
+    /// By step: how high the floor is at the mean, on which all samples stand; then the least and the most of them.
+    pub(super) floor_m: [f64; MOMENTS],
+    pub(super) floors_m: [f64; 2],
     /// The samples of all steps.
     pub(super) second: Disc,
     /// The least and the most of all samples.
@@ -125,6 +129,13 @@ impl Trajectories {
             self.place(s, numbers.joint);
         }
         self.bound(figure);
+    }
+
+    /// The floor below each step.
+    pub(super) fn stand_on(&mut self, hall: &Hall) {
+        self.floor_m = self.mean_m.map(|mean_m| hall.floor_m(mean_m));
+        let least_and_most = |[least, most]: [f64; 2], m: &f64| [m.min(least), m.max(most)];
+        self.floors_m = self.floor_m.iter().fold([self.floor_m[0]; 2], least_and_most);
     }
 
     /// The samples' errors now: of position and of velocity.

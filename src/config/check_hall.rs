@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::geometry::DVec2;
-use crate::site::{Hall, doubled_area_m2};
+use crate::site::{Floor, Hall, doubled_area_m2};
 
 /// No hall is longer; a longer one is in another unit.
 pub(super) const HALL_MAX_M: f64 = 1000.0;
@@ -10,8 +10,12 @@ pub(super) const HALL_MAX_M: f64 = 1000.0;
 const FAR_M: f64 = 1e7;
 /// No floor is smaller, square metres: nobody could stand on it.
 const AREA_MIN_M2: f64 = 0.25;
+/// No floor is steeper: ramps of car parks rise by 15 %, those that people are to walk by 6 %.
+const SLOPE_MAX: f64 = 0.2;
+/// Between floor and ceiling, at least.
+const HEADROOM_M: f64 = 2.0;
 
-/// Refuses sizes that cannot be, and an outline whose edges touch elsewhere than at their corners.
+/// Refuses sizes, outlines and floors that cannot be.
 ///
 /// # Errors
 /// As said, with the key, what was expected and what was found.
@@ -19,18 +23,51 @@ pub(super) fn check_hall(hall: &Hall) -> Result<(), Error> {
     above_0("site.hall.height_m", hall.height_m, HALL_MAX_M)?;
     if hall.outline_m.is_empty() {
         above_0("site.hall.length_m", hall.length_m, HALL_MAX_M)?;
-        return above_0("site.hall.width_m", hall.width_m, HALL_MAX_M);
+        above_0("site.hall.width_m", hall.width_m, HALL_MAX_M)?;
+    } else {
+        check_outline("site.hall.outline_m", &hall.outline_m)?;
     }
-    let count = hall.outline_m.len();
-    let refuse = |told: String| Err(Error::new(format!("site.hall.outline_m: {told}")));
+    hall.floors.iter().enumerate().try_for_each(|(i, floor)| check_floor(i, floor, hall))
+}
+
+/// Refuses a piece of floor that nobody could walk on, or that is not in the hall.
+fn check_floor(i: usize, floor: &Floor, hall: &Hall) -> Result<(), Error> {
+    let key = |name: &str| format!("site.hall.floors[{i}].{name}");
+    check_outline(&key("outline_m"), &floor.outline_m)?;
+    let [along_x, along_y] = floor.slope;
+    within(&key("slope, along x"), along_x, -SLOPE_MAX, SLOPE_MAX)?;
+    within(&key("slope, along y"), along_y, -SLOPE_MAX, SLOPE_MAX)?;
+    within(&key("height_m"), floor.height_m, -hall.height_m, hall.height_m - HEADROOM_M)?;
+    let corners: Vec<DVec2> = floor.outline_m.iter().copied().map(DVec2::from_array).collect();
+    for (corner, at_m) in corners.iter().enumerate() {
+        let name = key(&format!("outline_m[{corner}], its height"));
+        within(&name, floor.height_at_m(*at_m), -hall.height_m, hall.height_m - HEADROOM_M)?;
+    }
+    let [least, most] = hall.bounds_m();
+    let (low, high) = corners.iter().fold((most, least), |(low, high), p| (low.min(*p), high.max(*p)));
+    match low.cmplt(most).all() && high.cmpgt(least).all() {
+        true => Ok(()),
+        false => {
+            let key = key("outline_m");
+            Err(Error::new(format!(
+                "{key}: expected a piece of the hall, {least} to {most}, found one outside"
+            )))
+        }
+    }
+}
+
+/// Refuses an outline whose edges touch elsewhere than at their corners, and one of no size.
+fn check_outline(key: &str, outline_m: &[[f64; 2]]) -> Result<(), Error> {
+    let count = outline_m.len();
+    let refuse = |told: String| Err(Error::new(format!("{key}: {told}")));
     if count < 3 {
         return refuse(format!("expected 3 corners or more, found {count}"));
     }
-    for (i, [x_m, y_m]) in hall.outline_m.iter().enumerate() {
-        within(&format!("site.hall.outline_m[{i}], x"), *x_m, -FAR_M, FAR_M)?;
-        within(&format!("site.hall.outline_m[{i}], y"), *y_m, -FAR_M, FAR_M)?;
+    for (i, [x_m, y_m]) in outline_m.iter().enumerate() {
+        within(&format!("{key}[{i}], x"), *x_m, -FAR_M, FAR_M)?;
+        within(&format!("{key}[{i}], y"), *y_m, -FAR_M, FAR_M)?;
     }
-    let corners: Vec<DVec2> = hall.outline_m.iter().copied().map(DVec2::from_array).collect();
+    let corners: Vec<DVec2> = outline_m.iter().copied().map(DVec2::from_array).collect();
     let edge = |i: usize| [corners[i], corners[(i + 1) % count]];
     let name = |i: usize| format!("the edge from corner {i} to {}", (i + 1) % count);
     if let Some(i) = (0..count).find(|&i| edge(i)[0] == edge(i)[1]) {
@@ -51,9 +88,10 @@ pub(super) fn check_hall(hall: &Hall) -> Result<(), Error> {
             }
         }
     }
-    let [least, most] = hall.bounds_m();
-    above_0("site.hall.outline_m, along x", most.x - least.x, HALL_MAX_M)?;
-    above_0("site.hall.outline_m, along y", most.y - least.y, HALL_MAX_M)?;
+    let start = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+    let [least, most] = corners.iter().fold(start, |[least, most], p| [least.min(*p), most.max(*p)]);
+    above_0(&format!("{key}, along x"), most.x - least.x, HALL_MAX_M)?;
+    above_0(&format!("{key}, along y"), most.y - least.y, HALL_MAX_M)?;
     let area_m2 = 0.5 * doubled_area_m2(&corners).abs();
     match area_m2 >= AREA_MIN_M2 {
         true => Ok(()),
@@ -114,6 +152,28 @@ mod tests {
         let mut back = far;
         back.reverse();
         assert_eq!(found(&back), "accepted");
+    }
+
+    #[test]
+    fn floors_that_nobody_could_walk_on_are_refused_with_their_key() {
+        let told = |outline_m: &[[f64; 2]], height_m: f64, slope: [f64; 2]| {
+            let mut hall = Config::default().site.hall;
+            hall.floors = vec![Floor { outline_m: outline_m.to_vec(), height_m, slope }];
+            check_hall(&hall).map_or_else(|error| error.to_string(), |()| "accepted".to_owned())
+        };
+        let square = |x: f64| [[x, 0.0], [x + 4.0, 0.0], [x + 4.0, 4.0], [x, 4.0]];
+        assert_eq!(told(&square(0.0), 0.4, [0.05, 0.0]), "accepted");
+        assert_eq!(told(&square(0.0), -0.4, [0.0, 0.0]), "accepted");
+        for (found, key) in [
+            (told(&square(0.0)[..2], 0.4, [0.0; 2]), "outline_m: expected 3 corners or more"),
+            (told(&square(30.0), 0.4, [0.0; 2]), "outline_m: expected a piece of the hall"),
+            (told(&square(0.0), 0.4, [0.0, 5.0]), "slope, along y: expected -0.2 to 0.2, found 5"),
+            (told(&square(0.0), 9.0, [0.0; 2]), "height_m: expected -10 to 8, found 9"),
+            (told(&square(0.0), f64::NAN, [0.0; 2]), "height_m: expected"),
+            (told(&square(0.0), 7.9, [0.1, 0.0]), "outline_m[1], its height: expected -10 to 8"),
+        ] {
+            assert!(found.starts_with(&format!("site.hall.floors[0].{key}")), "{found}");
+        }
     }
 
     #[test]

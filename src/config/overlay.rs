@@ -52,8 +52,9 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 15] = [
+const OPTIONAL: [(&str, &str, &str); 16] = [
     ("site.hall", "outline_m", "an array"),
+    ("site.hall", "floors", "an array"),
     ("site.sensors", "address", "a string"),
     ("site.sensors", "calibration", "a string"),
     ("site.sensors", "calibration_file", "a string"),

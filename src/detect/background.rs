@@ -3,7 +3,7 @@
 use super::first_sight::of_people;
 use super::sensor_model::{Clip, Learn, Look, SensorModel, to_site, unorganised_point};
 use super::voxel::{VoxelMap, thin};
-use super::{Point, Prior};
+use super::{Point, Prior, above_floor};
 use crate::config::{BackgroundMethod, DetectConfig};
 use crate::geometry::DVec3;
 use crate::lidar::{Azimuths, Cloud, Scan};
@@ -168,6 +168,9 @@ impl Background {
         }
         if returns.is_empty() {
             return;
+        }
+        for of in &mut returns {
+            of.position_m = above_floor(&self.clip.hall, of.position_m);
         }
         let people = of_people(&returns);
         for (i, scan) in frame.scans.iter().enumerate() {

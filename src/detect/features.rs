@@ -34,6 +34,7 @@ pub struct AxisFeatures {
 #[derive(Debug, Clone)]
 pub struct Seen {
     at_m: DVec2,
+    /// Above the floor.
     z_m: f64,
     /// Horizontal, from the sensor.
     away: DVec2,
@@ -42,14 +43,15 @@ pub struct Seen {
 }
 
 impl AxisFeatures {
-    /// Looks at a person's points. `velocity_mps` is the person's, where it is known.
+    /// Looks at a person's points, who stands on a floor at `floor_m`. `velocity_mps` is the person's, where it is known.
     pub fn new<'a>(
         points: impl Iterator<Item = &'a Point> + Clone,
         sensors_m: &[DVec3],
+        floor_m: f64,
         shift_m: f64,
         velocity_mps: Option<DVec2>,
     ) -> Self {
-        Self::within(&mut Vec::new(), points, sensors_m, shift_m, velocity_mps)
+        Self::within(&mut Vec::new(), points, sensors_m, floor_m, shift_m, velocity_mps)
     }
 
     /// The same in some memory.
@@ -57,11 +59,12 @@ impl AxisFeatures {
         seen: &mut Vec<Seen>,
         points: impl Iterator<Item = &'a Point> + Clone,
         sensors_m: &[DVec3],
+        floor_m: f64,
         shift_m: f64,
         velocity_mps: Option<DVec2>,
     ) -> Self {
         seen.clear();
-        seen.extend(moved(points, sensors_m, shift_m, velocity_mps));
+        seen.extend(moved(points, sensors_m, floor_m, shift_m, velocity_mps));
         let n = seen.len().max(1) as f64;
         let base_m = seen.iter().map(|s| s.at_m).sum::<DVec2>() / n;
         let main = main_sensor(seen);
@@ -88,7 +91,7 @@ impl AxisFeatures {
         }
         let others_away = along(others_away.normalize_or_zero());
         let range_m = of_main().map(|s| s.range_m).sum::<f64>() / of_main().count().max(1) as f64;
-        let above_m = sensors_m.get(usize::from(main)).map_or(0.0, |s| s.z);
+        let above_m = sensors_m.get(usize::from(main)).map_or(0.0, |s| s.z - floor_m);
         let speed_mps = velocity_mps.map_or(0.0, DVec2::length);
         let walks = speed_mps > WALKS_FROM_MPS;
         let ahead = velocity_mps.filter(|_| walks).map_or(DVec2::ZERO, |v| along(v.normalize_or_zero()));
@@ -141,6 +144,7 @@ impl AxisFeatures {
 fn moved<'a>(
     points: impl Iterator<Item = &'a Point> + Clone,
     sensors_m: &[DVec3],
+    floor_m: f64,
     shift_m: f64,
     velocity_mps: Option<DVec2>,
 ) -> impl Iterator<Item = Seen> {
@@ -156,7 +160,7 @@ fn moved<'a>(
         let away = sight_m.normalize_or_zero();
         Seen {
             at_m: at_m + away * shift_m,
-            z_m: p.position_m.z,
+            z_m: p.position_m.z - floor_m,
             away,
             range_m: sight_m.length(),
             sensor: p.sensor,
@@ -253,7 +257,7 @@ mod tests {
     }
 
     fn position_m(points: &[Point], velocity_mps: DVec2) -> DVec2 {
-        let view = AxisFeatures::new(points.iter(), &[SENSOR_M], 0.1, Some(velocity_mps));
+        let view = AxisFeatures::new(points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
         AxisModel::shipped().locate(&view).0
     }
 

@@ -25,6 +25,7 @@ pub(super) struct Return {
     pub(super) scan: usize,
     /// Of the sensor's range model.
     pub(super) pixel: usize,
+    /// Its height is above the floor.
     pub(super) position_m: DVec3,
 }
 

@@ -7,7 +7,7 @@
 
 use super::{Point, Prior};
 use crate::gait::WALKS_FROM_MPS;
-use crate::geometry::DVec2;
+use crate::geometry::DVec3;
 
 /// Legs without feet, then arms with the trunk between, as shares of the height.
 const LEGS_UP: std::ops::Range<f64> = 0.05..0.40;
@@ -32,16 +32,16 @@ pub struct LimbCovariance {
 }
 
 impl LimbCovariance {
-    /// Of the points of `who`, whose axis stands at `position_m`; nothing of who stands.
+    /// Of the points of `who`, whose axis stands at `feet_m`; nothing of who stands still.
     #[doc(hidden)] // The measurer calls it.
-    pub fn of<'a>(points: impl Iterator<Item = &'a Point>, position_m: DVec2, who: &Prior) -> Option<Self> {
+    pub fn of<'a>(points: impl Iterator<Item = &'a Point>, feet_m: DVec3, who: &Prior) -> Option<Self> {
         if who.velocity_mps.length() < WALKS_FROM_MPS {
             return None;
         }
         let ahead = who.velocity_mps.normalize();
         let (mut legs, mut arms) = ((0.0, 0.0), (0.0, 0.0));
         for point in points {
-            let up = point.position_m.z / who.height_m;
+            let up = (point.position_m.z - feet_m.z) / who.height_m;
             let part = if LEGS_UP.contains(&up) {
                 &mut legs
             } else if ARMS_UP.contains(&up) {
@@ -49,7 +49,7 @@ impl LimbCovariance {
             } else {
                 continue;
             };
-            let off_m = point.position_m.truncate() - position_m;
+            let off_m = (point.position_m - feet_m).truncate();
             part.0 += ahead.dot(off_m) * ahead.perp_dot(off_m);
             part.1 += 1.0;
         }
@@ -63,7 +63,7 @@ impl LimbCovariance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::DVec3;
+    use crate::geometry::DVec2;
 
     const WHO: Prior = Prior {
         position_m: DVec2::ZERO,
@@ -89,7 +89,7 @@ mod tests {
             limb(0.2, 0.2 * wave, 0.8),
             limb(0.0, 0.1, 1.6),
         ];
-        LimbCovariance::of(points.iter(), DVec2::ZERO, who)
+        LimbCovariance::of(points.iter(), DVec3::ZERO, who)
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Position and boxes of one person.
+//! Position and boxes of one person. All is measured from the floor that is stood on; only the boxes are told in the site
+//! frame.
 
 use super::axis::{AxisModel, Network};
 use super::evidence::FULL_BODY_TOP_M;
@@ -8,6 +9,7 @@ use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
 use crate::config::{DetectConfig, Mechanism, PositionMethod};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+use crate::site::Hall;
 
 /// What is seen is the near side, 0.08 to 0.12 m nearer than the body axis: so far a point is moved along the horizontal
 /// line of sight.
@@ -75,6 +77,7 @@ pub struct Measurer {
     /// Whether known people may be as long as a wheelchair.
     seated: bool,
     sensors_m: Vec<DVec3>,
+    hall: Hall,
     axis: Network,
     /// A person's points, moved.
     seen: Vec<Seen>,
@@ -97,6 +100,7 @@ impl Measurer {
             size: if config.position == PositionMethod::BoxCenter { ADAPTED } else { OURS },
             seated: !config.without.contains(&Mechanism::ChildrenAndSeated),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
+            hall: site.hall.clone(),
             axis: Network::of(AxisModel::shipped()),
             seen: Vec::new(),
         }
@@ -127,7 +131,7 @@ impl Measurer {
         detections.clear();
         let mut seen = std::mem::take(&mut self.seen);
         for cluster in clusters {
-            let aabb = Aabb::around(cluster.iter().map(|&i| points[i as usize].position_m));
+            let aabb = self.above_floor(points, cluster).1;
             let expected = self.is_expected(&aabb, priors);
             // Legs are somebody only where nobody is known.
             let full_body = self.has_size_of_person(cluster.len(), &aabb)
@@ -138,6 +142,16 @@ impl Measurer {
             }
         }
         self.seen = seen;
+    }
+
+    /// How high the floor is where a person's points are in the middle, and the box of the points from there.
+    fn above_floor(&self, points: &[Point], cluster: &[u32]) -> (f64, Aabb) {
+        let of = || cluster.iter().map(|&i| points[i as usize].position_m);
+        let floor_m = match self.hall.floors.is_empty() {
+            true => 0.0,
+            false => self.hall.floor_m(of().sum::<DVec3>().truncate() / cluster.len().max(1) as f64),
+        };
+        (floor_m, Aabb::around(of().map(|p| p - DVec3::Z * floor_m)))
     }
 
     fn has_size_of_person(&self, points: usize, aabb: &Aabb) -> bool {
@@ -179,8 +193,9 @@ impl Measurer {
     ) -> Detection {
         let n = cluster.len() as f64;
         let of = || cluster.iter().map(|&i| &points[i as usize]);
-        let aabb = Aabb::around(of().map(|p| p.position_m));
-        let mean_m: DVec3 = of().map(|p| p.position_m).sum::<DVec3>() / n;
+        let (floor_m, aabb) = self.above_floor(points, cluster);
+        let places_m = || of().map(|p| p.position_m - DVec3::Z * floor_m);
+        let mean_m: DVec3 = places_m().sum::<DVec3>() / n;
         let first_ns = of().map(|p| p.time_ns).min().unwrap_or_default();
         let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
         let (position_m, z_m, covariance_m2) = match self.position {
@@ -195,8 +210,8 @@ impl Measurer {
             }
         };
         let who = nearest(mean_m.truncate(), priors);
-        let limbs = who.and_then(|who| LimbCovariance::of(of(), position_m, who));
-        let of_top = of().map(|p| p.position_m).filter(|p| p.z >= aabb.max_m.z - HEAD_M);
+        let limbs = who.and_then(|who| LimbCovariance::of(of(), position_m.extend(floor_m), who));
+        let of_top = places_m().filter(|p| p.z >= aabb.max_m.z - HEAD_M);
         let axes = match self.position {
             PositionMethod::BoxCenter => ObbAxes::Eigenvectors,
             PositionMethod::ShiftedMean | PositionMethod::Fitted => ObbAxes::Yaw,
@@ -211,8 +226,8 @@ impl Measurer {
             full_body: true,
             top_m: aabb.max_m.z,
             top_diagonal_m: diagonal_m(&Aabb::around(of_top)),
-            aabb,
-            obb: obb(of().map(|p| p.position_m), mean_m, axes),
+            aabb: aabb.raised_by(floor_m),
+            obb: obb(places_m(), mean_m, axes).raised_by(floor_m),
         }
     }
 
@@ -233,7 +248,8 @@ impl Measurer {
         let mean_m =
             seen.clone().map(|p| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
         let velocity_mps = nearest(mean_m, priors).map(|prior| prior.velocity_mps);
-        AxisFeatures::within(memory, seen, &self.sensors_m, SHIFT_M, velocity_mps)
+        let floor_m = self.hall.floor_m(mean_m);
+        AxisFeatures::within(memory, seen, &self.sensors_m, floor_m, SHIFT_M, velocity_mps)
     }
 }
 

@@ -34,6 +34,7 @@ pub use measure::SHIFT_M;
 pub use split_merge::Clusterer;
 
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
+use crate::site::Hall;
 
 /// A foreground point.
 ///
@@ -98,7 +99,7 @@ pub struct Detection {
     /// Covariance of its error in a single frame, the sway of the body included, m^2; `None` where the position was
     /// found by a method that does not tell.
     pub covariance_m2: Option<[[f64; 2]; 2]>,
-    /// Mean height of the points above the floor (`hdl` tracks x, y and z).
+    /// Mean height of the points above the floor below them (`hdl` tracks x, y and z).
     pub z_m: f64,
     /// Mean time of the points.
     pub time_ns: i64,
@@ -112,8 +113,13 @@ pub struct Detection {
     pub top_diagonal_m: f64,
     /// How arms and legs of a known walker lie.
     pub limbs: Option<LimbCovariance>,
-    /// Box along the site's axes.
+    /// Box along the site's axes, in the site frame.
     pub aabb: Aabb,
-    /// Box along the cluster's axes.
+    /// Box along the cluster's axes, the same.
     pub obb: Obb,
+}
+
+/// A place with its height above the floor below it: whoever walks on a ramp is upright there.
+fn above_floor(hall: &Hall, at_m: DVec3) -> DVec3 {
+    DVec3 { z: at_m.z - hall.floor_m(at_m.truncate()), ..at_m }
 }

@@ -14,7 +14,7 @@ pub(super) struct Part {
     pub(super) owner: Option<usize>,
     /// Of the positions in plan view.
     pub(super) sum_m: DVec2,
-    /// The highest point.
+    /// The highest point, above the floor below it.
     pub(super) top_m: f64,
 }
 

@@ -123,7 +123,8 @@ pub(super) struct Clip {
 
 impl Clip {
     fn holds(&self, p: DVec3) -> bool {
-        self.hall.contains(p.truncate()) && p.z >= LOWEST_M && p.z <= self.highest_m
+        let above_m = || p.z - self.hall.floor_m(p.truncate());
+        self.hall.contains(p.truncate()) && (LOWEST_M..=self.highest_m).contains(&above_m())
     }
 }
 

@@ -5,10 +5,11 @@ use super::dp_means::MergeMean;
 use super::evidence::Memory;
 use super::features::away;
 use super::part::Part;
-use super::{Cluster, Point, Prior, dp_means, evidence};
+use super::{Cluster, Point, Prior, above_floor, dp_means, evidence};
 use crate::Site;
 use crate::config::{ClusterMethod, DetectConfig, Mechanism};
 use crate::geometry::{DVec2, DVec3};
+use crate::site::Hall;
 
 /// When points belong together in plan view.
 #[derive(Debug, Clone, Copy)]
@@ -57,8 +58,9 @@ pub struct Clusterer {
     /// Whether expected people guide split and merge.
     guided: bool,
     sensors_m: Vec<DVec3>,
+    hall: Hall,
     grid: PlanGrid,
-    /// Each point, moved behind the surface that its sensor saw.
+    /// Each point, moved behind the surface that its sensor saw, with its height above the floor.
     moved_m: Vec<DVec3>,
     plan_m: Vec<DVec2>,
     radius_m: Vec<f64>,
@@ -87,6 +89,7 @@ impl Clusterer {
             radius: if config.clusters == ClusterMethod::Evidence { OURS } else { ADAPTED },
             guided: !config.without.contains(&Mechanism::GuidedAssignment),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
+            hall: site.hall.clone(),
             grid: PlanGrid::default(),
             moved_m: Vec::new(),
             plan_m: Vec::new(),
@@ -162,7 +165,8 @@ impl Clusterer {
             let range_m =
                 self.sensors_m.iter().map(|s| s.distance(point.position_m)).fold(f64::INFINITY, f64::min);
             let range_m = if range_m.is_finite() { range_m } else { 0.0 };
-            let moved_m = point.position_m + (away(&self.sensors_m, point) * self.radius.shift_m).extend(0.0);
+            let behind_m = (away(&self.sensors_m, point) * self.radius.shift_m).extend(0.0);
+            let moved_m = above_floor(&self.hall, point.position_m) + behind_m;
             self.moved_m.push(moved_m);
             self.plan_m.push(moved_m.truncate());
             self.radius_m.push(self.radius.radius_m + self.radius.per_range * range_m);

@@ -73,4 +73,18 @@ impl Aabb {
         let offset = offset_m.extend(0.0);
         Self { min_m: self.min_m + offset, max_m: self.max_m + offset }
     }
+
+    /// The box lifted, as by a floor that is higher there.
+    ///
+    /// ```
+    /// use umbracast::geometry::{Aabb, DVec3};
+    ///
+    /// let raised = Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE }.raised_by(0.5);
+    /// assert_eq!((raised.min_m.z, raised.max_m.z), (0.5, 1.5));
+    /// ```
+    #[must_use]
+    pub fn raised_by(&self, up_m: f64) -> Self {
+        let up = DVec3::Z * up_m;
+        Self { min_m: self.min_m + up, max_m: self.max_m + up }
+    }
 }

@@ -59,4 +59,17 @@ impl Obb {
             site_from_box: DMat3::from_rotation_z(turn_rad) * self.site_from_box,
         }
     }
+
+    /// The box lifted, as by a floor that is higher there.
+    ///
+    /// ```
+    /// use umbracast::geometry::{Aabb, DVec3, Obb};
+    ///
+    /// let one = Obb::from_aabb(&Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE });
+    /// assert_eq!(one.raised_by(0.5).center_m, DVec3::new(0.5, 0.5, 1.0));
+    /// ```
+    #[must_use]
+    pub fn raised_by(&self, up_m: f64) -> Self {
+        Self { center_m: self.center_m + DVec3::Z * up_m, ..*self }
+    }
 }

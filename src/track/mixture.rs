@@ -143,7 +143,8 @@ impl MixtureTracker {
         let Memory { bodies, expected, .. } = memory;
         visibility.look(views);
         bodies.clear();
-        bodies.extend(people.iter().map(|p| p.body(p.filter.state_after(numbers, step_s).position_m())));
+        let body = |p: &Person| p.body(p.filter.state_after(numbers, step_s).position_m(), &visibility.hall);
+        bodies.extend(people.iter().map(body));
         expected.clear();
         expected.extend(bodies.iter().map(|body| {
             let view = visibility.view(body, bodies);
@@ -263,7 +264,7 @@ impl MixtureTracker {
         tracks.truncate(self.people.len());
         for (i, person) in self.people.iter_mut().enumerate() {
             let observed = tracks.get_mut(i).map(|old| std::mem::take(&mut old.observed)).unwrap_or_default();
-            let track = person.track(time_ns, step_s, observed);
+            let track = person.track(time_ns, step_s, &self.visibility.hall, observed);
             match tracks.get_mut(i) {
                 Some(old) => *old = track,
                 None => tracks.push(track),

@@ -14,6 +14,7 @@ use super::visibility::{Body, BodyView};
 use super::width::BodyWidth;
 use crate::detect::{Detection, Prior};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+use crate::site::Hall;
 
 /// Nobody is believed in more firmly than this, so that a track that should be seen dies within frames.
 const EXISTENCE_MAX: f64 = 0.99;
@@ -189,8 +190,8 @@ impl Person {
     }
 
     /// The body that others may hide behind.
-    pub(super) fn body(&self, position_m: DVec2) -> Body {
-        Body { position_m, height_m: self.height.mean_m() }
+    pub(super) fn body(&self, position_m: DVec2, hall: &Hall) -> Body {
+        Body { position_m, floor_m: hall.floor_m(position_m), height_m: self.height.mean_m() }
     }
 
     pub(super) fn prior(&self, numbers: &Numbers, last_ns: i64, after_s: f64) -> Prior {
@@ -206,13 +207,19 @@ impl Person {
     }
 
     /// The track at the frame's time, `step_s` after the last frame; the filter stands there. `observed` gives its memory.
-    pub(super) fn track(&mut self, time_ns: i64, step_s: f64, mut observed: VecDeque<Observed>) -> Track {
+    pub(super) fn track(
+        &mut self,
+        time_ns: i64,
+        step_s: f64,
+        hall: &Hall,
+        mut observed: VecDeque<Observed>,
+    ) -> Track {
         let state = self.filter.state();
         let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
         self.heading.follow(&state, step_s);
         self.observed.push(time_ns, position_m, velocity_mps);
         observed.clone_from(&self.observed.0);
-        let (aabb, obb) = self.boxes(position_m);
+        let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
         let (width_scale, width_scale_sigma) = self.width.scale();
         Track {
             id: self.id,
@@ -245,7 +252,9 @@ impl Person {
         if let Some(limbs) = detection.limbs.as_ref().filter(|_| numbers.limb_phase) {
             self.limb_phase.see(limbs, speed_mps, self.height.mean_m());
         }
-        self.height.see(detection.top_m, view.beams_per_m_at_top);
+        if !view.on_step {
+            self.height.see(detection.top_m, view.beams_per_m_at_top);
+        }
         if numbers.body_width {
             self.width.see(detection, view, self.height.mean_m(), speed_mps);
         }
@@ -254,9 +263,9 @@ impl Person {
     }
 
     /// As wide as seen on the mean, standing on the floor; the oriented one turned with the heading.
-    fn boxes(&self, position_m: DVec2) -> (Aabb, Obb) {
+    fn boxes(&self, position_m: DVec2, floor_m: f64) -> (Aabb, Obb) {
         let half_m = (0.5 * self.extent_m).extend(0.5 * self.height.mean_m());
-        let center_m = position_m.extend(half_m.z);
+        let center_m = position_m.extend(floor_m + half_m.z);
         let aabb = Aabb { min_m: center_m - half_m, max_m: center_m + half_m };
         let site_from_box = DMat3::from_rotation_z(self.heading.mean_rad);
         // Shoulders are twice as wide as a trunk is deep; the plan area is what was seen.

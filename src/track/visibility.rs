@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use crate::geometry::slab::hit_obb;
 use crate::geometry::{DMat3, DVec2, DVec3, Obb, Pose};
 use crate::lidar::{Fan, SECTORS, Views, sector};
-use crate::site::{Site, from_segment_m};
+use crate::site::{Hall, Site, from_segment_m};
 
 /// Radius of the upright cylinder that stands for a body, both as what is seen and as what hides: the trunk,
 /// 0.26 m by 0.46 m, averaged over all directions.
@@ -27,6 +27,8 @@ const ROUNDED: f64 = 1e-9;
 pub struct Body {
     /// Ground point of its axis.
     pub position_m: DVec2,
+    /// How high the floor is there, metres.
+    pub floor_m: f64,
     /// Standing height.
     pub height_m: f64,
 }
@@ -34,6 +36,8 @@ pub struct Body {
 /// Sensors of the last frame, and what stands still between them and people.
 #[derive(Debug, Clone)]
 pub struct Visibility {
+    /// Says how high the floor is.
+    pub(super) hall: Hall,
     pillars: Vec<(DVec2, f64)>,
     furniture: Vec<Obb>,
     /// Shortest and longest range of each sensor of the site.
@@ -67,7 +71,7 @@ struct Crossed {
     /// Shares of the line where it enters and leaves.
     enter: f64,
     leave: f64,
-    height_m: f64,
+    top_m: f64,
 }
 
 /// What a body gives.
@@ -83,20 +87,23 @@ pub struct BodyView {
     pub beams_per_m_at_top: f64,
     /// Upper end of the highest part of the body that beams meet, above the floor.
     pub top_m: f64,
+    /// Whether it stands at a step, on which level cannot be told.
+    pub on_step: bool,
 }
 
 impl Visibility {
     /// For what stands in the site.
     pub fn new(site: &Site) -> Self {
         let furniture = site.furniture.iter().map(|f| {
-            let half_m = DVec3::from_array(f.size_m) * 0.5;
+            let (position_m, half_m) = (DVec2::from_array(f.position_m), DVec3::from_array(f.size_m) * 0.5);
             Obb {
-                center_m: DVec3::new(f.position_m[0], f.position_m[1], half_m.z),
+                center_m: position_m.extend(site.hall.floor_m(position_m) + half_m.z),
                 half_m,
                 site_from_box: DMat3::from_rotation_z(f.yaw_deg.to_radians()),
             }
         });
         Self {
+            hall: site.hall.clone(),
             pillars: site.pillars.iter().map(|p| (DVec2::from_array(p.position_m), p.radius_m)).collect(),
             furniture: furniture.collect(),
             ranges_m: site.sensors.iter().map(|s| (s.range_min_m, s.range_max_m)).collect(),
@@ -129,9 +136,12 @@ impl Visibility {
 
     /// What `body` gives to all sensors while `others` stand round it.
     pub fn view(&mut self, body: &Body, others: &[Body]) -> BodyView {
-        let Self { pillars, furniture, eyes, between, .. } = self;
-        let mut view =
-            BodyView { beams_known: eyes.iter().all(|eye| eye.fan.is_some()), ..BodyView::default() };
+        let Self { hall, pillars, furniture, eyes, between, .. } = self;
+        let mut view = BodyView {
+            beams_known: eyes.iter().all(|eye| eye.fan.is_some()),
+            on_step: hall.has_step_about(body.position_m),
+            ..BodyView::default()
+        };
         for eye in eyes {
             let from = eye.origin_m.truncate();
             let along = body.position_m - from;
@@ -161,8 +171,9 @@ impl Eye {
         let across = (body.position_m - self.origin_m.truncate()).perp().normalize_or_zero();
         let feet_m = [-0.5, 0.5].map(|side| body.position_m + across * (side * BODY_RADIUS_M));
         let z_m = |edge: usize| body.height_m * edge as f64 / SLICES as f64;
+        let above = |foot_m: DVec2, up_m: f64| foot_m.extend(body.floor_m + up_m);
         let edges: [[Edge; SLICES + 1]; 2] =
-            feet_m.map(|foot_m| std::array::from_fn(|edge| self.edge(foot_m.extend(z_m(edge)))));
+            feet_m.map(|foot_m| std::array::from_fn(|edge| self.edge(above(foot_m, z_m(edge)))));
         between.cross(self.origin_m.truncate(), feet_m);
         for slice in 0..SLICES {
             let (low_m, high_m) = (z_m(slice), z_m(slice + 1));
@@ -173,7 +184,7 @@ impl Eye {
                 }
                 let returns = beams * self.columns_on(&edges[slice]) * 0.5;
                 view.returns_alone += returns;
-                if between.hide(side, self.origin_m, foot_m.extend(0.5 * (low_m + high_m))) {
+                if between.hide(side, self.origin_m, above(*foot_m, 0.5 * (low_m + high_m))) {
                     continue;
                 }
                 view.top_m = view.top_m.max(high_m);
@@ -229,13 +240,15 @@ impl Between {
     fn cross(&mut self, eye_m: DVec2, sides_m: [DVec2; 2]) {
         let Self { others, pillars, crossed, .. } = self;
         for (crossed, side_m) in crossed.iter_mut().zip(sides_m) {
-            let cross = |axis_m: DVec2, radius_m: f64, height_m: f64| {
+            let cross = |axis_m: DVec2, radius_m: f64, top_m: f64| {
                 let (enter, leave) = crossing(axis_m, radius_m, eye_m, side_m)?;
-                Some(Crossed { enter, leave, height_m })
+                Some(Crossed { enter, leave, top_m })
             };
             crossed.clear();
             crossed.extend(pillars.iter().filter_map(|p| cross(p.0, p.1, f64::INFINITY)));
-            crossed.extend(others.iter().filter_map(|o| cross(o.position_m, BODY_RADIUS_M, o.height_m)));
+            crossed.extend(
+                others.iter().filter_map(|o| cross(o.position_m, BODY_RADIUS_M, o.floor_m + o.height_m)),
+            );
         }
     }
 
@@ -243,7 +256,7 @@ impl Between {
     fn hide(&self, side: usize, eye_m: DVec3, target_m: DVec3) -> bool {
         let z_m = |share: f64| eye_m.z + (target_m.z - eye_m.z) * share;
         // Where the line leaves a cylinder it is lowest, if the eye looks down; where it enters, if up.
-        self.crossed[side].iter().any(|c| z_m(c.enter).min(z_m(c.leave)) < c.height_m)
+        self.crossed[side].iter().any(|c| z_m(c.enter).min(z_m(c.leave)) < c.top_m)
             || self.furniture.iter().any(|f| hit_obb(f, eye_m, target_m).is_some())
     }
 }
@@ -314,7 +327,7 @@ mod tests {
     }
 
     fn body(x_m: f64, y_m: f64) -> Body {
-        Body { position_m: DVec2::new(x_m, y_m), height_m: 1.75 }
+        Body { position_m: DVec2::new(x_m, y_m), floor_m: 0.0, height_m: 1.75 }
     }
 
     fn view(frame: &Frame, seen: Body, others: &[Body]) -> BodyView {

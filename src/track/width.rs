@@ -96,6 +96,7 @@ mod tests {
     }
 
     const FREE: BodyView = BodyView {
+        on_step: false,
         returns: 30.0,
         returns_alone: 30.0,
         beams_per_m_at_top: 5.0,

@@ -170,7 +170,7 @@ fn calibrated(case: &Case, truth: &Site, given: &Site, seed: u64) -> Result<Cali
     let empty = frames(given, Scene::empty(truth, seed, EMPTY)?.into_iter())?;
     let mut scene = Scene::in_hall(crowd, truth, &sensors, seed);
     let recorded = frames(given, std::iter::from_fn(|| Some(scene.next_frame()?.packets)))?;
-    let mut survey = Survey::new(given);
+    let mut survey = Survey::new(given)?;
     match case.empty {
         true => empty.iter().for_each(|frame| survey.take(frame)),
         false => recorded.iter().step_by(10).for_each(|frame| survey.take(frame)),

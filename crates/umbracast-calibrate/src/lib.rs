@@ -40,8 +40,20 @@ pub struct Survey {
 
 impl Survey {
     /// Nothing was seen yet.
-    pub fn new(site: &Site) -> Self {
-        Self { site: site.clone(), still: site.sensors.iter().map(|_| Still::default()).collect() }
+    ///
+    /// # Errors
+    /// A floor that is not level: sensors are levelled by it.
+    pub fn new(site: &Site) -> Result<Self, Error> {
+        match site.hall.floors.len() {
+            0 => Ok(Self {
+                site: site.clone(),
+                still: site.sensors.iter().map(|_| Still::default()).collect(),
+            }),
+            count => Err(Error::new(format!(
+                "site.hall.floors: expected none, for sensors are levelled by the floor, found {count}; calibrate where the \
+                 floor is level"
+            ))),
+        }
     }
 
     /// Looks at a frame.

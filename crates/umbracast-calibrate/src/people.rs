@@ -129,6 +129,7 @@ fn empty_site(sensor: &Sensor, level: &Level, default: &Site) -> Site {
             width_m: size_m,
             height_m: level.height_m + size_m,
             outline_m: Vec::new(),
+            floors: Vec::new(),
         },
         pillars: Vec::new(),
         furniture: Vec::new(),

@@ -28,7 +28,7 @@ fn calibrated(truth: &Site, given: &Site, seconds: u64) -> Calibration {
     let crowd = strolling(Preset::Orca03, 4, 7.0, SEED, seconds);
     let mut scene = Scene::new(crowd, truth, SEED).unwrap();
     let empty = frames(given, Scene::empty(truth, SEED, 5).unwrap().into_iter());
-    let mut survey = Survey::new(given);
+    let mut survey = Survey::new(given).unwrap();
     empty.iter().for_each(|frame| survey.take(frame));
     let mut walkers = survey.level();
     empty.iter().for_each(|frame| walkers.learn_empty(frame));

@@ -46,8 +46,7 @@ pub fn markers(time_ns: i64, site: &Site, tracks: &[TrackRow], links: &[LinkRow]
         ) else {
             continue;
         };
-        let ue_m =
-            site.ue.on_body(DVec2::new(track.x_m, track.y_m), track.heading_rad, track.height_m).to_array();
+        let ue_m = site.ue_m(DVec2::new(track.x_m, track.y_m), track.heading_rad, track.height_m).to_array();
         rays.points_m.extend([ap.position_m, ue_m]);
         rays.colours.extend([of_probability(link.p[STEPS - 1]); 2]);
         if link.blocked_now {

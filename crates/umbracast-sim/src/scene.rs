@@ -1,5 +1,7 @@
 //! A whole scene: crowd, bodies, sensors and truth, frame by frame.
 
+use std::sync::Arc;
+
 use rand::Rng;
 use umbracast::lidar::Packet;
 use umbracast::{Error, STEP_NS, Site};
@@ -76,7 +78,9 @@ impl Scene {
     /// The same people without sensors: no packets and no returns, for training and the ladder of oracles.
     pub fn truth_only(crowd: Crowd, site: &Site, seed: u64) -> Self {
         let frames = (crowd.duration_ns / STEP_NS).max(0) as u64;
-        let body = |(number, way): (usize, Trajectory)| Walker::new(way, own_seed(seed, number));
+        let hall = Arc::new(site.hall.clone());
+        let body =
+            |(number, way): (usize, Trajectory)| Walker::new(way, own_seed(seed, number)).on_floor_of(&hall);
         Self {
             site: site.clone(),
             seed,
@@ -92,8 +96,10 @@ impl Scene {
     #[must_use]
     pub fn with_bodies(mut self, bodies: &Bodies) -> Self {
         if !bodies.is_plain() {
+            let hall = Arc::new(self.site.hall.clone());
             for (number, walker) in self.walkers.iter_mut().enumerate() {
-                *walker = bodies.walker(walker.trajectory.clone(), own_seed(self.seed, number));
+                let body = bodies.walker(walker.trajectory.clone(), own_seed(self.seed, number));
+                *walker = body.on_floor_of(&hall);
             }
         }
         self

@@ -33,7 +33,8 @@ struct Case {
     access_point: u32,
     start_m: DVec3,
     ue_m: DVec3,
-    near: Vec<(PeopleRow, Phases)>,
+    /// With how high the floor is that each stands on.
+    near: Vec<(PeopleRow, Phases, f64)>,
     blocked: bool,
 }
 
@@ -159,7 +160,7 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
         };
         let Some(own) = all.iter().find(|p| p.person == link.person) else { continue };
         let start_m = config.site.access_points[link.access_point as usize].position();
-        let ue_m = config.site.ue.on_body(DVec2::new(own.x_m, own.y_m), own.heading_rad, own.height_m);
+        let ue_m = config.site.ue_m(DVec2::new(own.x_m, own.y_m), own.heading_rad, own.height_m);
         let (from, to) = (start_m.truncate(), ue_m.truncate());
         let near = |p: &&PeopleRow| {
             let at = DVec2::new(p.x_m, p.y_m);
@@ -168,9 +169,10 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
         };
         let with_phase = |p: &PeopleRow| {
             let (gait, height_m) = known(p).unwrap_or((GaitPhase::UNKNOWN, p.height_m));
-            (PeopleRow { height_m, ..*p }, Phases::new(&gait))
+            let floor_m = config.site.hall.floor_m(DVec2::new(p.x_m, p.y_m));
+            (PeopleRow { height_m, ..*p }, Phases::new(&gait), floor_m)
         };
-        let near: Vec<(PeopleRow, Phases)> = all.iter().filter(near).map(with_phase).collect();
+        let near: Vec<(PeopleRow, Phases, f64)> = all.iter().filter(near).map(with_phase).collect();
         if !near.is_empty() {
             cases.push(Case { access_point: link.access_point, start_m, ue_m, near, blocked: link.blocked });
         }
@@ -181,7 +183,8 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
 /// Chance that the link is blocked.
 fn probability(body: &BodyModel, numbers: &Numbers, case: &Case) -> f64 {
     let hits = (0..POSTURES).filter(|&k| {
-        case.near.iter().any(|(p, phases)| {
+        case.near.iter().any(|(p, phases, floor_m)| {
+            let down = DVec3::NEG_Z * *floor_m;
             let share = ((k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person)).fract();
             let posture = Posture {
                 width_scale: 1.0
@@ -192,7 +195,7 @@ fn probability(body: &BodyModel, numbers: &Numbers, case: &Case) -> f64 {
                 arm_swing: 1.0,
                 ..Posture::standing(DVec2::new(p.x_m, p.y_m), DVec2::from_angle(p.heading_rad), p.height_m)
             };
-            body::blocks(body, &posture, case.start_m, case.ue_m)
+            body::blocks(body, &posture, case.start_m + down, case.ue_m + down)
         })
     });
     hits.count() as f64 / POSTURES as f64

@@ -89,7 +89,10 @@ fn watch(scene: u64) -> Result<Vec<Person>, Error> {
         while let Some(frame) = assembler.pop() {
             let outcome = pipeline.step(&frame);
             visibility.look(&Views::of(&frame));
-            let body = |t: &Track| Body { position_m: t.position_m, height_m: t.height_m };
+            let body = |t: &Track| {
+                let floor_m = config.site.hall.floor_m(t.position_m);
+                Body { position_m: t.position_m, floor_m, height_m: t.height_m }
+            };
             let bodies: Vec<Body> = outcome.tracks.iter().map(body).collect();
             for (track, body) in outcome.tracks.iter().zip(&bodies).filter(|(track, _)| track.points > 0) {
                 let view = visibility.view(body, &bodies);

@@ -61,7 +61,7 @@ fn found(
         lost.extend(told);
         empty = frames;
     }
-    let mut survey = Survey::new(&config.site);
+    let mut survey = Survey::new(&config.site)?;
     empty.iter().for_each(|frame| survey.take(frame));
     if empty.is_empty() {
         recording.frames(&config.site, &mut Health::default(), |frame: &Frame| {

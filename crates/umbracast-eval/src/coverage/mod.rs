@@ -172,7 +172,7 @@ fn look(site: &Site, survey: &mut Survey, bodies: &[(Walker, f64)], position_m: 
                 place.span_m = Some((lowest_m.min(low_m), highest_m.max(high_m)));
             }
         }
-        let ue_m = site.ue.on_body(position_m, *heading_rad, body.build.height_m());
+        let ue_m = site.ue_m(position_m, *heading_rad, body.build.height_m());
         for (blocked, access_point) in place.static_blocked.iter_mut().zip(&site.access_points) {
             *blocked |= fixtures::block(site, access_point.position(), ue_m);
         }

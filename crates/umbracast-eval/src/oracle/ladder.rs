@@ -262,7 +262,10 @@ impl Play<'_> {
         let mut blocked = Vec::with_capacity(self.site.access_points.len() * states.len());
         for access_point in &self.site.access_points {
             for (q, state) in states.iter().enumerate() {
-                let ue = state.map(|s| self.site.ue.on_body(s.position_m, s.heading_rad, s.height_m));
+                let ue = state.map(|s| {
+                    let on_body = self.site.ue.on_body(s.position_m, s.heading_rad, s.height_m);
+                    on_body + DVec3::Z * s.floor_m
+                });
                 let cut_by = |(p, shape): (usize, &Option<Shape>)| {
                     p != q
                         && shape.as_ref().zip(ue).is_some_and(|(shape, ue)| {
@@ -303,13 +306,13 @@ impl Play<'_> {
             ahead: DVec2::from_angle(state.heading_rad),
             half_depth_m: depth_m / 2.0,
             half_width_m: width_m / 2.0,
-            bottom_m,
-            top_m,
+            bottom_m: state.floor_m + bottom_m,
+            top_m: state.floor_m + top_m,
         };
         match body {
             Body::Aabb => Shape::Aabb(self.moments[now].boxes[walker].moved_by(state.position_m)),
             Body::Obb => Shape::Obb(Obb {
-                center_m: state.position_m.extend(state.height_m / 2.0),
+                center_m: state.position_m.extend(state.floor_m + state.height_m / 2.0),
                 half_m: DVec3::new(BOX_M[0], BOX_M[1], state.height_m) / 2.0,
                 site_from_box: DMat3::from_rotation_z(state.heading_rad),
             }),

@@ -9,6 +9,7 @@ use umbracast::forecast::constant_velocity::ACCELERATION_PSD_M2PS3;
 use umbracast::forecast::{Coupling, Forecast, Gaussian2, Weights, constant_velocity};
 use umbracast::gait::{GaitPhase, WALKS_FROM_MPS};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
+use umbracast::site::Hall;
 use umbracast::track::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
 use umbracast::{Config, Error, STEP_S, STEPS};
 use umbracast_io::rows::{PeopleRow, TrackRow};
@@ -26,8 +27,10 @@ pub fn constant_velocity_of_truth(truth: &TruthIndex, config: &Config) -> Said {
     let mut caster = Caster::new(&config.blockage, &config.site);
     let (mut said, mut blockages) = (Said::default(), Vec::new());
     for &frame in &truth.frames {
-        let tracks: Vec<Track> =
-            truth.people_of(frame).map(|row| true_track(truth, row, person_box(row))).collect();
+        let tracks: Vec<Track> = truth
+            .people_of(frame)
+            .map(|row| true_track(truth, row, person_box(row, &config.site.hall)))
+            .collect();
         let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
         caster.cast(&tracks, &forecasts, &mut blockages);
         said.add(frame, &blockages);
@@ -70,8 +73,8 @@ pub fn true_state(
     let track = |row: &PeopleRow| {
         let own = matching.get(&(row.frame, row.person)).and_then(|track| rows.get(&(row.frame, *track)));
         match own {
-            Some(own) => with_true_state(truth, own, row),
-            None => true_track(truth, row, person_box(row)),
+            Some(own) => with_true_state(truth, own, row, &config.site.hall),
+            None => true_track(truth, row, person_box(row, &config.site.hall)),
         }
     };
     let tracks: Vec<Vec<Track>> =
@@ -95,7 +98,7 @@ pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, conf
         let ahead = |row: &&TrackRow| {
             let person = person_of.get(&(frame, row.track));
             match person.and_then(|&person| truth.person(frame, person)) {
-                Some(person) => with_true_future(truth, row, person),
+                Some(person) => with_true_future(truth, row, person, &config.site.hall),
                 None => with_own_future(row),
             }
         };
@@ -136,8 +139,8 @@ const CERTAIN: Coupling = Coupling { state: [[0.0; 4]; 4], acceleration_psd_m2ps
 
 /// A track with the true state of its person. Its heading follows the velocity as the tracker's does; below
 /// walking speed the track's own is held.
-fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow) -> Track {
-    let track = true_track(truth, row, box_moved_to(own, row));
+fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, hall: &Hall) -> Track {
+    let track = true_track(truth, row, box_moved_to(own, row, hall));
     let walks = track.velocity_mps.length() > WALKS_FROM_MPS;
     let (heading_rad, heading_sigma_rad) =
         if walks { (track.velocity_mps.to_angle(), 0.0) } else { (own.heading_rad, own.heading_sigma_rad) };
@@ -156,8 +159,8 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow) -> Track
 
 /// A track at the true positions of its person, now and at every step. The present is moved as well: a body
 /// turns as its trajectory does, and one from an estimate to the truth would turn it by the estimate's error.
-fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow) -> (Track, Forecast) {
-    let (aabb, obb) = box_moved_to(own, now);
+fn with_true_future(truth: &TruthIndex, own: &TrackRow, now: &PeopleRow, hall: &Hall) -> (Track, Forecast) {
+    let (aabb, obb) = box_moved_to(own, now, hall);
     let position_m = DVec2::new(now.x_m, now.y_m);
     let track = Track { position_m, aabb, obb, ..track_of(own) };
     let offset_m = position_m - DVec2::new(own.x_m, own.y_m);
@@ -211,9 +214,10 @@ pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb))
 }
 
 /// The boxes of a person of usual size.
-fn person_box(row: &PeopleRow) -> (Aabb, Obb) {
+fn person_box(row: &PeopleRow, hall: &Hall) -> (Aabb, Obb) {
     let half_m = DVec3::new(PERSON_BOX_M[0] / 2.0, PERSON_BOX_M[1] / 2.0, row.height_m / 2.0);
-    let center_m = DVec3::new(row.x_m, row.y_m, half_m.z);
+    let position_m = DVec2::new(row.x_m, row.y_m);
+    let center_m = position_m.extend(hall.floor_m(position_m) + half_m.z);
     let site_from_box = DMat3::from_rotation_z(row.heading_rad);
     let reach_m = site_from_box.x_axis.abs() * half_m.x + site_from_box.y_axis.abs() * half_m.y;
     let reach_m = DVec3::new(reach_m.x, reach_m.y, half_m.z);
@@ -222,10 +226,11 @@ fn person_box(row: &PeopleRow) -> (Aabb, Obb) {
 }
 
 /// The boxes of a track, moved with its position to the true one.
-fn box_moved_to(track: &TrackRow, row: &PeopleRow) -> (Aabb, Obb) {
+fn box_moved_to(track: &TrackRow, row: &PeopleRow, hall: &Hall) -> (Aabb, Obb) {
     let offset_m = DVec2::new(row.x_m - track.x_m, row.y_m - track.y_m);
+    let up_m = hall.floor_m(DVec2::new(row.x_m, row.y_m)) - hall.floor_m(DVec2::new(track.x_m, track.y_m));
     let (aabb, obb) = boxes_of(track);
-    (aabb.moved_by(offset_m), obb.moved_by(offset_m, 0.0))
+    (aabb.moved_by(offset_m).raised_by(up_m), obb.moved_by(offset_m, 0.0).raised_by(up_m))
 }
 
 fn boxes_of(row: &TrackRow) -> (Aabb, Obb) {
@@ -347,7 +352,7 @@ mod tests {
         let (truth, _) = crossing();
         let index = TruthIndex::new(&truth);
         let (row, own) = track_beside(&index);
-        let (track, forecast) = with_true_future(&index, &own, &row);
+        let (track, forecast) = with_true_future(&index, &own, &row, &umbracast::Config::default().site.hall);
         let (first, last) = (forecast.steps[0].mean_m - track.position_m, forecast.steps[8].mean_m);
         assert!(first.angle_to(last - forecast.steps[7].mean_m).abs() < 1e-9, "{first}");
         assert!(track.aabb.min_m.abs_diff_eq(DVec3::new(-0.4, 0.1, 0.0), 1e-9), "{}", track.aabb.min_m);
@@ -385,11 +390,14 @@ mod tests {
         let (truth, _) = crossing();
         let index = TruthIndex::new(&truth);
         let (row, own) = track_beside(&index);
-        let track = with_true_state(&index, &own, &row);
+        let track = with_true_state(&index, &own, &row, &umbracast::Config::default().site.hall);
         assert_eq!((track.position_m, track.height_m), (DVec2::new(row.x_m, row.y_m), 1.9));
         assert_eq!(track.heading_rad, std::f64::consts::FRAC_PI_2);
         let slow = PeopleRow { vx_mps: 0.1, vy_mps: 0.0, ..row };
-        assert_eq!(with_true_state(&index, &own, &slow).heading_rad, own.heading_rad);
+        assert_eq!(
+            with_true_state(&index, &own, &slow, &umbracast::Config::default().site.hall).heading_rad,
+            own.heading_rad
+        );
     }
 
     #[test]
@@ -408,7 +416,7 @@ mod tests {
     fn a_person_turned_by_90_degrees_is_wide_along_x() {
         let row =
             PeopleRow { heading_rad: std::f64::consts::FRAC_PI_2, height_m: 1.8, ..PeopleRow::default() };
-        let (aabb, obb) = person_box(&row);
+        let (aabb, obb) = person_box(&row, &umbracast::Config::default().site.hall);
         assert!((aabb.size_m() - DVec3::new(0.46, 0.28, 1.8)).length() < 1e-12, "{:?}", aabb.size_m());
         assert_eq!(obb.half_m, DVec3::new(0.14, 0.23, 0.9));
     }

@@ -83,12 +83,13 @@ fn body(
     let walker = walkers.iter().position(|walker| walker.trajectory.person == person)?;
     let truth = walkers[walker].state_at(instant_ns)?;
     let position_m: DVec2 = forecast_of(row)[h - 1].mean_m;
+    let up_m = site.hall.floor_m(position_m) - site.hall.floor_m(truth.position_m);
     Some(Body {
         frame: row.frame,
         track: row.track,
         walker,
-        offset_m: (position_m - truth.position_m).extend(0.0),
-        ue_m: site.ue.on_body(position_m, truth.heading_rad, truth.height_m),
+        offset_m: (position_m - truth.position_m).extend(up_m),
+        ue_m: site.ue_m(position_m, truth.heading_rad, truth.height_m),
     })
 }
 

@@ -10,7 +10,7 @@ use serde::Serialize;
 use umbracast::geometry::DVec3;
 use umbracast::lidar::packet::decode;
 use umbracast::lidar::{Assembler, Cloud, Frame, Model, Packet, sensor_models};
-use umbracast::site::{Sensor, TimeSource};
+use umbracast::site::{Hall, Sensor, TimeSource};
 use umbracast::{Error, Health, Site};
 use umbracast_calibrate::floor;
 
@@ -229,7 +229,7 @@ fn is_watched(site: &Site, point_m: &DVec3) -> bool {
     site.hall.contains(point_m.truncate()) && (-HEIGHT_MAX_M..WATCHED_MAX_M).contains(&point_m.z)
 }
 
-/// Returns of the fullest frame, in the site's frame.
+/// Returns of the fullest frame, in the site's frame, but for their heights, which are above the site's floor.
 fn points(site: &Site, sensor: &Sensor, packets: &[Packet]) -> Result<Vec<DVec3>, Error> {
     let alone = Site { sensors: vec![sensor.clone()], ..site.clone() };
     let (mut assembler, mut health) = (Assembler::new(&alone)?, Health::default());
@@ -237,7 +237,7 @@ fn points(site: &Site, sensor: &Sensor, packets: &[Packet]) -> Result<Vec<DVec3>
     for packet in packets {
         assembler.push(0, packet, &mut health);
         while let Some(frame) = assembler.pop() {
-            let points = returns_of(&frame);
+            let points = returns_of(&frame, &site.hall);
             if points.len() > fullest.len() {
                 fullest = points;
             }
@@ -246,14 +246,16 @@ fn points(site: &Site, sensor: &Sensor, packets: &[Packet]) -> Result<Vec<DVec3>
     Ok(fullest)
 }
 
-fn returns_of(frame: &Frame) -> Vec<DVec3> {
+fn returns_of(frame: &Frame, hall: &Hall) -> Vec<DVec3> {
     let mut points = Vec::new();
     for scan in &frame.scans {
         let Cloud::Organised(image) = &scan.cloud else { continue };
         let beams = image.beams.len();
         for (at, &range_m) in image.range_m.iter().enumerate().filter(|(_, range_m)| **range_m > 0.0) {
             let point = image.point_m(at / beams, at % beams, f64::from(range_m));
-            points.push(scan.site_from_sensor.point(point));
+            let mut at_m = scan.site_from_sensor.point(point);
+            at_m.z -= hall.floor_m(at_m.truncate());
+            points.push(at_m);
         }
     }
     points

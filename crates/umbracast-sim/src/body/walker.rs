@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};
+use umbracast::site::Hall;
 
 use super::build::Build;
 use super::gestures::Gestures;
@@ -17,6 +18,9 @@ use super::{feet, gait, things};
 use crate::crowd::Trajectory;
 use crate::random::stream;
 
+/// A body climbs from one level to the next over so much of its way, before the edge and behind it.
+const CLIMB_M: f64 = 0.3;
+
 /// Where a person is and how he stands, at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PersonState {
@@ -26,6 +30,8 @@ pub struct PersonState {
     pub velocity_mps: DVec2,
     /// The trunk's, held while standing.
     pub heading_rad: f64,
+    /// How high the floor is that the feet are on; climbing a step, between both levels.
+    pub floor_m: f64,
     /// Standing height with shoes; of who sits, the height of the head's top.
     pub height_m: f64,
 }
@@ -48,6 +54,8 @@ pub struct Walker {
     gait: Option<Arc<Gait>>,
     /// Standing (or sitting) upright at the origin, looking along x.
     upright: Pose,
+    /// Whose floor is not level.
+    hall: Option<Arc<Hall>>,
 }
 
 impl Walker {
@@ -83,6 +91,7 @@ impl Walker {
             seat_m: things.seat_m,
             gait: None,
             upright,
+            hall: None,
         }
     }
 
@@ -94,11 +103,19 @@ impl Walker {
         self
     }
 
+    /// The same body on this hall's floor.
+    #[must_use]
+    pub fn on_floor_of(mut self, hall: &Arc<Hall>) -> Self {
+        self.hall = (!hall.floors.is_empty()).then(|| hall.clone());
+        self
+    }
+
     /// The person's state, or `None` while not in the scene.
     pub fn state_at(&self, time_ns: i64) -> Option<PersonState> {
         let (position_m, velocity_mps) = self.trajectory.at(time_ns)?;
         let heading_rad = (self.walk.at(time_ns).heading_rad + PI).rem_euclid(TAU) - PI;
-        Some(PersonState { position_m, velocity_mps, heading_rad, height_m: self.height_m() })
+        let floor_m = self.hall.as_ref().map_or(0.0, |hall| underfoot(hall, position_m, heading_rad).0);
+        Some(PersonState { position_m, velocity_mps, heading_rad, floor_m, height_m: self.height_m() })
     }
 
     fn height_m(&self) -> f64 {
@@ -109,8 +126,9 @@ impl Walker {
     /// is not in the scene.
     pub fn mesh_at(&self, time_ns: i64, vertices: &mut Vec<DVec3>) -> bool {
         vertices.clear();
-        let Some((pose, _)) = self.pose_at(time_ns) else { return false };
+        let Some((pose, state)) = self.pose_at(time_ns) else { return false };
         self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+        self.raise(state.position_m, state.heading_rad, vertices);
         true
     }
 
@@ -118,6 +136,7 @@ impl Walker {
     pub fn upright_mesh(&self, position_m: DVec2, heading_rad: f64, vertices: &mut Vec<DVec3>) {
         let pose = self.upright.moved(DVec2::ZERO, heading_rad, position_m);
         self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+        self.raise(position_m, heading_rad, vertices);
     }
 
     /// The walking mesh of `time_ns` moved so that its axis stands at `position_m` with `heading_rad`. Nothing
@@ -127,6 +146,15 @@ impl Walker {
         let Some((pose, state)) = self.pose_at(time_ns) else { return };
         let pose = pose.moved(state.position_m, heading_rad - state.heading_rad, position_m);
         self.shape.skin(|bone, rest| pose.point(bone, rest), vertices);
+        self.raise(position_m, heading_rad, vertices);
+    }
+
+    /// Puts a body that stands at z = 0 on the floor: upright, and on a ramp each foot at the height of its own place.
+    fn raise(&self, position_m: DVec2, heading_rad: f64, vertices: &mut [DVec3]) {
+        if let Some(hall) = &self.hall {
+            let (floor_m, slope) = underfoot(hall, position_m, heading_rad);
+            vertices.iter_mut().for_each(|v| v.z += floor_m + slope.dot(v.truncate() - position_m));
+        }
     }
 
     /// How the vertices of every mesh that this walker makes hang together.
@@ -161,4 +189,29 @@ impl Walker {
         let feet = things::feet_on_rests(&self.build, state.position_m, heading_rad);
         Pose::new(&self.build, heading_rad, &still, &pelvis, &feet, &self.holds)
     }
+}
+
+/// How high the floor is below a body and how it rises, both on the mean along its way: so a step is climbed steadily.
+fn underfoot(hall: &Hall, position_m: DVec2, heading_rad: f64) -> (f64, DVec2) {
+    let ahead_m = DVec2::from_angle(heading_rad) * CLIMB_M;
+    let (from_m, way_m) = (position_m - ahead_m, 2.0 * ahead_m);
+    // Between the edges that it crosses all is linear.
+    let mut cuts = vec![0.0, 1.0];
+    for floor in &hall.floors {
+        let corners = floor.outline_m.iter().copied().map(DVec2::from_array);
+        for (a, b) in corners.clone().zip(corners.cycle().skip(1)) {
+            cuts.push(((a - from_m).perp_dot(b - a) / way_m.perp_dot(b - a)).clamp(0.0, 1.0));
+        }
+    }
+    cuts.retain(|share| !share.is_nan());
+    cuts.sort_by(f64::total_cmp);
+    let (mut floor_m, mut slope) = (0.0, DVec2::ZERO);
+    for piece in cuts.windows(2).filter(|piece| piece[0] < piece[1]) {
+        let middle_m = from_m + way_m * (0.5 * (piece[0] + piece[1]));
+        let length = piece[1] - piece[0];
+        floor_m += length * hall.floor_m(middle_m);
+        let here = hall.floor_at(middle_m);
+        slope += length * here.map_or(DVec2::ZERO, |i| DVec2::from_array(hall.floors[i].slope));
+    }
+    (floor_m, slope)
 }

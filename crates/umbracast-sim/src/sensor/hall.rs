@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use umbracast::Site;
 use umbracast::geometry::{DVec2, DVec3, Pose};
 use umbracast::lidar::{Model, RangeImage, Turn};
+use umbracast::site::Hall;
 
 use super::panes::{Meets, Mirrored, Panes};
 
@@ -17,6 +18,9 @@ const CEILING: u8 = 60;
 const WALL: u8 = 55;
 const PILLAR: u8 = 45;
 const FURNITURE: u8 = 35;
+/// So far to either side of an edge the floor has the height that it has beside it.
+const BESIDE_M: f64 = 1e-6;
+
 /// Dust on glass, and what comes straight back.
 const PANE: u8 = 10;
 
@@ -83,6 +87,8 @@ impl HallImage {
 
 /// The hall's surfaces, each met exactly: planes, boxes and true cylinders.
 struct Solids {
+    /// Where its floor is not level.
+    floor: Option<Hall>,
     room_min_m: DVec3,
     room_max_m: DVec3,
     /// Those of a room that is no rectangle along x and y.
@@ -98,10 +104,12 @@ impl Solids {
         let is_box = site.hall.outline_m.is_empty();
         let boxes = site.furniture.iter().map(|item| {
             let size_m = DVec3::from_array(item.size_m);
-            let middle_m = DVec2::from_array(item.position_m).extend(size_m.z * 0.5);
+            let position_m = DVec2::from_array(item.position_m);
+            let middle_m = position_m.extend(site.hall.floor_m(position_m) + size_m.z * 0.5);
             (Pose::from_yaw_pitch_roll_deg(middle_m, item.yaw_deg, 0.0, 0.0).inverse(), size_m * 0.5)
         });
         Self {
+            floor: (!site.hall.floors.is_empty()).then(|| site.hall.clone()),
             room_min_m: least_m.extend(0.0),
             room_max_m: most_m.extend(site.hall.height_m),
             walls: if is_box { Vec::new() } else { site.hall.walls().collect() },
@@ -164,9 +172,49 @@ impl Solids {
                 self.walls.iter().filter_map(meets).fold(f64::INFINITY, f64::min)
             }
         };
-        let end = exit(2);
+        let end = match &self.floor {
+            Some(hall) if direction.z < 0.0 => floors(hall, origin_m, direction),
+            // Looking up, a step may be met before the ceiling.
+            Some(hall) => {
+                let step = floors(hall, origin_m, direction);
+                if step < side.min(exit(2)) {
+                    return (step, FLOOR);
+                }
+                exit(2)
+            }
+            None => exit(2),
+        };
         if side < end { (side, WALL) } else { (end, if direction.z < 0.0 { FLOOR } else { CEILING }) }
     }
+}
+
+/// Where a ray meets a floor that is not level: ramps, platforms, what is at z = 0 between them, and the upright faces
+/// where neighbours differ in height.
+fn floors(hall: &Hall, origin_m: DVec3, direction: DVec3) -> f64 {
+    let at_m = |range_m: f64| (origin_m + direction * range_m).truncate();
+    let plane = |height_at_origin_m: f64, slope: DVec2, floor: Option<usize>| {
+        let range_m = (height_at_origin_m - origin_m.z) / (direction.z - slope.dot(direction.truncate()));
+        (range_m > 0.0 && hall.floor_at(at_m(range_m)) == floor).then_some(range_m)
+    };
+    let level = plane(0.0, DVec2::ZERO, None);
+    let others = hall.floors.iter().enumerate().filter_map(|(i, floor)| {
+        plane(floor.height_at_m(origin_m.truncate()), DVec2::from_array(floor.slope), Some(i))
+    });
+    let edges = hall.floors.iter().flat_map(|floor| {
+        let corners = floor.outline_m.iter().copied().map(DVec2::from_array);
+        corners.clone().zip(corners.cycle().skip(1))
+    });
+    let faces = edges.filter_map(|(from, to)| {
+        let range_m = wall(origin_m.truncate(), direction.truncate(), [from, to])?;
+        let aside_m = (to - from).normalize_or_zero().perp() * BESIDE_M;
+        let sides_m = [aside_m, -aside_m].map(|aside_m| hall.floor_m(at_m(range_m) + aside_m));
+        let (low_m, high_m) = (sides_m[0].min(sides_m[1]), sides_m[0].max(sides_m[1]));
+        // A hair of room, so that no ray slips through between a face and what it leads to.
+        (low_m - BESIDE_M..=high_m + BESIDE_M)
+            .contains(&(origin_m.z + direction.z * range_m))
+            .then_some(range_m)
+    });
+    level.into_iter().chain(others).chain(faces).fold(f64::INFINITY, f64::min)
 }
 
 /// Where a ray meets a wall, seen from above. Both ends belong to it, so that no ray slips through a corner.

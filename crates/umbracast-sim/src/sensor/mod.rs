@@ -123,7 +123,9 @@ impl Simulated {
             return Err(Error::new(format!("rate_hz: expected more than 0 and at most 50, found {found}")));
         }
         let at_m = DVec3::from_array(sensor.position_m);
-        if !(site.hall.clearance_m(at_m.truncate()) > 0.0 && at_m.z > 0.0 && at_m.z < site.hall.height_m) {
+        let floor_m = site.hall.floor_m(at_m.truncate());
+        if !(site.hall.clearance_m(at_m.truncate()) > 0.0 && at_m.z > floor_m && at_m.z < site.hall.height_m)
+        {
             let [least_m, most_m] = site.hall.bounds_m();
             let (hall_m, found) = ((most_m - least_m).extend(site.hall.height_m), sensor.position_m);
             return Err(Error::new(format!(

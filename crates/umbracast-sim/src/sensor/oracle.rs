@@ -6,9 +6,9 @@ use parry3d::query::details::local_ray_intersection_with_triangle;
 use parry3d::query::{PointQuery, Ray, RayCast};
 use parry3d::shape::{Cuboid, SharedShape, TriMesh};
 use umbracast::Site;
-use umbracast::geometry::DVec3;
+use umbracast::geometry::{DVec2, DVec3};
 use umbracast::lidar::RangeImage;
-use umbracast::site::{Pillar, Sensor};
+use umbracast::site::{Floor, Pillar, Sensor};
 
 use crate::body::Walker;
 
@@ -138,12 +138,29 @@ fn hall_shapes(site: &Site) -> Vec<(Pose, SharedShape)> {
     }
     for item in &site.furniture {
         let ([px, py], [sx, sy, sz]) = (item.position_m, item.size_m.map(|s| s as f32));
-        cuboid(Vector::new(px as f32, py as f32, sz * 0.5), Vector::new(sx, sy, sz), item.yaw_deg);
+        let floor_m = site.hall.floor_m(DVec2::from_array(item.position_m)) as f32;
+        cuboid(Vector::new(px as f32, py as f32, floor_m + sz * 0.5), Vector::new(sx, sy, sz), item.yaw_deg);
+    }
+    for floor in &site.hall.floors {
+        shapes.push((Pose::IDENTITY, SharedShape::new(plinth(floor))));
     }
     for pillar in &site.pillars {
         shapes.push((Pose::IDENTITY, SharedShape::new(prism(pillar, z))));
     }
     shapes
+}
+
+/// A convex piece of floor as the top of a block that reaches below z = 0.
+fn plinth(floor: &Floor) -> TriMesh {
+    let n = floor.outline_m.len() as u32;
+    let [x0, y0] = floor.outline_m[0];
+    let top = |&[x, y]: &[f64; 2]| floor.height_m + floor.slope[0] * (x - x0) + floor.slope[1] * (y - y0);
+    let corner = |[x, y]: [f64; 2], z: f64| Vector::new(x as f32, y as f32, z as f32);
+    let tops = floor.outline_m.iter().map(|p| corner(*p, top(p)));
+    let vertices = tops.chain(floor.outline_m.iter().map(|p| corner(*p, -0.5))).collect();
+    let fan = (1..n - 1).map(|i| [0, i, i + 1]);
+    let sides = (0..n).flat_map(|i| [[i, (i + 1) % n, n + i], [(i + 1) % n, n + (i + 1) % n, n + i]]);
+    TriMesh::new(vertices, fan.chain(sides).collect()).unwrap()
 }
 
 /// A pillar as a prism of so many sides that it is 3 um from round.

@@ -129,8 +129,9 @@ impl Painter {
         let mut around: Option<(f64, f64)> = None;
         let (first, last) = (view.image.columns.first()?, view.image.columns.last()?);
         for state in [first, last].iter().filter_map(|column| walker.state_at(column.time_ns)) {
-            let foot = self.sensor_from_site.point(state.position_m.extend(0.0)).truncate();
-            let head = self.sensor_from_site.point(state.position_m.extend(state.height_m)).truncate();
+            let foot = self.sensor_from_site.point(state.position_m.extend(state.floor_m)).truncate();
+            let top_m = state.floor_m + state.height_m;
+            let head = self.sensor_from_site.point(state.position_m.extend(top_m)).truncate();
             let reach_m = REACH_M + self.aside_m;
             if distance_to_segment(foot, head) <= reach_m {
                 return Some((0.0, 18_000.0));

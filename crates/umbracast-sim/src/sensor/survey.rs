@@ -5,6 +5,7 @@
 
 use umbracast::Site;
 use umbracast::geometry::{DVec2, Pose};
+use umbracast::site::Hall;
 
 use super::noise::Noise;
 use super::raster::Painter;
@@ -15,6 +16,7 @@ use crate::body::Walker;
 /// Sensors that look at one body at a time.
 #[derive(Debug, Clone)]
 pub struct Survey {
+    hall: Hall,
     lookouts: Vec<Lookout>,
 }
 
@@ -51,14 +53,17 @@ impl Survey {
                 view,
             }
         };
-        Self { lookouts: sensors.sensors.iter().zip(&site.sensors).map(lookout).collect() }
+        Self {
+            hall: site.hall.clone(),
+            lookouts: sensors.sensors.iter().zip(&site.sensors).map(lookout).collect(),
+        }
     }
 
     /// A body that stands at the origin and looks along x, as each sensor sees it in the first revolution of a
     /// scene when it is moved to `position_m` and turned to `heading_rad`.
     pub fn see(&mut self, body: &Walker, position_m: DVec2, heading_rad: f64) -> Vec<Seen> {
-        let site_from_body =
-            Pose::from_yaw_pitch_roll_deg(position_m.extend(0.0), heading_rad.to_degrees(), 0.0, 0.0);
+        let feet_m = position_m.extend(self.hall.floor_m(position_m));
+        let site_from_body = Pose::from_yaw_pitch_roll_deg(feet_m, heading_rad.to_degrees(), 0.0, 0.0);
         self.lookouts.iter_mut().map(|lookout| lookout.see(body, &site_from_body)).collect()
     }
 }
@@ -78,7 +83,7 @@ impl Lookout {
             if returns > 0.0 {
                 let (column, beam) = (pixel / image.beams.len(), pixel % image.beams.len());
                 let point_m = image.point_m(column, beam, f64::from(range_m));
-                let height_m = self.site_from_sensor.point(point_m).z;
+                let height_m = self.site_from_sensor.point(point_m).z - site_from_body.translation_m.z;
                 let (low_m, high_m) = seen.span_m.unwrap_or((height_m, height_m));
                 seen.returns += returns;
                 seen.span_m = Some((low_m.min(height_m), high_m.max(height_m)));

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use umbracast::geometry::DVec2;
 use umbracast::lidar::{Column, packet};
-use umbracast::site::{Pane, Rotation, Surface};
+use umbracast::site::{Floor, Pane, Rotation, Surface};
 use umbracast::{Config, Health, STEP_NS};
 
 use super::oracle::Oracle;
@@ -20,6 +20,30 @@ fn the_hall_is_as_an_independent_caster_sees_it() {
     let site = site();
     let mut sensors = Sensors::new(&site, 0).unwrap();
     assert_as_the_oracle_sees(&site, &mut sensors, 3, 1, &[]);
+}
+
+#[test]
+fn ramps_platforms_and_who_walks_on_them_are_as_an_independent_caster_sees_them() {
+    let mut site = site();
+    let floor = |[x, y]: [f64; 2], [along, across]: [f64; 2], height_m: f64, slope: [f64; 2]| Floor {
+        outline_m: vec![[x, y], [x + along, y], [x + along, y + across], [x, y + across]],
+        height_m,
+        slope,
+    };
+    site.hall.floors = vec![
+        floor([-6.0, -17.0], [12.0, 34.0], 0.0, [0.05, 0.0]),
+        floor([6.0, -17.0], [11.0, 34.0], 0.6, [0.0; 2]),
+        floor([-10.0, 2.0], [3.0, 5.0], 0.4, [0.0, 0.02]),
+    ];
+    let hall = Arc::new(site.hall.clone());
+    let mut sensors = Sensors::new(&site, 0).unwrap();
+    let walkers: Vec<Walker> = (0..10)
+        .map(|i| walker(i, 1.8 + f64::from(i) * 0.2, 10.0 - f64::from(i) * 0.25).on_floor_of(&hall))
+        .collect();
+    let bodies = assert_as_the_oracle_sees(&site, &mut sensors, 7, 2, &walkers);
+    assert!(bodies > 300, "{bodies} rays on bodies");
+    let floors_m: Vec<f64> = walkers.iter().filter_map(|w| Some(w.state_at(790_000_000)?.floor_m)).collect();
+    assert!(floors_m.iter().any(|m| *m > 0.35) && floors_m.contains(&0.0), "{floors_m:?}");
 }
 
 /// Beams that look aside and do not start at the sensor's axis, at another speed and cut.

@@ -10,7 +10,10 @@ pub fn block(site: &Site, start_m: DVec3, end_m: DVec3) -> bool {
     let indoors = !site.hall.outline_m.is_empty() && site.hall.contains(start_m.truncate());
     (indoors && walls_block(site, start_m.truncate(), end_m.truncate()))
         || site.pillars.iter().any(|pillar| pillar_blocks(pillar, start_m, end_m))
-        || site.furniture.iter().any(|piece| furniture_blocks(piece, start_m, end_m))
+        || site.furniture.iter().any(|piece| {
+            let down = DVec3::NEG_Z * site.hall.floor_m(DVec2::from_array(piece.position_m));
+            furniture_blocks(piece, start_m + down, end_m + down)
+        })
 }
 
 /// Walls reach from floor to ceiling. A segment that ends on one is not cut by it.

@@ -6,6 +6,7 @@ pub mod fixtures;
 pub use mesh::BodyMesh;
 
 use umbracast::Site;
+use umbracast::geometry::DVec3;
 
 use crate::body::Walker;
 
@@ -45,7 +46,8 @@ impl Truth {
             let start = at.position();
             for (own, walker) in walkers.iter().enumerate() {
                 let Some(state) = walker.state_at(time_ns) else { continue };
-                let ue = site.ue.on_body(state.position_m, state.heading_rad, state.height_m);
+                let on_body = site.ue.on_body(state.position_m, state.heading_rad, state.height_m);
+                let ue = on_body + DVec3::Z * state.floor_m;
                 let cuts = |i: usize| self.meshes[i].blocks(walkers[i].surface(), start, ue);
                 let inside = self.meshes[own].holds(walker.surface(), ue);
                 links.push(LinkTruth {
