@@ -34,6 +34,8 @@ const BIRTH_RADIUS_M: f64 = 0.45;
 const BIRTH_BESIDE_SEEN_M: f64 = 0.30;
 const CROWD_PEOPLE: usize = 3;
 const CROWD_M: f64 = 1.0;
+/// What shows little this near to one person, and to nobody else, may be an arm: half the span of a tall one's arms.
+const ARM_REACH_M: f64 = 0.95;
 /// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it.
 const DUPLICATE_M: f64 = 0.3;
 /// Nobody walks faster: spares most pairs the rest.
@@ -249,7 +251,14 @@ impl MixtureTracker {
                 .copied()
                 .chain(furniture_m)
                 .any(|place| place.distance(detection.position_m) < BESIDE_M);
-            let mut person = Person::born(numbers, *next_id, detection, time_ns, beside);
+            let mut around = people.iter().zip(&*places_m).filter(|(person, place)| {
+                person.confirmed && place.distance(detection.position_m) < ARM_REACH_M
+            });
+            let on_trial = match (around.next(), around.next()) {
+                (Some((person, _)), None) => person.may_own(detection),
+                _ => false,
+            };
+            let mut person = Person::born(numbers, *next_id, detection, time_ns, beside, on_trial);
             let measured_ns = measured_ns(detection, i64::MIN, time_ns);
             person.predict(numbers, seconds(measured_ns, time_ns));
             places_m.push(detection.position_m);

@@ -29,6 +29,9 @@ const EXISTENCE_MIN: f64 = 0.05;
 /// So many detections confirm a track, within a time: two of three frames at 10 Hz.
 const CONFIRMING_MATCHES: u32 = 2;
 const CONFIRM_WITHIN_S: f64 = 0.25;
+/// The same of who may be an arm of somebody beside: arms do not stay.
+const CONFIRMING_MATCHES_ON_TRIAL: u32 = 8;
+const CONFIRM_WITHIN_ON_TRIAL_S: f64 = 1.0;
 /// A track is not reported as confirmed while its position, one standard deviation of the larger axis, is less sure:
 /// who has been out of sight so long is more likely elsewhere. It is kept, to be known again.
 const REPORTED_SIGMA_MAX_M: f64 = 0.6;
@@ -42,6 +45,8 @@ const DUPLICATE_AFTER_S: f64 = 0.5;
 const HIDDEN_NOISE_M: f64 = 0.25;
 /// Furniture is known to the background once it is no longer found.
 const FURNITURE_GONE_S: f64 = 0.5;
+/// Of a body's points an arm has fewer than this share.
+const ARM_SHARE: f64 = 0.5;
 /// Mean standing height of adults in shoes.
 const HEIGHT_MEAN_M: f64 = 1.72;
 /// Time over which the width of a box is averaged.
@@ -56,6 +61,8 @@ pub(super) struct Person {
     pub(super) filter: Filter,
     limb_phase: LimbPhase,
     pub(super) confirmed: bool,
+    /// Born so near to somebody, showing so little, that it may be an arm.
+    on_trial: bool,
     /// Probability that somebody is there.
     pub(super) existence: f64,
     pub(super) matches: u32,
@@ -78,6 +85,7 @@ impl Remembered for Person {
         self.filter.visit(words);
         self.limb_phase.visit(words);
         words.bool(&mut self.confirmed);
+        words.bool(&mut self.on_trial);
         words.f64(&mut self.existence);
         words.u32(&mut self.matches);
         words.f64(&mut self.doubled_s);
@@ -93,18 +101,20 @@ impl Remembered for Person {
 }
 
 impl Person {
-    /// Somebody new, or a part of furniture that stands beside.
+    /// Somebody new, or a part of furniture or of somebody that stands beside.
     pub(super) fn born(
         numbers: &Numbers,
         id: u64,
         detection: &Detection,
         time_ns: i64,
         beside_furniture: bool,
+        on_trial: bool,
     ) -> Self {
         let noise = plus(noise(numbers, detection, &BodyView::default()), sway(numbers));
         let variance = noise[0][0].max(noise[1][1]);
         let mut person = Self::new(numbers, id, detection.position_m, variance, time_ns);
         person.origin = Origin::new(detection.position_m, time_ns, beside_furniture);
+        person.on_trial = on_trial;
         person.see(numbers, detection, &BodyView::default(), 0.0);
         person
     }
@@ -120,6 +130,7 @@ impl Person {
             filter: Filter::new(numbers, position_m, variance_m2),
             limb_phase: LimbPhase::default(),
             confirmed: false,
+            on_trial: false,
             existence: EXISTENCE_AT_BIRTH,
             matches: 1,
             doubled_s: 0.0,
@@ -158,7 +169,8 @@ impl Person {
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.matches += 1;
         self.last_match_ns = time_ns;
-        self.confirmed |= self.matches >= CONFIRMING_MATCHES;
+        let enough = if self.on_trial { CONFIRMING_MATCHES_ON_TRIAL } else { CONFIRMING_MATCHES };
+        self.confirmed |= self.matches >= enough;
         self.see(numbers, detection, view, step_s);
     }
 
@@ -176,7 +188,11 @@ impl Person {
             || spread[0][0] + spread[1][1] >= POSITION_VARIANCE_MAX_M2
             || self.doubled_s > DUPLICATE_AFTER_S
             || self.origin.is_furniture(time_ns) && seconds(self.last_match_ns, time_ns) > FURNITURE_GONE_S
-            || !self.confirmed && self.origin.age_s(time_ns) > CONFIRM_WITHIN_S
+            || !self.confirmed && self.origin.age_s(time_ns) > self.confirm_within_s()
+    }
+
+    fn confirm_within_s(&self) -> f64 {
+        if self.on_trial { CONFIRM_WITHIN_ON_TRIAL_S } else { CONFIRM_WITHIN_S }
     }
 
     /// Where it stands, if it is furniture.
@@ -187,6 +203,11 @@ impl Person {
     /// Whether it has a detection in this frame.
     pub(super) fn is_seen(&self) -> bool {
         self.points > 0
+    }
+
+    /// Whether so few points may be of an arm of this body, which shows more in this frame.
+    pub(super) fn may_own(&self, detection: &Detection) -> bool {
+        f64::from(detection.points) < ARM_SHARE * f64::from(self.points)
     }
 
     /// The body that others may hide behind.
