@@ -25,6 +25,11 @@ const OWN_M: f64 = 0.5;
 const SEATED_DIAGONAL_MAX_M: f64 = 1.5;
 const SEATED_HEIGHT_M: f64 = 1.5;
 
+/// Somebody known whose arms are stretched out is as long as tall at most; of that the part below this share of what is
+/// seen is no longer than a stride.
+const ARMS_OUT_M: f64 = 2.1;
+const HIPS_SHARE: f64 = 0.4;
+
 /// What has the size of a person: both ends excluded, but of the points.
 #[derive(Debug, Clone)]
 struct Size {
@@ -132,7 +137,7 @@ impl Measurer {
         let mut seen = std::mem::take(&mut self.seen);
         for cluster in clusters {
             let aabb = self.above_floor(points, cluster).1;
-            let expected = self.is_expected(&aabb, priors);
+            let expected = self.is_expected(points, cluster, &aabb, priors);
             // Legs are somebody only where nobody is known.
             let full_body = self.has_size_of_person(cluster.len(), &aabb)
                 && !(expected && aabb.max_m.z < FULL_BODY_TOP_M);
@@ -164,18 +169,29 @@ impl Measurer {
     }
 
     /// True for what may be a part of somebody who is expected there.
-    fn is_expected(&self, aabb: &Aabb, priors: &[Prior]) -> bool {
+    fn is_expected(&self, points: &[Point], cluster: &[u32], aabb: &Aabb, priors: &[Prior]) -> bool {
         let (length_m, middle_m) = (diagonal_m(aabb), aabb.center_m().truncate());
+        let arms_m = if self.arms_out(points, cluster, aabb) { ARMS_OUT_M } else { self.size.diagonal_m[1] };
         // A wheelchair is longer than a stride, and who sits in it lower than who walks.
         let longest_m = |prior: &Prior| match self.seated && prior.height_m < SEATED_HEIGHT_M {
             true => SEATED_DIAGONAL_MAX_M,
-            false => self.size.diagonal_m[1],
+            false => arms_m,
         };
         let near = |prior: &Prior| {
             let reach_m = EXPECTED_M + prior.position_sigma_m.min(EXPECTED_M);
             prior.confirmed && prior.position_m.distance(middle_m) < reach_m && length_m < longest_m(prior)
         };
         aabb.max_m.z < self.size.top_m[1] && priors.iter().any(near)
+    }
+
+    /// True where what is longer than a stride is so above the hips alone, and stands on something.
+    fn arms_out(&self, points: &[Point], cluster: &[u32], aabb: &Aabb) -> bool {
+        if !self.seated || diagonal_m(aabb) < self.size.diagonal_m[1] {
+            return false;
+        }
+        let hips_m = aabb.min_m.z + HIPS_SHARE * aabb.size_m().z;
+        let low = cluster.iter().map(|&i| points[i as usize].position_m).filter(|p| p.z < hips_m);
+        low.clone().next().is_some() && diagonal_m(&Aabb::around(low)) < self.size.diagonal_m[1]
     }
 
     /// Of points that are one person's, whatever their size; at least one.

@@ -34,8 +34,10 @@ const BIRTH_RADIUS_M: f64 = 0.45;
 const BIRTH_BESIDE_SEEN_M: f64 = 0.30;
 const CROWD_PEOPLE: usize = 3;
 const CROWD_M: f64 = 1.0;
-/// What shows little this near to one person, and to nobody else, may be an arm: half the span of a tall one's arms.
+/// What shows little this near to one person may be an arm: half the span of a tall one's arms. Not where somebody else is
+/// known as near as [`ALONE_M`]: in a crowd people do show that little.
 const ARM_REACH_M: f64 = 0.95;
+const ALONE_M: f64 = 2.0;
 /// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it.
 const DUPLICATE_M: f64 = 0.3;
 /// Nobody walks faster: spares most pairs the rest.
@@ -252,10 +254,12 @@ impl MixtureTracker {
                 .chain(furniture_m)
                 .any(|place| place.distance(detection.position_m) < BESIDE_M);
             let mut around = people.iter().zip(&*places_m).filter(|(person, place)| {
-                person.confirmed && place.distance(detection.position_m) < ARM_REACH_M
+                person.confirmed && place.distance(detection.position_m) < ALONE_M
             });
             let on_trial = match (around.next(), around.next()) {
-                (Some((person, _)), None) => person.may_own(detection),
+                (Some((person, place)), None) => {
+                    place.distance(detection.position_m) < ARM_REACH_M && person.may_own(detection)
+                }
                 _ => false,
             };
             let mut person = Person::born(numbers, *next_id, detection, time_ns, beside, on_trial);
