@@ -24,6 +24,8 @@ const ONE_PERSON_M: f64 = 0.33;
 const LIMB_M: f64 = 0.55;
 /// Low: its top is below this share of the person's, for a leg ends below the hip.
 const LIMB_TOP_SHARE: f64 = 0.55;
+/// Nobody else near: an arm may be looked for.
+const ALONE_M: f64 = 2.0;
 /// Passes of k-means; it settles in three or four.
 const PASSES: usize = 10;
 /// How sure a known person's place is at most where pieces are given away, and in a crowd: there a track that took a
@@ -90,11 +92,13 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
     }
     let mut people = guided.unwrap_or_else(|| vec![all.clone()]);
     // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
-    // are never counted: two of them may be one person or two. Nor are arms.
+    // are never counted: two of them may be one person or two. Nor are the halves of somebody alone with his arms out.
     while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
         && are_people(&more, HALVES_M)
         && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
-        && !(known.len() < 2 && are_of_one_body(moved_m, &more, known.len() == 1))
+        && !(more.len() == 2
+            && expected_near(&all, &all, priors) < 2
+            && are_of_one_body(moved_m, &more, known.len() == 1))
     {
         people = more;
     }
@@ -265,21 +269,17 @@ fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> boo
     if apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m {
         return true;
     }
-    let may_be_arm =
-        |is_known: bool| is_arm(moved_m, small, large, is_known) || is_arm(moved_m, large, small, is_known);
-    // Whose body is known may be told from less, so what is no arm of such a one is nobody's.
-    may_be_arm(true)
-        && match expected_near(small, large, priors) {
-            0 => may_be_arm(false),
-            known => known == 1,
-        }
+    // Who is not known has no arms here, for strangers who stand close show as little of themselves.
+    (is_arm(moved_m, small, large, true) || is_arm(moved_m, large, small, true))
+        && expected_near(small, large, priors) == 1
 }
 
-/// How many confirmed people are expected within an arm's reach of two parts.
+/// How many confirmed people are expected so near to two parts that these may be some of them: in a crowd one shows as
+/// little of himself as an arm.
 fn expected_near(a: &Part, b: &Part, priors: &[Prior]) -> usize {
     let is_near = |prior: &&Prior| {
         let off_m = |part: &Part| prior.position_m.distance(part.mean_m());
-        prior.confirmed && off_m(a).min(off_m(b)) < ARM_M
+        prior.confirmed && off_m(a).min(off_m(b)) < ALONE_M
     };
     priors.iter().filter(is_near).count()
 }

@@ -253,9 +253,10 @@ impl MixtureTracker {
                 .copied()
                 .chain(furniture_m)
                 .any(|place| place.distance(detection.position_m) < BESIDE_M);
-            let mut around = people.iter().zip(&*places_m).filter(|(person, place)| {
-                person.confirmed && place.distance(detection.position_m) < ALONE_M
-            });
+            let mut around = people
+                .iter()
+                .zip(&*places_m)
+                .filter(|(person, place)| person.confirmed && place.distance(detection.position_m) < ALONE_M);
             let on_trial = match (around.next(), around.next()) {
                 (Some((person, place)), None) => {
                     place.distance(detection.position_m) < ARM_REACH_M && person.may_own(detection)
