@@ -7,8 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
-use umbracast::{Error, Site};
+use umbracast::Error;
 use umbracast_io::fields;
 use umbracast_io::nodes::NodeHealth;
 use zenoh::{Session, Wait};
@@ -78,13 +77,6 @@ impl Hall {
         }
         counts.into_iter().rev().max_by_key(|&(_, count)| count).map(|(site, _)| site)
     }
-}
-
-/// A number by which nodes see that they were given the same site: the first bytes of a digest of all that it says.
-pub fn site_number(site: &Site) -> u64 {
-    let text = serde_json::to_vec(site).unwrap_or_default(); // Plain data: cannot fail.
-    let digest = Sha256::digest(&text);
-    digest.iter().take(8).fold(0, |number, &byte| number << 8 | u64::from(byte))
 }
 
 /// What tokens and words of health say together. A word comes with its key; of one node the later replaces the earlier.
@@ -211,6 +203,7 @@ pub fn json(halls: &BTreeMap<String, Hall>) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::share::site_number;
     use umbracast::Config;
 
     fn word(key: &str, time_ns: i64, cpu_s: f64, frames_skipped: u64) -> (String, NodeHealth) {

@@ -21,12 +21,11 @@ use zenoh::pubsub::Subscriber;
 
 use crate::back::{Back, Counted};
 use crate::chain::Row;
-use crate::fleet;
 use crate::front::{Expected, Front, takes_clouds};
 use crate::hall::{Hall, Outlet, Urgency};
 use crate::role::Role;
 use crate::ros2;
-use crate::share::{Shared, Sharing, keep_state};
+use crate::share::{Shared, Sharing, keep_state, site_number};
 use crate::watch::Watch;
 
 /// Packets that wait for the front end: a second of four HDL-32E.
@@ -186,7 +185,7 @@ impl Node {
             drivers: Vec::new(),
             recorder,
             record_status,
-            site: fleet::site_number(&config.site),
+            site: site_number(&config.site),
             started_ns: clock.now_ns(),
             clock,
             health: Vec::new(),

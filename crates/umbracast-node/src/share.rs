@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use sha2::{Digest, Sha256};
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_io::messages;
@@ -139,4 +140,11 @@ pub fn empty_frames(site: &Site, packets: &[Vec<Packet>]) -> Result<Vec<Frame>, 
     frames.extend(std::iter::from_fn(|| assembler.pop()));
     frames.iter_mut().flat_map(|frame| &mut frame.scans).for_each(|scan| scan.sensor = own[scan.sensor]);
     Ok(frames)
+}
+
+/// A number by which nodes see that they were given the same site: the first bytes of a digest of all that it says.
+pub fn site_number(site: &Site) -> u64 {
+    let text = serde_json::to_vec(site).unwrap_or_default(); // Plain data: cannot fail.
+    let digest = Sha256::digest(&text);
+    digest.iter().take(8).fold(0, |number, &byte| number << 8 | u64::from(byte))
 }
