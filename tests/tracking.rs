@@ -233,6 +233,31 @@ fn pieces_of_a_person_keep_a_track_and_start_none() {
 }
 
 #[test]
+fn a_hand_that_shows_apart_is_nobody_and_who_stays_beside_is_somebody() {
+    let config = Config::for_mode(Mode::Default).track;
+    let told = |beside_m: f64, points: u32, frames: std::ops::Range<u64>| {
+        let mut tracker = Tracker::new(&config, &open_site());
+        let (mut tracks, mut most) = (Vec::new(), 0);
+        for k in 0..30 {
+            let frame = frame(k);
+            let somebody = |x_m: f64, points: u32| Detection {
+                points,
+                ..detection(DVec2::new(x_m, 8.0), frame.time_ns)
+            };
+            let mut detections = vec![somebody(0.0, 100)];
+            detections.extend(frames.contains(&k).then(|| somebody(beside_m, points)));
+            tracker.update(&Views::of(&frame), &detections, &mut tracks);
+            most = most.max(tracks.iter().filter(|track| track.confirmed).count());
+        }
+        most
+    };
+    assert_eq!(told(0.7, 10, 10..15), 1, "half a second of a hand");
+    assert_eq!(told(0.7, 10, 10..25), 2, "who has come out from behind");
+    assert_eq!(told(0.7, 80, 10..13), 2, "a body beside");
+    assert_eq!(told(1.2, 10, 10..13), 2, "out of an arm's reach");
+}
+
+#[test]
 fn somebody_who_leaves_is_forgotten_within_half_a_second() {
     let config = Config::for_mode(Mode::Default).track;
     let mut tracker = Tracker::new(&config, &open_site());

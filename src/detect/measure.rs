@@ -25,10 +25,11 @@ const OWN_M: f64 = 0.5;
 const SEATED_DIAGONAL_MAX_M: f64 = 1.5;
 const SEATED_HEIGHT_M: f64 = 1.5;
 
-/// Somebody known whose arms are stretched out is as long as tall at most; of that the part below this share of what is
-/// seen is no longer than a stride.
+/// Somebody known whose arms are stretched out is as long as tall at most. What is below this share of it is legs that stand,
+/// which take up less than this.
 const ARMS_OUT_M: f64 = 2.1;
 const HIPS_SHARE: f64 = 0.4;
+const LEGS_M: f64 = 0.9;
 
 /// What has the size of a person: both ends excluded, but of the points.
 #[derive(Debug, Clone)]
@@ -184,14 +185,14 @@ impl Measurer {
         aabb.max_m.z < self.size.top_m[1] && priors.iter().any(near)
     }
 
-    /// True where what is longer than a stride is so above the hips alone, and stands on something.
+    /// True where what is longer than a stride is so above the hips alone, and stands on legs.
     fn arms_out(&self, points: &[Point], cluster: &[u32], aabb: &Aabb) -> bool {
         if !self.seated || diagonal_m(aabb) < self.size.diagonal_m[1] {
             return false;
         }
         let hips_m = aabb.min_m.z + HIPS_SHARE * aabb.size_m().z;
         let low = cluster.iter().map(|&i| points[i as usize].position_m).filter(|p| p.z < hips_m);
-        low.clone().next().is_some() && diagonal_m(&Aabb::around(low)) < self.size.diagonal_m[1]
+        low.clone().next().is_some() && diagonal_m(&Aabb::around(low)) < LEGS_M
     }
 
     /// Of points that are one person's, whatever their size; at least one.
@@ -375,6 +376,35 @@ mod tests {
     #[test]
     fn who_sits_in_a_wheelchair_is_not_too_long_once_known() {
         assert_eq!((found_of_a_wheelchair(1.34), found_of_a_wheelchair(1.75)), (1, 0));
+    }
+
+    #[test]
+    fn somebody_known_is_found_with_both_arms_stretched_out_and_a_table_is_not() {
+        let body = (0..30).map(|k| DVec3::new(0.1 * f64::from(k % 3), 0.1, 0.05 * f64::from(k) + 0.1));
+        let span = |z_m: f64| (0..20).map(move |k| DVec3::new(0.09 * f64::from(k) - 0.8, 0.1, z_m));
+        let found = |span_z_m: f64, known: bool| {
+            let points: Vec<Point> = body
+                .clone()
+                .chain(span(span_z_m))
+                .map(|position_m| Point { position_m, time_ns: 0, sensor: 0 })
+                .collect();
+            let prior = Prior {
+                position_m: DVec2::splat(0.1),
+                velocity_mps: DVec2::ZERO,
+                position_sigma_m: 0.05,
+                height_m: 1.7,
+                confirmed: true,
+                is_furniture: false,
+            };
+            let config = Config::default();
+            let mut detections = Vec::new();
+            let priors = if known { vec![prior] } else { Vec::new() };
+            let cluster: Cluster = (0..points.len() as u32).collect();
+            let mut measurer = Measurer::new(&config.detect, &config.site);
+            measurer.detections(&points, &[cluster], &priors, &mut detections);
+            detections.len()
+        };
+        assert_eq!([found(1.4, true), found(1.4, false), found(0.4, true)], [1, 0, 0]);
     }
 
     #[test]

@@ -17,6 +17,7 @@ pub mod chain;
 pub mod back;
 pub mod watch;
 pub mod share;
+pub mod summary;
 pub mod node;
 pub mod fleet;
 

@@ -26,6 +26,7 @@ use crate::hall::{Hall, Outlet, Urgency};
 use crate::role::Role;
 use crate::ros2;
 use crate::share::{Shared, Sharing, keep_state, site_number};
+use crate::summary::{Summary, load};
 use crate::watch::Watch;
 
 /// Packets that wait for the front end: a second of four HDL-32E.
@@ -72,39 +73,6 @@ pub enum Source {
     Ros2(u32, Vec<(usize, String)>),
     /// A recording, so many times as fast as it was, once front ends of all sensors and all stages are there.
     Replay(Box<dyn Iterator<Item = Arrived> + Send>, f64),
-}
-
-/// A node's account.
-#[derive(Debug, Clone, Default)]
-pub struct Summary {
-    /// Packets, or clouds, that came.
-    pub packets: u64,
-    /// Those that were given up because the front end was busy.
-    pub packets_lost: u64,
-    /// Frames of the front end, of the stages, or told to those who look on.
-    pub frames: u64,
-    /// Messages that were given up because the stages were busy.
-    pub skipped: u64,
-    /// Frames that waited in vain for a front end, or of which a part did not come.
-    pub incomplete: u64,
-    /// Messages that came too late.
-    pub late: u64,
-    /// Messages that were not understood.
-    pub broken: u64,
-    /// Frames for which the priors did not come in time.
-    pub priors_late: u64,
-    /// Messages published, and their bytes.
-    pub published: (u64, u64),
-    /// From the close of a frame to the results of the last stage.
-    pub latency: Latencies,
-    /// Of that what was not spent in a stage.
-    pub wire: Latencies,
-    /// Whether it leads.
-    pub leads: bool,
-    /// What was skipped since the start.
-    pub health: Health,
-    /// The recorder's.
-    pub recorded: RecordStatus,
 }
 
 /// A running node.
@@ -512,18 +480,6 @@ fn all_there(hall: &Hall, sensors: &[String]) -> bool {
 
 fn has_any(stages: &[Role], any: &[Role]) -> bool {
     stages.iter().any(|stage| any.contains(stage))
-}
-
-/// Seconds of processor time and bytes held, where the system says so (Linux does).
-fn load() -> Option<(f64, u64)> {
-    /// Ticks a second and bytes a page of every Linux that Rust runs on.
-    const TICKS_PER_S: f64 = 100.0;
-    const PAGE_BYTES: u64 = 4096;
-    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks: f64 = fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;
-    let pages: u64 = fields.get(21)?.parse().ok()?;
-    Some((ticks / TICKS_PER_S, pages * PAGE_BYTES))
 }
 
 /// What a thread that panicked left is whole: every change is one assignment.

@@ -17,9 +17,9 @@ use umbracast_live::run::{Counters, Listener};
 use umbracast_node::hall::Hall;
 use umbracast_node::keys::Keys;
 use umbracast_node::network::{self, Mode, Network};
-use umbracast_node::node::Summary;
 use umbracast_node::role::Role;
 use umbracast_node::share::{self, Shared};
+use umbracast_node::summary::Summary;
 use umbracast_node::{Node, Settings, Source};
 
 use super::live;
