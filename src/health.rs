@@ -40,6 +40,8 @@ pub struct Health {
     /// Times that a sensor was found to hang elsewhere than it was thought to, by the floor and the walls it sees. Its pose is
     /// put right while the program runs; `umbracast calibrate` puts it right in the site file.
     pub sensors_moved: u64,
+    /// Times that sensors' clocks were found apart, by the people who walk before several of them, and put right.
+    pub clocks_corrected: u64,
 }
 
 impl Health {
@@ -76,5 +78,6 @@ impl Health {
         self.points_over_limit += other.points_over_limit;
         self.frames_with_fewer_samples += other.frames_with_fewer_samples;
         self.sensors_moved += other.sensors_moved;
+        self.clocks_corrected += other.clocks_corrected;
     }
 }

@@ -9,7 +9,7 @@
 use std::borrow::Cow;
 
 use crate::config::DetectConfig;
-use crate::geometry::{DMat3, DVec2, DVec3, Pose};
+use crate::geometry::{DMat3, DVec2, DVec3, Pose, cholesky};
 use crate::lidar::{Cloud, Frame, RangeImage, Scan};
 use crate::site::Hall;
 use crate::{Health, Site};
@@ -299,25 +299,6 @@ fn solved(sums: &[Sums], by: &Six, surfaces: &[Surface]) -> Option<Six> {
         }
     }
     cholesky(matrix, right)
-}
-
-/// Solves a positive definite system.
-fn cholesky(mut a: [Six; 6], mut x: Six) -> Option<Six> {
-    for i in 0..6 {
-        for j in 0..=i {
-            let sum: f64 = (0..j).map(|k| a[i][k] * a[j][k]).sum();
-            let left = a[i][j] - sum;
-            if i == j && left <= 0.0 {
-                return None;
-            }
-            a[i][j] = if i == j { left.sqrt() } else { left / a[j][j] };
-        }
-        x[i] = (x[i] - (0..i).map(|k| a[i][k] * x[k]).sum::<f64>()) / a[i][i];
-    }
-    for i in (0..6).rev() {
-        x[i] = (x[i] - (i + 1..6).map(|k| a[k][i] * x[k]).sum::<f64>()) / a[i][i];
-    }
-    Some(x)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The page: one line a stage.
 
 use crate::blockage::{Blockage, Caster};
-use crate::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point, Prior};
+use crate::detect::{Background, Clocks, Cluster, Clusterer, Detection, Measurer, Point, Prior};
 use crate::forecast::{Forecast, Forecaster, Weights};
 use crate::lidar::Views;
 use crate::mounting::Mountings;
@@ -84,6 +84,7 @@ pub struct Pipeline {
     /// None where the configuration has sensors hang as the site says, whatever they see.
     mountings: Mountings,
     background: Background,
+    clocks: Clocks,
     clusterer: Clusterer,
     measurer: Measurer,
     views: Views,
@@ -110,6 +111,7 @@ impl Pipeline {
         Ok(Self {
             mountings: Mountings::new(&config.detect, &config.site),
             background: Background::new(&config.detect, &config.site),
+            clocks: Clocks::new(&config.detect, &config.site),
             clusterer: Clusterer::new(&config.detect, &config.site),
             measurer: Measurer::new(&config.detect, &config.site),
             views: Views::default(),
@@ -161,14 +163,29 @@ impl Pipeline {
         self.mountings.moved().iter().for_each(|&sensor| self.background.forget(sensor));
         self.tracker.priors(frame.time_ns, &mut self.priors);
         self.background.foreground(frame, &self.priors, &mut o.health, &mut o.foreground);
+        self.clocks.put_right(&mut o.foreground);
         self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);
+        self.clocks.follow(&o.foreground, &o.clusters, &self.priors);
         self.measurer.detections(&o.foreground, &o.clusters, &self.priors, &mut o.detections);
         self.views.take(frame);
         self.tracker.update(&self.views, &o.detections, &mut o.tracks);
         self.forecaster.forecast(&o.tracks, &mut o.forecasts);
         self.caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
+        o.health.clocks_corrected = self.clocks.corrected();
         o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());
         o
+    }
+
+    /// How far sensors' clocks were found apart.
+    ///
+    /// ```
+    /// use umbracast::{Config, Pipeline};
+    ///
+    /// assert_eq!(Pipeline::new(&Config::default(), None)?.clocks().corrected(), 0, "nothing was seen");
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    pub fn clocks(&self) -> &Clocks {
+        &self.clocks
     }
 
     /// From the next step on links are those of this configuration's access points, UE and stage 3; everybody stays

@@ -58,6 +58,7 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         covariance,
         heading_rad: 0.0,
         heading_sigma_rad: 0.0,
+        heading_behind: 0.0,
         height_m: HEIGHT_M,
         height_sigma_m: 0.0,
         width_scale: 1.0,

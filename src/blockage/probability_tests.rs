@@ -34,6 +34,7 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
         covariance,
         heading_rad: within(3.0),
         heading_sigma_rad: 0.3,
+        heading_behind: 0.0,
         height_m: 1.7 + within(0.3),
         height_sigma_m: 0.03,
         width_scale: 1.0 + within(0.1),

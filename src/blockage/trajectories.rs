@@ -216,6 +216,12 @@ impl Trajectories {
             &mut self.turn_rad,
             drifts().zip(&draws.heading).map(|((x, y), z)| (vx * y - vy * x) * per2 + turn_sigma_rad * z),
         );
+        if !walks && track.heading_behind > 0.0 {
+            // The phase of who stands turns nothing: its draw is free.
+            let behind = track.heading_behind as f32;
+            let turned = self.turn_rad.iter_mut().zip(&draws.phase).filter(|(_, share)| **share < behind);
+            turned.for_each(|(turn_rad, _)| *turn_rad += std::f32::consts::PI);
+        }
     }
 
     /// How far the samples and their bodies reach.

@@ -1,7 +1,7 @@
 //! One person more, or one fewer? A cluster is split as long as its parts lie farther apart than the halves of one
 //! body, and parts nearer than two bodies can stand become one. Where people are expected moves both thresholds.
 
-use super::arms::{ARM_M, have_one_head, is_arm};
+use super::arms::{ALONE_M, ARM_M, have_one_head, is_arm};
 use super::guided::owners;
 use super::part::Part;
 use super::{Cluster, Prior};
@@ -24,8 +24,6 @@ const ONE_PERSON_M: f64 = 0.33;
 const LIMB_M: f64 = 0.55;
 /// Low: its top is below this share of the person's, for a leg ends below the hip.
 const LIMB_TOP_SHARE: f64 = 0.55;
-/// Nobody else near: an arm may be looked for.
-const ALONE_M: f64 = 2.0;
 /// Passes of k-means; it settles in three or four.
 const PASSES: usize = 10;
 /// How sure a known person's place is at most where pieces are given away, and in a crowd: there a track that took a
@@ -97,7 +95,7 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
         && are_people(&more, HALVES_M)
         && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
         && !(more.len() == 2
-            && expected_near(&all, &all, priors) < 2
+            && expected_near(&[&all], priors) < 2
             && are_of_one_body(moved_m, &more, known.len() == 1))
     {
         people = more;
@@ -271,15 +269,13 @@ fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> boo
     }
     // Who is not known has no arms here, for strangers who stand close show as little of themselves.
     (is_arm(moved_m, small, large, true) || is_arm(moved_m, large, small, true))
-        && expected_near(small, large, priors) == 1
+        && expected_near(&[small, large], priors) == 1
 }
 
-/// How many confirmed people are expected so near to two parts that these may be some of them: in a crowd one shows as
-/// little of himself as an arm.
-fn expected_near(a: &Part, b: &Part, priors: &[Prior]) -> usize {
+/// How many confirmed people are expected so near to any of these that none of them is alone.
+fn expected_near(parts: &[&Part], priors: &[Prior]) -> usize {
     let is_near = |prior: &&Prior| {
-        let off_m = |part: &Part| prior.position_m.distance(part.mean_m());
-        prior.confirmed && off_m(a).min(off_m(b)) < ALONE_M
+        prior.confirmed && parts.iter().any(|part| prior.position_m.distance(part.mean_m()) < ALONE_M)
     };
     priors.iter().filter(is_near).count()
 }

@@ -43,19 +43,9 @@ pub struct Seen {
 }
 
 impl AxisFeatures {
-    /// Looks at a person's points, who stands on a floor at `floor_m`. `velocity_mps` is the person's, where it is known.
+    /// Looks at a person's points, who stands on a floor at `floor_m`. `velocity_mps` is the person's, where it is known;
+    /// `seen` is memory.
     pub fn new<'a>(
-        points: impl Iterator<Item = &'a Point> + Clone,
-        sensors_m: &[DVec3],
-        floor_m: f64,
-        shift_m: f64,
-        velocity_mps: Option<DVec2>,
-    ) -> Self {
-        Self::within(&mut Vec::new(), points, sensors_m, floor_m, shift_m, velocity_mps)
-    }
-
-    /// The same in some memory.
-    pub fn within<'a>(
         seen: &mut Vec<Seen>,
         points: impl Iterator<Item = &'a Point> + Clone,
         sensors_m: &[DVec3],
@@ -257,7 +247,8 @@ mod tests {
     }
 
     fn position_m(points: &[Point], velocity_mps: DVec2) -> DVec2 {
-        let view = AxisFeatures::new(points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
+        let view =
+            AxisFeatures::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
         AxisModel::shipped().locate(&view).0
     }
 

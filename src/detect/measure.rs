@@ -23,7 +23,7 @@ const HEAD_M: f64 = 0.2;
 const OWN_M: f64 = 0.5;
 /// A wheelchair is 1.3 m from corner to corner, and who sits in one reaches no higher than this.
 const SEATED_DIAGONAL_MAX_M: f64 = 1.5;
-const SEATED_HEIGHT_M: f64 = 1.5;
+pub(crate) const SEATED_HEIGHT_M: f64 = 1.5;
 
 /// Somebody known whose arms are stretched out is as long as tall at most. What is below this share of it is legs that stand,
 /// which take up less than this.
@@ -187,7 +187,7 @@ impl Measurer {
 
     /// True where what is longer than a stride is so above the hips alone, and stands on legs.
     fn arms_out(&self, points: &[Point], cluster: &[u32], aabb: &Aabb) -> bool {
-        if !self.seated || diagonal_m(aabb) < self.size.diagonal_m[1] {
+        if diagonal_m(aabb) < self.size.diagonal_m[1] {
             return false;
         }
         let hips_m = aabb.min_m.z + HIPS_SHARE * aabb.size_m().z;
@@ -266,7 +266,7 @@ impl Measurer {
             seen.clone().map(|p| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
         let velocity_mps = nearest(mean_m, priors).map(|prior| prior.velocity_mps);
         let floor_m = self.hall.floor_m(mean_m);
-        AxisFeatures::within(memory, seen, &self.sensors_m, floor_m, SHIFT_M, velocity_mps)
+        AxisFeatures::new(memory, seen, &self.sensors_m, floor_m, SHIFT_M, velocity_mps)
     }
 }
 

@@ -21,14 +21,18 @@ mod split_merge;
 pub mod axis;
 mod limbs;
 mod measure;
+mod clocks;
 mod doubled;
 
+pub(crate) use arms::{ALONE_M, ARM_SHARE};
 pub use background::Background;
 #[doc(hidden)] // For who joins the foreground of several front ends.
 pub use background::keep_most;
+pub use clocks::Clocks;
 pub use doubled::doubled;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
+pub(crate) use measure::SEATED_HEIGHT_M;
 #[doc(hidden)] // For the card of the model of the body axis.
 pub use measure::SHIFT_M;
 pub use split_merge::Clusterer;

@@ -212,6 +212,7 @@ pub(super) mod tests {
             covariance: [[0.01; 4]; 4],
             heading_rad: 0.0,
             heading_sigma_rad: 0.0,
+            heading_behind: 0.0,
             height_m: 1.75,
             height_sigma_m: 0.0,
             width_scale: 1.0,

@@ -3,10 +3,12 @@
 mod pose;
 mod aabb;
 mod obb;
+mod linear;
 #[doc(hidden)] // For the truth, the ladder and the benchmark; a user asks the caster.
 pub mod slab;
 
 pub use aabb::Aabb;
 pub use glam::{DMat3, DVec2, DVec3};
+pub(crate) use linear::cholesky;
 pub use obb::Obb;
 pub use pose::Pose;

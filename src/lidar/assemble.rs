@@ -60,6 +60,8 @@ pub struct Assembler {
     shared_shift_ns: i64,
     /// Those of the packet at hand.
     columns: Columns,
+    /// Whether the packet taken last has given something to the frame that it closed.
+    gave: bool,
 }
 
 /// Columns with a range and a reflectivity a beam.
@@ -69,6 +71,9 @@ struct Columns {
     range_m: Vec<f32>,
     reflectivity: Vec<u8>,
 }
+
+/// Columns come as evenly as this, as a share of their period.
+const HAIR: f64 = 0.01;
 
 /// What the assembler knows of one sensor.
 #[derive(Debug)]
@@ -126,6 +131,7 @@ impl Assembler {
             leap_ns: None,
             shared_shift_ns: 0,
             columns: Columns::default(),
+            gave: false,
         })
     }
 
@@ -181,12 +187,28 @@ impl Assembler {
         self.leap_ns = None;
         self.origin_ns = Some(origin_ns);
         intake.clock.shift_ns = shift_ns;
-        intake.clock.newest_ns = intake.clock.newest_ns.max(Some(last_ns));
+        let before_ns = intake.clock.newest_ns;
+        intake.clock.newest_ns = before_ns.max(Some(last_ns));
         if !jumped {
             self.now = Some((first_ns, received_ns));
         }
-        self.store(sensor, &model, health);
+        let (next, number) = (self.next, frame_number(self.origin_ns, first_ns));
+        self.store(sensor, &model, before_ns, health);
         self.close_ready(health);
+        self.gave = (next..self.next).contains(&number);
+    }
+
+    /// Whether the packet that was pushed last gave something to a frame that it closed: else that frame had been whole since
+    /// the packet before.
+    ///
+    /// ```
+    /// use umbracast::{Config, lidar::Assembler};
+    ///
+    /// assert!(!Assembler::new(&Config::default().site)?.closed_by_its_own(), "nothing was pushed");
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    pub fn closed_by_its_own(&self) -> bool {
+        self.gave
     }
 
     /// The next closed frame.
@@ -222,14 +244,20 @@ impl Assembler {
         }
     }
 
-    /// Puts the columns of the packet at hand into their frames.
-    fn store(&mut self, sensor: usize, model: &Model, health: &mut Health) {
+    /// Puts the columns of the packet at hand into their frames; before it the sensor's newest was of `before_ns`.
+    fn store(&mut self, sensor: usize, model: &Model, before_ns: Option<i64>, health: &mut Health) {
         let intake = &mut self.sensors[sensor];
         let beams = model.beams.len();
         let (mut late, mut duplicate) = (false, false);
         for (c, &column) in self.columns.column.iter().enumerate() {
             let column = Column { time_ns: column.time_ns + intake.clock.shift_ns, ..column };
-            let number = frame_number(self.origin_ns, column.time_ns);
+            let mut number = frame_number(self.origin_ns, column.time_ns);
+            // A frame closes when the next column is due after its end: one that then comes sooner is of the next.
+            let sooner_ns = (model.column_period_ns / 2.0) as i64;
+            let is_new = before_ns.is_some_and(|before_ns| column.time_ns > before_ns);
+            if is_new && frame_number(self.origin_ns, column.time_ns.saturating_add(sooner_ns)) == self.next {
+                number = self.next;
+            }
             if number < self.next {
                 late = true;
                 continue;
@@ -267,9 +295,13 @@ impl Assembler {
 
     /// Closes every frame that waits for no sensor any more.
     fn close_ready(&mut self, health: &mut Health) {
-        while let Some((&number, _)) = self.open.first_key_value() {
+        while let Some((&number, images)) = self.open.first_key_value() {
             let reached = |s: &Intake| s.clock.newest_ns.map(|ns| frame_number(self.origin_ns, ns));
-            let all_past = self.sensors.iter().all(|s| !s.awaited || reached(s) > Some(number));
+            let end_ns = self.origin_ns.unwrap_or(0) + (number + 1) * STEP_NS;
+            let is_past = |(i, s): (usize, &Intake)| {
+                !s.awaited || reached(s) > Some(number) || s.is_whole(images.get(&i), end_ns)
+            };
+            let all_past = self.sensors.iter().enumerate().all(is_past);
             let one_far_past = self.sensors.iter().any(|s| reached(s) > Some(number + 1));
             if !all_past && !one_far_past {
                 break;
@@ -297,6 +329,21 @@ impl Assembler {
             time_ns: self.origin_ns.unwrap_or(0) + (number + 1) * STEP_NS,
             scans: scans.collect(),
         });
+    }
+}
+
+impl Intake {
+    /// Whether nothing of a frame that ends at `end_ns` can come any more: from its first column to its last none is missing, and
+    /// the next one is of the next frame. Some sensors' packets end where frames do, and the next one comes 1.5 ms later.
+    fn is_whole(&self, image: Option<&RangeImage>, end_ns: i64) -> bool {
+        let (Some(model), Some(image)) = (&self.model, image) else { return false };
+        let (Some(first), Some(last)) = (image.columns.first(), image.columns.last()) else { return false };
+        let period_ns = model.column_period_ns;
+        let columns = (last.time_ns - first.time_ns) as f64 / period_ns;
+        let from_end = |time_ns: i64| (end_ns - time_ns) as f64;
+        from_end(last.time_ns) <= period_ns * (1.0 + HAIR)
+            && from_end(first.time_ns) > STEP_NS as f64 - period_ns
+            && image.columns.len() as f64 > columns + 0.5
     }
 }
 

@@ -123,6 +123,34 @@ fn a_frame_closes_as_soon_as_every_sensor_is_past_its_end() {
     assert!((99 * MS..101 * MS).contains(&closed_at_ns), "{closed_at_ns}");
 }
 
+/// For each frame of a single sensor, whether a packet with some of it closed it; and what was counted.
+fn closed_by_their_own(packets: &[Packet]) -> (Vec<bool>, Health) {
+    let mut site = Config::default().site;
+    site.sensors.truncate(1);
+    let (mut assembler, mut health) = (Assembler::new(&site).unwrap(), Health::default());
+    let mut own = Vec::new();
+    for packet in packets {
+        assembler.push(0, packet, &mut health);
+        own.extend(assembler.pop().map(|_| assembler.closed_by_its_own()));
+    }
+    (own, health)
+}
+
+#[test]
+fn a_whole_frame_waits_for_no_packet_of_the_next() {
+    let (own, health) = closed_by_their_own(&packets(0, 3000 * MS));
+    assert!(own.len() > 28 && own.iter().all(|own| *own), "{own:?}");
+    assert!(health.is_clean(), "{health:?}");
+}
+
+#[test]
+fn a_frame_whose_last_packet_is_lost_closes_with_the_next_one() {
+    let mut packets = packets(0, 300 * MS);
+    packets.retain(|p| !(99 * MS..101 * MS).contains(&p.time_ns));
+    let (own, health) = closed_by_their_own(&packets);
+    assert_eq!(own, [false, true], "{health:?}");
+}
+
 #[test]
 fn a_lost_sensor_delays_one_frame_is_counted_and_comes_back() {
     let mut west = packets(0, 1000 * MS);

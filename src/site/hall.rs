@@ -68,6 +68,13 @@ impl Floor {
         let from_m = self.outline_m.first().copied().map_or(DVec2::ZERO, DVec2::from_array);
         self.height_m + DVec2::from_array(self.slope).dot(place_m - from_m)
     }
+
+    /// Each edge from corner to corner, in their order.
+    #[doc(hidden)] // For simulated steps.
+    pub fn edges(&self) -> impl Iterator<Item = [DVec2; 2]> {
+        let corner = |i: usize| DVec2::from_array(self.outline_m[i % self.outline_m.len()]);
+        (0..self.outline_m.len()).map(move |i| [corner(i), corner(i + 1)])
+    }
 }
 
 impl Hall {

@@ -2,20 +2,13 @@
 
 use std::collections::VecDeque;
 
-use super::gaussian::State;
 use super::remembered::{Remembered, Words};
 use super::width;
-use crate::gait::{GaitPhase, WALKS_FROM_MPS};
+use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, Obb};
 
 /// Positions of the observation window: 10 frames (paper, section V-B).
 pub const OBSERVED: usize = 10;
-/// Variance of a heading that may be any: even over a turn.
-const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
-/// How fast who stands may turn away from the last heading: 40 degrees (one sigma) in a second. A guess: nothing
-/// that is measured here tells it.
-const STANDING_TURN_RAD2PS: f64 = 0.5;
-
 /// One standard deviation of the width scale of adults of whom nothing is known.
 pub const WIDTH_SCALE_SIGMA: f64 = width::PRIOR_SIGMA;
 
@@ -44,9 +37,11 @@ pub struct Track {
     pub covariance: [[f64; 4]; 4],
     /// The trunk's, counter-clockwise from +x: the velocity's while walking, held while standing.
     pub heading_rad: f64,
-    /// One standard deviation of `heading_rad`: what the velocity's covariance leaves open while walking, more
-    /// with the time while standing, and 1.81 (any direction) for who has never walked.
+    /// One standard deviation of `heading_rad`: what the velocity's covariance leaves open while walking, what the width of the
+    /// shoulders does while standing, more with the time where these are not seen, and 1.81 (any direction) for who never walked.
     pub heading_sigma_rad: f64,
+    /// Probability that the trunk faces the other way: shoulders look alike from the front and from behind.
+    pub heading_behind: f64,
     /// Standing height, shoes and hair included; by the paper's method the last detection's highest point.
     pub height_m: f64,
     /// One standard deviation of `height_m`.
@@ -89,41 +84,6 @@ pub struct Observed {
     pub position_m: DVec2,
     /// Velocity.
     pub velocity_mps: DVec2,
-}
-
-/// Where a trunk faces, counter-clockwise from +x.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Heading {
-    pub(super) mean_rad: f64,
-    variance_rad2: f64,
-}
-
-impl Remembered for Heading {
-    fn visit(&mut self, words: &mut impl Words) {
-        words.f64(&mut self.mean_rad);
-        words.f64(&mut self.variance_rad2);
-    }
-}
-
-impl Heading {
-    /// Of who has never walked.
-    pub(super) const ANY: Self = Self { mean_rad: 0.0, variance_rad2: ANY_HEADING_RAD2 };
-
-    /// The heading follows the velocity of who walks; who stands may turn on the spot.
-    pub(super) fn follow(&mut self, state: &State, step_s: f64) {
-        let v = state.velocity_mps();
-        if v.length() > WALKS_FROM_MPS {
-            self.mean_rad = v.y.atan2(v.x);
-            self.variance_rad2 = state.heading_variance_rad2();
-        } else {
-            self.variance_rad2 += STANDING_TURN_RAD2PS * step_s;
-        }
-        self.variance_rad2 = self.variance_rad2.min(ANY_HEADING_RAD2);
-    }
-
-    pub(super) fn sigma_rad(&self) -> f64 {
-        self.variance_rad2.sqrt()
-    }
 }
 
 /// The observation window of a track.

@@ -13,7 +13,7 @@ use super::remembered::{FURNITURE_MAX, PEOPLE_MAX, Remembered, Words};
 use super::visibility::{Body, BodyView, Visibility, detection_probability};
 use crate::Site;
 use crate::config::TrackConfig;
-use crate::detect::{Detection, Prior};
+use crate::detect::{ALONE_M, Detection, Prior};
 use crate::geometry::DVec2;
 use crate::lidar::Views;
 
@@ -37,7 +37,6 @@ const CROWD_M: f64 = 1.0;
 /// What shows little this near to one person may be an arm: half the span of a tall one's arms. Not where somebody else is
 /// known as near as [`ALONE_M`]: in a crowd people do show that little.
 const ARM_REACH_M: f64 = 0.95;
-const ALONE_M: f64 = 2.0;
 /// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it.
 const DUPLICATE_M: f64 = 0.3;
 /// Nobody walks faster: spares most pairs the rest.
@@ -205,11 +204,14 @@ impl MixtureTracker {
         ranks.extend(self.people.iter().map(|p| (Reverse(p.confirmed), Reverse(p.matches), p.id)));
         places_m.clear();
         places_m.extend(self.people.iter().map(|p| p.filter.state().position_m()));
-        for (i, person) in self.people.iter_mut().enumerate() {
-            let place_m = places_m[i];
-            let doubles =
-                |(k, at_m): (usize, &DVec2)| at_m.distance(place_m) < DUPLICATE_M && ranks[k] < ranks[i];
-            let doubled = places_m.iter().enumerate().any(doubles);
+        for i in 0..self.people.len() {
+            let (person, place_m) = (&self.people[i], places_m[i]);
+            let doubles = |(k, other): (usize, &Person)| {
+                places_m[k].distance(place_m) < DUPLICATE_M && ranks[k] < ranks[i]
+                    || person.may_be_lap_of(other)
+            };
+            let doubled = self.people.iter().enumerate().any(doubles);
+            let person = &mut self.people[i];
             person.doubled_s = if doubled { person.doubled_s + step_s } else { 0.0 };
         }
     }

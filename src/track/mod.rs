@@ -16,6 +16,7 @@ pub mod visibility;
 mod height;
 #[doc(hidden)] // Extents, for the fit of its numbers.
 pub mod width;
+mod heading;
 mod followed;
 mod origin;
 mod person;

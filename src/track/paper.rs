@@ -6,8 +6,9 @@
 #![allow(non_snake_case)]
 
 use super::association::{FORBIDDEN, greedy, in_order, optimal};
-use super::followed::{Heading, Observations, Track, WIDTH_SCALE_SIGMA, seconds};
+use super::followed::{Observations, Track, WIDTH_SCALE_SIGMA, seconds};
 use super::gaussian::State;
+use super::heading::Heading;
 use super::remembered::{PEOPLE_MAX, Remembered, Words};
 use crate::detect::Detection;
 use crate::gait::GaitPhase;
@@ -243,6 +244,7 @@ impl Person {
             covariance: state.P,
             heading_rad: self.heading.mean_rad,
             heading_sigma_rad: self.heading.sigma_rad(),
+            heading_behind: 0.0,
             height_m: self.top_m,
             height_sigma_m: 0.0,
             width_scale: 1.0,

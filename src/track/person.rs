@@ -2,8 +2,9 @@
 
 use std::collections::VecDeque;
 
-use super::followed::{Heading, Observations, Observed, Track, seconds};
+use super::followed::{Observations, Observed, Track, seconds};
 use super::gaussian::{Mat2, largest_sigma, plus, round};
+use super::heading::Heading;
 use super::height::Height;
 use super::kalman::Filter;
 use super::limb_phase::LimbPhase;
@@ -12,7 +13,7 @@ use super::origin::Origin;
 use super::remembered::{Remembered, Words};
 use super::visibility::{Body, BodyView};
 use super::width::BodyWidth;
-use crate::detect::{Detection, Prior};
+use crate::detect::{ARM_SHARE, Detection, Prior, SEATED_HEIGHT_M};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use crate::site::Hall;
 
@@ -45,8 +46,12 @@ const DUPLICATE_AFTER_S: f64 = 0.5;
 const HIDDEN_NOISE_M: f64 = 0.25;
 /// Furniture is known to the background once it is no longer found.
 const FURNITURE_GONE_S: f64 = 0.5;
-/// Of a body's points an arm has fewer than this share.
-const ARM_SHARE: f64 = 0.5;
+/// Who sits in a wheelchair is longer than who walks, with all that goes before him. Knees are no higher than this share of his
+/// head, so near to it, and as fast.
+const SEATED_LENGTH_M: f64 = 0.75;
+const LAP_SHARE: f64 = 0.85;
+const LAP_M: f64 = 0.65;
+const LAP_MPS: f64 = 0.5;
 /// Mean standing height of adults in shoes.
 const HEIGHT_MEAN_M: f64 = 1.72;
 /// Time over which the width of a box is averaged.
@@ -76,6 +81,8 @@ pub(super) struct Person {
     width: BodyWidth,
     /// Averaged extent along x and y.
     extent_m: DVec2,
+    /// How high it shows itself, averaged.
+    top_m: f64,
     observed: Observations,
 }
 
@@ -96,6 +103,7 @@ impl Remembered for Person {
         self.height.visit(words);
         self.width.visit(words);
         words.vec2(&mut self.extent_m);
+        words.f64(&mut self.top_m);
         self.observed.visit(words);
     }
 }
@@ -141,6 +149,7 @@ impl Person {
             height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
             width: BodyWidth::default(),
             extent_m: DVec2::splat(WIDTH_M),
+            top_m: HEIGHT_MEAN_M,
             observed: Observations::default(),
         }
     }
@@ -210,6 +219,21 @@ impl Person {
         f64::from(detection.points) < ARM_SHARE * f64::from(self.points)
     }
 
+    /// Whether this may be knees, feet and wheels of `other`, who sits in a wheelchair: beside him, as fast, and showing no head
+    /// where he shows his.
+    pub(super) fn may_be_lap_of(&self, other: &Self) -> bool {
+        if self.top_m >= LAP_SHARE * other.top_m
+            || other.extent_m.length() <= SEATED_LENGTH_M
+            || !other.confirmed
+            || other.height.mean_m() >= SEATED_HEIGHT_M
+        {
+            return false;
+        }
+        let (own, others) = (self.filter.state(), other.filter.state());
+        own.position_m().distance(others.position_m()) < LAP_M
+            && own.velocity_mps().distance(others.velocity_mps()) < LAP_MPS
+    }
+
     /// The body that others may hide behind.
     pub(super) fn body(&self, position_m: DVec2, hall: &Hall) -> Body {
         Body { position_m, floor_m: hall.floor_m(position_m), height_m: self.height.mean_m() }
@@ -238,6 +262,9 @@ impl Person {
         let state = self.filter.state();
         let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
         self.heading.follow(&state, step_s);
+        if self.heading.is_either() {
+            self.heading.face_room(hall.middle_m() - position_m);
+        }
         self.observed.push(time_ns, position_m, velocity_mps);
         observed.clone_from(&self.observed.0);
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
@@ -249,6 +276,7 @@ impl Person {
             covariance: state.P,
             heading_rad: self.heading.mean_rad,
             heading_sigma_rad: self.heading.sigma_rad(),
+            heading_behind: self.heading.behind,
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
             width_scale,
@@ -276,11 +304,13 @@ impl Person {
         if !view.on_step {
             self.height.see(detection.top_m, view.beams_per_m_at_top);
         }
+        self.heading.see(detection, view, speed_mps);
         if numbers.body_width {
             self.width.see(detection, view, self.height.mean_m(), speed_mps);
         }
         let new = 1.0 - (-step_s / BOX_AVERAGE_S).exp();
         self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
+        self.top_m += (detection.top_m - self.top_m) * new;
     }
 
     /// As wide as seen on the mean, standing on the floor; the oriented one turned with the heading.

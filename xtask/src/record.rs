@@ -43,7 +43,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 37] = [
+const JOBS: [Job; 38] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -55,6 +55,7 @@ const JOBS: [Job; 37] = [
     job("forecasts", "the residual beside a constant velocity", Needs::Data, crowds::forecasts),
     job("calibrate", "sensors that hang elsewhere than the file says, found again", Needs::Nothing, calibrate::calibrate),
     job("following", "a sensor screwed on askew, one that slips", Needs::Nothing, calibrate::following),
+    job("clocks", "sensors' clocks apart, found while people walk", Needs::Nothing, calibrate::clocks),
     job("tripods", "from two sensors on tripods to warnings, command by command", Needs::Nothing, calibrate::tripods),
     job("logictronix", "real people before a real VLP-16", Needs::Data, crowds::logictronix),
     job("speed", "how long a frame takes, in every mode", Needs::Nothing, house::speed),
@@ -62,7 +63,7 @@ const JOBS: [Job; 37] = [
     job("living", "furniture put in, people who stand, no empty scan", Needs::Nothing, living::living),
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", Needs::Nothing, glass::glass),
     job("gestures", "people who talk with their hands beside a sensor", Needs::Nothing, gestures::gestures),
-    job("cut", "what a frame gains that closes as soon as the part with people has", Needs::Nothing, glass::cut),
+    job("cut", "what a frame gains that closes as soon as the part with people has", Needs::Nothing, crowds::cut),
     job("live", "ten minutes live, three times over, the page open", Needs::Asking, house::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", Needs::Asking, nodes::nodes),
     job("halls", "1 to 64 halls on one host", Needs::Asking, nodes::halls),

@@ -10,6 +10,7 @@ pub mod point_cloud;
 pub mod tables;
 pub mod wire;
 pub mod fields;
+mod health;
 pub mod nodes;
 pub mod viewers;
 pub mod results;

@@ -286,29 +286,6 @@ impl Message for NodeHealth {
     }
 }
 
-impl Message for Health {
-    const NAME: &'static str = "Health";
-    const WHAT: &'static str = "What was met that could not be used, counted.";
-
-    fn empty() -> Self {
-        Self::default()
-    }
-
-    fn visit(&mut self, f: &mut impl Fields) {
-        f.u64("packets_wrong_size", &mut self.packets_wrong_size);
-        f.u64("packets_not_understood", &mut self.packets_not_understood);
-        f.u64("packets_late", &mut self.packets_late);
-        f.u64("packets_duplicate", &mut self.packets_duplicate);
-        f.u64("clock_jumps", &mut self.clock_jumps);
-        f.u64("sensors_missing", &mut self.sensors_missing);
-        f.u64("points_invalid", &mut self.points_invalid);
-        f.u64("frames_out_of_order", &mut self.frames_out_of_order);
-        f.u64("points_over_limit", &mut self.points_over_limit);
-        f.u64("frames_with_fewer_samples", &mut self.frames_with_fewer_samples);
-        f.u64("sensors_moved", &mut self.sensors_moved);
-    }
-}
-
 impl Message for View {
     const NAME: &'static str = "View";
     const WHAT: &'static str = "Where a sensor hung, and where its beams went; the fan is none or one.";
@@ -399,6 +376,7 @@ impl Message for Track {
             covariance: [[0.0; 4]; 4],
             heading_rad: 0.0,
             heading_sigma_rad: 0.0,
+            heading_behind: 0.0,
             height_m: 0.0,
             height_sigma_m: 0.0,
             width_scale: 0.0,
@@ -419,6 +397,7 @@ impl Message for Track {
         f.f64_array("covariance", self.covariance.as_flattened_mut());
         f.f64("heading_rad", &mut self.heading_rad);
         f.f64("heading_sigma_rad", &mut self.heading_sigma_rad);
+        f.f64("heading_behind", &mut self.heading_behind);
         f.f64("height_m", &mut self.height_m);
         f.f64("height_sigma_m", &mut self.height_sigma_m);
         f.f64("width_scale", &mut self.width_scale);

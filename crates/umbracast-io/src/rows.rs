@@ -1,6 +1,8 @@
 //! The rows of every table, once. A field is a column of the same name; name and unit say what it holds.
 #![allow(missing_docs, reason = "names carry the unit; what needs a word has one")]
 
+use std::f64::consts::PI;
+
 use serde::{Deserialize, Serialize};
 use umbracast::blockage::Chance;
 use umbracast::detect::Detection;
@@ -188,7 +190,7 @@ pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
             c[0][0], c[0][1], c[0][2], c[0][3], c[1][1], c[1][2], c[1][3], c[2][2], c[2][3], c[3][3],
         ],
         heading_rad: track.heading_rad,
-        heading_sigma_rad: track.heading_sigma_rad,
+        heading_sigma_rad: heading_sigma_rad(track),
         height_m: track.height_m,
         height_sigma_m: track.height_sigma_m,
         width_scale: track.width_scale,
@@ -201,6 +203,12 @@ pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
         obb: of_obb(&track.obb),
         ..TrackRow::default()
     }
+}
+
+/// One standard deviation over both ways that the trunk may face.
+fn heading_sigma_rad(track: &Track) -> f64 {
+    let of_ways_rad = PI * (track.heading_behind * (1.0 - track.heading_behind)).sqrt();
+    track.heading_sigma_rad.hypot(of_ways_rad).min(PI / 3.0_f64.sqrt())
 }
 
 fn of_aabb(aabb: &Aabb) -> [f64; 6] {

@@ -24,7 +24,7 @@ pub struct Published {
     pub time_ns: i64,
     /// When it was published, host time.
     pub published_ns: i64,
-    /// From the packet before the one that closed the frame to this.
+    /// From the last packet of the frame to this.
     pub latency: Duration,
     /// Of the stages alone.
     pub step: Duration,

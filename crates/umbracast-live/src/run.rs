@@ -69,7 +69,7 @@ pub struct Counters {
     pub dropped_by_system: AtomicU64,
     /// Frames that were published.
     pub frames: AtomicU64,
-    /// From the packet before the one that closed a frame to its results.
+    /// From the last packet of a frame to its results.
     pub latencies: Mutex<Latencies>,
     /// Of the stages alone.
     pub steps: Mutex<Latencies>,
@@ -111,7 +111,7 @@ pub struct Summary {
     pub frames: u64,
     /// Frames given up because the pipeline was busy.
     pub frames_skipped: u64,
-    /// From the packet before the one that closed a frame to its results.
+    /// From the last packet of a frame to its results.
     pub latencies: Latencies,
     /// Of the stages alone.
     pub steps: Latencies,
@@ -124,7 +124,7 @@ pub struct Summary {
 /// A frame that closed, and what the assembler knew then.
 struct Closed {
     frame: Frame,
-    /// When the packet before the one that closed it came.
+    /// When its last packet came.
     arrived_ns: i64,
     health: Health,
 }
@@ -278,7 +278,8 @@ fn assemble(
         arrived.packet.time_ns = came_ns;
         assembler.push(arrived.sensor, &arrived.packet, &mut health);
         while let Some(frame) = assembler.pop() {
-            let arrived_ns = if before_ns == i64::MIN { came_ns } else { before_ns };
+            let is_last = before_ns == i64::MIN || assembler.closed_by_its_own();
+            let arrived_ns = if is_last { came_ns } else { before_ns };
             frames.push(Closed { frame, arrived_ns, health });
         }
         before_ns = came_ns;

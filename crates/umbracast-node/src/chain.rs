@@ -2,7 +2,7 @@
 //! [`umbracast::Pipeline::step`], with a wire where the row ends.
 
 use umbracast::blockage::Caster;
-use umbracast::detect::{self, Clusterer, Measurer, Prior};
+use umbracast::detect::{self, Clocks, Clusterer, Measurer, Prior};
 use umbracast::forecast::{Forecaster, Weights};
 use umbracast::track::Tracker;
 use umbracast::{Config, Error, Outcome, STEP_NS};
@@ -47,6 +47,7 @@ impl Row {
 #[derive(Debug)]
 pub struct Chain {
     config: Config,
+    clocks: Clocks,
     clusterer: Clusterer,
     measurer: Measurer,
     tracker: Option<Tracker>,
@@ -91,6 +92,7 @@ impl Chain {
     /// A setting that cannot work.
     pub fn new(config: &Config, weights: Option<&Weights>, row: Row) -> Result<Self, Error> {
         Ok(Self {
+            clocks: Clocks::new(&config.detect, &config.site),
             clusterer: Clusterer::new(&config.detect, &config.site),
             measurer: Measurer::new(&config.detect, &config.site),
             tracker: row.track.then(|| Tracker::new(&config.track, &config.site)),
@@ -133,13 +135,16 @@ impl Chain {
         match joined.detections {
             Some(detections) => o.detections = detections,
             None => {
+                self.clocks.put_right(&mut o.foreground);
                 self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);
+                self.clocks.follow(&o.foreground, &o.clusters, &self.priors);
                 self.measurer.detections(&o.foreground, &o.clusters, &self.priors, &mut o.detections);
             }
         }
         tracker.update(&joined.views, &o.detections, &mut o.tracks);
         tracker.priors(time_ns + STEP_NS, &mut self.priors);
         o.health.frames_out_of_order += self.out_of_order;
+        o.health.clocks_corrected = self.clocks.corrected();
         let made = Made {
             priors: Some(Priors {
                 time_ns: time_ns + STEP_NS,

@@ -242,9 +242,10 @@ impl Node {
             counted.packets.fetch_add(1, Ordering::Relaxed);
             counted.priors_late.store(front.priors_late(), Ordering::Relaxed);
         };
-        if let Some(&sensor) = own.iter().find(|&&s| takes_clouds(&config.site.sensors[s])) {
+        let first = &config.site.sensors[own[0]];
+        if takes_clouds(first) {
             let Source::Ros2(domain, topics) = source else {
-                let name = &config.site.sensors[sensor].name;
+                let name = &first.name;
                 return Err(Error::new(format!(
                     "sensor {name:?} is known by its clouds: expected a topic of them, found none"
                 )));

@@ -83,3 +83,24 @@ pub fn following(book: &mut Book) -> Result<()> {
     }
     book.compare()
 }
+
+/// Clocks that are apart while people walk for two minutes: what a run finds of them.
+pub fn clocks(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record clocks");
+    book.line("lidar_west ahead by, ms  seed    what a run says of the clocks");
+    let (site, walk, out) = (book.scratch("late.toml"), book.scratch("walk"), book.scratch("out"));
+    for ahead_ms in [0, 20, 50, -50] {
+        let text = format!("[site.simulation]\nclock_ahead_ms = {{ lidar_west = {ahead_ms}.0 }}\n");
+        fs::write(&site, text).map_err(|e| e.to_string())?;
+        for seed in 205_000..205_005 {
+            let seed = seed.to_string();
+            let words = ["simulate", "--stroll", "120", "--seed", &seed, "--site"].map(OsString::from);
+            let to = ["--out".into(), argument(&walk)];
+            book.quietly(&words.into_iter().chain([argument(&site)]).chain(to).collect::<Vec<_>>())?;
+            let said = book.quietly(&["run".into(), argument(&walk), "--out".into(), argument(&out)])?;
+            let found = said.split("their mean: ").nth(1).and_then(|rest| rest.split(';').next());
+            book.line(&format!("{ahead_ms:>24}  {seed}  {}", found.unwrap_or("nothing")));
+        }
+    }
+    Ok(())
+}

@@ -25,6 +25,27 @@ pub fn sites(book: &mut Book) -> Result<()> {
     book.compare()
 }
 
+/// The default hall with revolutions cut elsewhere than behind the sensors, who see people within a quarter of a turn to
+/// either side: soon after these, their points are 25 ms younger when the frame closes, and before these as much older.
+pub fn cut(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record cut");
+    let crowd = ["--scenes", "20", "--preset", "orca-03"];
+    for (name, cut_deg) in [("after people", 95.0), ("behind", 180.0), ("before people", 265.0)] {
+        let sensor = |name: &str, x_m: f64, yaw_deg: f64| {
+            format!(
+                "[[site.sensors]]\nname = \"{name}\"\nmodel = \"hdl-32e\"\nposition_m = [{x_m:.1}, 0.0, 9.0]\n\
+                 rotation_deg = {{ yaw = {yaw_deg:.1}, pitch = 35.0, roll = 0.0 }}\ncut_deg = {cut_deg:.1}\n"
+            )
+        };
+        let file = book.scratch(&format!("cut-{cut_deg}.toml"));
+        let text = sensor("lidar_east", 16.0, 180.0) + &sensor("lidar_west", -16.0, 0.0);
+        fs::write(&file, text).map_err(|e| e.to_string())?;
+        let words = crowd.map(OsString::from).into_iter().chain(["--site".into(), argument(&file)]);
+        book.score(name, words)?;
+    }
+    book.compare()
+}
+
 /// Halls of other shapes with devices in the right hand: links blocked by others, by their owners, by the hall, and by any
 /// of them.
 pub fn shapes(book: &mut Book) -> Result<()> {

@@ -62,6 +62,14 @@ pub fn living(book: &mut Book) -> Result<()> {
     let standing = simulated(book, "standing", &walked(book, "standing", &standing)?)?;
     row(book, "four come and stand 5 min", &standing, &known)?;
     row(book, "four come and stand 5 min", &standing, &["--no-empty"])?;
+    let stools = book.scratch("stools.toml");
+    fs::write(&stools, with_stools()?).map_err(|e| e.to_string())?;
+    let sitting: Vec<String> = (0..SCENES / 5).map(|k| sit(u64::from(k))).collect();
+    let mut how = walked(book, "sitting", &sitting)?;
+    how.extend(["--bodies", "sitting", "--site", &stools.to_string_lossy()].map(str::to_owned));
+    let sitting = simulated(book, "sitting", &how)?;
+    row(book, "four come and sit 5 min", &sitting, &["--empty", &format!("{sitting}/empty.mcap")])?;
+    row(book, "four come and sit 5 min", &sitting, &["--no-empty"])?;
     book.line(
         "Default mode, test seeds. Put in after the empty scan: a table of 0.75 m, a cupboard of 1.8 m, a chair. Standing, seen: \
          share of the frames in which somebody stands, at least a second by now, who has a confirmed track within 0.5 m. Ids a \
@@ -224,6 +232,14 @@ pub(super) fn read(path: &str) -> Result<Vec<Row>> {
 
 /// The default hall's furniture, and what is put in.
 fn furnished() -> Result<String> {
+    let mut text = default_furniture()?;
+    for thing in PUT_IN {
+        let _ = write!(text, "[[site.furniture]]\n{thing}\n");
+    }
+    Ok(text)
+}
+
+fn default_furniture() -> Result<String> {
     let default = fs::read_to_string(root().join("config/default.toml")).map_err(|e| e.to_string())?;
     let mut text = String::new();
     let mut inside = false;
@@ -237,9 +253,6 @@ fn furnished() -> Result<String> {
             text.push_str(line);
             text.push('\n');
         }
-    }
-    for thing in PUT_IN {
-        let _ = write!(text, "[[site.furniture]]\n{thing}\n");
     }
     Ok(text)
 }
@@ -270,6 +283,36 @@ fn stand(seed: u64) -> String {
         let (radius_m, speed_mps) = (3.5 + 4.5 * draw(), 0.9 + 0.5 * draw());
         let at = |radius_m: f64| (radius_m * angle.cos(), radius_m * angle.sin());
         people.push(way(&[at(11.9), at(radius_m)], 1.0, speed_mps, seconds));
+    }
+    people.extend(rings(seconds, &[(4, 9.5, 1.2), (2, 2.0, 0.8)]));
+    table(&people)
+}
+
+/// Where the stools are that people sit down on, well inside the hall.
+fn stools() -> [(f64, f64); 4] {
+    [(3.6, 0.3), (6.2, 1.9), (5.0, 3.5), (7.0, 5.0)].map(|(r, a): (f64, f64)| (r * a.cos(), r * a.sin()))
+}
+
+/// The default hall with these in it.
+fn with_stools() -> Result<String> {
+    let mut text = default_furniture()?;
+    for (x_m, y_m) in stools() {
+        let _ = write!(
+            text,
+            "[[site.furniture]]\nposition_m = [{x_m:.4}, {y_m:.4}]\nsize_m = [0.36, 0.36, 0.44]\nyaw_deg = 0.0\n"
+        );
+    }
+    Ok(text)
+}
+
+/// Four walk to the stools and stay there for minutes; six walk in rings between and around them.
+fn sit(seed: u64) -> String {
+    let mut draw = draws(seed);
+    let seconds = STANDS_S + 15.0;
+    let mut people: Vec<Vec<(f64, f64)>> = Vec::new();
+    for (x_m, y_m) in stools() {
+        let (angle, speed_mps) = (TAU * draw(), 0.9 + 0.5 * draw());
+        people.push(way(&[(11.9 * angle.cos(), 11.9 * angle.sin()), (x_m, y_m)], 1.0, speed_mps, seconds));
     }
     people.extend(rings(seconds, &[(4, 9.5, 1.2), (2, 2.0, 0.8)]));
     table(&people)

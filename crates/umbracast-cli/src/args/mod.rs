@@ -149,8 +149,8 @@ pub struct Replay {
 #[derive(Debug, Clone, Args)]
 pub struct BodyArgs {
     /// Kinds of bodies and their shares of the people, KIND[=SHARE]: bag, phone (at the ear), pockets (hands in
-    /// them), child, wheelchair, cmu-walk (needs --gait), gesturing (with both hands); the rest are plain. Several with
-    /// commas.
+    /// them), child, wheelchair, cmu-walk (needs --gait), gesturing (with both hands), sitting (wherever they stay); the
+    /// rest are plain. Several with commas.
     #[arg(long, value_name = "KIND[=SHARE]", value_delimiter = ',', value_parser = body_share)]
     pub bodies: Vec<(Kind, f64)>,
     /// Motion capture of somebody who walks, BVH: how people of the kind cmu-walk move.

@@ -222,7 +222,7 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
         json = json.with("packets_sent", sent.packets).with("sent_late_ms_max", sent.latest_ns as f64 * 1e-6);
     }
     let text = format!(
-        "{} frames of {} packets in {:.1} s: {:.2} ms from the last packet but one to the warning (median), {:.2} ms (99 %)",
+        "{} frames of {} packets in {:.1} s: {:.2} ms from the last packet to the warning (median), {:.2} ms (99 %)",
         summary.frames,
         summary.packets,
         watch.seconds(),

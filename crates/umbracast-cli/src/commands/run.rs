@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use umbracast::detect::doubled;
 use umbracast::forecast::Weights;
+use umbracast::site::Sensor;
 use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline};
 use umbracast_io::recording::{RecordingWriter, Results};
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
@@ -211,7 +212,7 @@ fn run_scene(
     input: &Input,
     method: &Method,
     results: &SyncSender<Step>,
-) -> Result<(Health, Option<String>), Error> {
+) -> Result<(Health, Vec<String>), Error> {
     let Method { config, weights, empty, recordings } = method;
     let mut pipeline = Pipeline::new(config, Some(weights))?;
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
@@ -234,7 +235,22 @@ fn run_scene(
     })?;
     recording.map_or(Ok(()), Recording::finish)?;
     health.add(&stage_health);
-    Ok((health, lost))
+    Ok((health, lost.into_iter().chain(clocks_apart(input, config, &pipeline)).collect()))
+}
+
+/// How far sensors' clocks were found apart, where they were.
+fn clocks_apart(input: &Input, config: &Config, pipeline: &Pipeline) -> Option<String> {
+    let clocks = pipeline.clocks();
+    if clocks.corrected() == 0 {
+        return None;
+    }
+    let ahead = |(s, sensor): (usize, &Sensor)| format!("{} {:+.1} ms", sensor.name, 1e3 * clocks.ahead_s(s));
+    let ahead: Vec<String> = config.site.sensors.iter().enumerate().map(ahead).collect();
+    Some(format!(
+        "{input}: clocks_corrected: by who walks before several sensors these clocks are ahead of their mean: {}; times were \
+         put right, `clock_offset_ms` of a sensor or `umbracast calibrate` does so for good",
+        ahead.join(", ")
+    ))
 }
 
 /// One scene's results as a recording, begun with the first frame.

@@ -66,7 +66,7 @@ pub fn text(watched: &Watched, newest: &Published, connections: &Connections) ->
     let of = |latencies: &std::sync::Mutex<Latencies>| {
         latencies.lock().unwrap_or_else(PoisonError::into_inner).clone()
     };
-    let what = "From the packet before the one that closed the frame to its results.";
+    let what = "From the last packet of the frame to its results.";
     histogram(&mut out, "latency_seconds", what, &of(&counters.latencies));
     histogram(&mut out, "step_seconds", "The stages alone.", &of(&counters.steps));
     out

@@ -46,7 +46,7 @@ fn frame_schema() -> Value {
             "time_ns": { "type": "integer", "description": "End of the frame, time of the sensors." },
             "published_ns": { "type": "integer", "description": "Host time." },
             "age_ms": { "type": ["integer", "null"], "description": "Since it was published; null before the first." },
-            "latency_ms": { "type": "number", "description": "From the packet before the one that closed the frame to its results." },
+            "latency_ms": { "type": "number", "description": "From the last packet of the frame to its results." },
             "step_ms": { "type": "number", "description": "The stages alone." },
             "frames_skipped": { "type": "integer" },
             "reloads": { "type": "integer", "description": "How often the site file was read again; then /api/site is another." },

@@ -115,7 +115,8 @@ fn turned(ahead_m: f64, up_m: f64, pitch_rad: f64) -> [f64; 2] {
     [ahead_m * cos - up_m * sin, ahead_m * sin + up_m * cos]
 }
 
-fn smoothstep(x: f64) -> f64 {
+/// From 0 to 1 without a jerk.
+pub fn smoothstep(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
 }

@@ -53,7 +53,7 @@ impl Gestures {
     /// Where the hands are.
     pub fn holds(&self, build: &Build, time_ns: i64, speed_mps: f64) -> Holds {
         let (offset_m, level_m) = build.shoulder_m();
-        let length_m = level_m - build.elbow_height_m() + build.forearm_m + 0.5 * build.hand_m;
+        let length_m = arm_m(build);
         let hanging = (speed_mps / WALKING_MPS).min(1.0);
         let between = |(least, most): (f64, f64), share: f64| least + (most - least) * share;
         let time_s = time_ns as f64 * 1e-9;
@@ -62,7 +62,7 @@ impl Gestures {
             let (rise, out) = between(RAISED_RAD, raised.at(time_s)).sin_cos();
             let towards = DVec3::new(out * cos, side * out * sin, rise);
             let from_shoulder_m = towards * between(STRETCH, stretch.at(time_s)) * length_m;
-            let hangs_m = DVec3::new(0.1, side * 0.1, -0.95).normalize() * length_m;
+            let hangs_m = hanging_m(build, side);
             Some(Hold {
                 bone: Bone::Thorax,
                 at_m: DVec3::new(0.0, side * offset_m, level_m) + from_shoulder_m.lerp(hangs_m, hanging),
@@ -72,4 +72,14 @@ impl Gestures {
         };
         [hand(1.0, &self.hands[0]), hand(-1.0, &self.hands[1])]
     }
+}
+
+/// From the shoulder to the middle of the hand.
+fn arm_m(build: &Build) -> f64 {
+    build.shoulder_m().1 - build.elbow_height_m() + build.forearm_m + 0.5 * build.hand_m
+}
+
+/// Where the middle of a hand that hangs is from its shoulder, on a side: 1 left, -1 right.
+pub fn hanging_m(build: &Build, side: f64) -> DVec3 {
+    DVec3::new(0.1, side * 0.1, -0.95).normalize() * arm_m(build)
 }

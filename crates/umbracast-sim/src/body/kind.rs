@@ -24,11 +24,13 @@ pub enum Kind {
     CmuWalk,
     /// An adult who talks with both hands.
     Gesturing,
+    /// An adult who sits down where he stays for long.
+    Sitting,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Plain,
         Self::Bag,
         Self::Phone,
@@ -37,6 +39,7 @@ impl Kind {
         Self::Wheelchair,
         Self::CmuWalk,
         Self::Gesturing,
+        Self::Sitting,
     ];
 
     /// As it is written on the command line.
@@ -50,6 +53,7 @@ impl Kind {
             Self::Wheelchair => "wheelchair",
             Self::CmuWalk => "cmu-walk",
             Self::Gesturing => "gesturing",
+            Self::Sitting => "sitting",
         }
     }
 }

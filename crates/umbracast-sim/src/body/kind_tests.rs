@@ -78,6 +78,18 @@ fn every_part_is_closed_faces_outward_and_has_its_vertices() {
     }
 }
 
+/// What touches the floor touches it only, and no sole that does has moved since `before`, the mesh 10 ms ago.
+fn assert_stands(walker: &Walker, mesh: &[DVec3], before: &[DVec3], at: &str) {
+    let down = |v: &DVec3| v.z < 1e-8;
+    assert!(mesh.iter().all(|v| v.z > -1e-9), "{at}: sinks");
+    assert!(mesh.iter().any(down), "{at}: floats");
+    let feet = FEET.into_iter().flat_map(|foot| walker.surface().parts[foot].0.clone());
+    for v in feet.filter(|_| !before.is_empty()) {
+        let still = &before[v];
+        assert!(!(down(&mesh[v]) && down(still)) || mesh[v].distance(*still) < 3e-4, "{at}: slides");
+    }
+}
+
 #[test]
 fn nobody_sinks_floats_or_slides() {
     for kind in Kind::ALL {
@@ -87,17 +99,7 @@ fn nobody_sinks_floats_or_slides() {
             for step in 0..600 {
                 let mesh = mesh(&walker, step);
                 let at = format!("{kind:?} {seed} at {} s", step as f64 * 0.01);
-                let down = |v: &DVec3| v.z < 1e-8;
-                assert!(mesh.iter().all(|v| v.z > -1e-9), "{at}: sinks");
-                assert!(mesh.iter().any(down), "{at}: floats");
-                let feet = FEET.into_iter().flat_map(|foot| walker.surface().parts[foot].0.clone());
-                for v in feet.filter(|_| !before.is_empty()) {
-                    let still: &DVec3 = &before[v];
-                    assert!(
-                        !(down(&mesh[v]) && down(still)) || mesh[v].distance(*still) < 3e-4,
-                        "{at}: slides"
-                    );
-                }
+                assert_stands(&walker, &mesh, &before, &at);
                 before = mesh;
             }
         }
@@ -229,5 +231,45 @@ fn a_turned_chair_is_the_same_chair() {
     for (a, b) in here.iter().zip(&there) {
         let turned = (a.truncate() - DVec2::X).perp() + DVec2::new(3.0, -2.0);
         assert!((turned.extend(a.z) - *b).length() < 1e-9);
+    }
+}
+
+/// Walks for 2 s, rests for 12 s, walks on.
+#[test]
+fn who_stays_sits_down_and_gets_up_again_and_no_foot_slides() {
+    let mut positions_m = vec![DVec2::ZERO];
+    for i in 0..1600 {
+        let velocity_mps = if (200..1400).contains(&i) { DVec2::ZERO } else { DVec2::X };
+        positions_m.push(positions_m[i] + velocity_mps * 0.01);
+    }
+    let way = Trajectory {
+        person: 0,
+        start_ns: 0,
+        step_ns: STEP_NS,
+        positions_m,
+        arrived_ns: None,
+        height_m: None,
+    };
+    for seed in 0..5 {
+        let walker = Walker::of_kind(way.clone(), seed, Kind::Sitting);
+        let standing_m = walker.build.height_m();
+        let (mut lowest_m, mut before) = (standing_m, Vec::new());
+        for step in 0..1600 {
+            let mesh = mesh(&walker, step);
+            let state = walker.state_at(step * STEP_NS).unwrap();
+            lowest_m = lowest_m.min(state.height_m);
+            let top_m = bounds(&walker, &mesh, 2..3).max_m.z;
+            // Who stops at once from 1 m/s dips first.
+            let told = !(300..1400).contains(&step) || (top_m - state.height_m).abs() < 0.02;
+            assert!(told, "{seed}, {step}: {top_m} for {}", state.height_m);
+            assert_stands(&walker, &mesh, &before, &format!("{seed}, {step}"));
+            before = mesh;
+        }
+        assert!((0.3..0.6).contains(&(standing_m - lowest_m)), "{lowest_m} of {standing_m}");
+        let sits = mesh(&walker, 800);
+        let thighs = bounds(&walker, &sits, 7..9);
+        assert!(thighs.size_m().x > 0.4 && thighs.min_m.z > 0.35 && thighs.max_m.z < 0.75, "{thighs:?}");
+        let tall = |step: i64| walker.state_at(step * STEP_NS).unwrap().height_m;
+        assert!(tall(100) == standing_m && tall(1500) == standing_m);
     }
 }

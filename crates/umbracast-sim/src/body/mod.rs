@@ -10,6 +10,7 @@ mod walk;
 pub mod kind;
 mod things;
 mod gestures;
+mod sitting;
 mod recorded;
 mod walker;
 mod bodies;

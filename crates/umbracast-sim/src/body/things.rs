@@ -31,7 +31,7 @@ pub fn of(kind: Kind, build: &Build, seed: u64) -> Things {
     let side = if left { 1.0 } else { -1.0 };
     let one_hand = |hold: Hold| if left { [Some(hold), None] } else { [None, Some(hold)] };
     match kind {
-        Kind::Plain | Kind::Child | Kind::CmuWalk | Kind::Gesturing => Things::default(),
+        Kind::Plain | Kind::Child | Kind::CmuWalk | Kind::Gesturing | Kind::Sitting => Things::default(),
         Kind::Bag if other => Things { parts: vec![backpack(build)], ..Things::default() },
         Kind::Bag => {
             let (bag, hold) = shoulder_bag(build, side);

@@ -105,6 +105,18 @@ impl Walk {
         }
     }
 
+    /// From when until when the body stands still, time and again; what it did before and does after the plan goes on.
+    pub fn rests_ns(&self) -> impl Iterator<Item = [i64; 2]> {
+        let time_ns = |i: usize| self.start_ns + i as i64 * STEP_NS;
+        let stands = |i: &usize| self.instants[*i].speed_mps < STANDING_MPS;
+        let last = self.instants.len();
+        let begins = (0..last).filter(move |&i| stands(&i) && (i == 0 || !stands(&(i - 1))));
+        begins.map(move |begin| {
+            let end = (begin..last).find(|i| !stands(i));
+            [if begin == 0 { i64::MIN } else { time_ns(begin) }, end.map_or(i64::MAX, time_ns)]
+        })
+    }
+
     /// The footprints between which a foot is: the one it stands on or left last, and the next one.
     pub fn prints_of(&self, left: bool, phase: f64) -> [Footprint; 2] {
         let contact = (2.0 * (phase - if left { 0.5 } else { 0.0 })).floor().max(0.0) as usize;

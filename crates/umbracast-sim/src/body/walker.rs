@@ -12,6 +12,7 @@ use super::gestures::Gestures;
 use super::kind::Kind;
 use super::recorded::Gait;
 use super::shape::{Shape, Surface};
+use super::sitting::Sitting;
 use super::skeleton::{Holds, PelvisPose, Pose};
 use super::walk::{self, Instant, Walk};
 use super::{feet, gait, things};
@@ -48,7 +49,9 @@ pub struct Walker {
     holds: Holds,
     /// In place of what the hands hold.
     gestures: Option<Gestures>,
-    /// Height of the hip joints of who sits.
+    /// Of who sits down now and then.
+    sitting: Option<Sitting>,
+    /// Height of the hip joints of who always sits.
     seat_m: Option<f64>,
     /// In place of the published gait.
     gait: Option<Arc<Gait>>,
@@ -85,9 +88,10 @@ impl Walker {
             shape,
             trajectory,
             build,
-            walk,
             holds: things.holds,
             gestures: (kind == Kind::Gesturing).then(|| Gestures::draw(seed)),
+            sitting: (kind == Kind::Sitting).then(|| Sitting::plan(&walk)),
+            walk,
             seat_m: things.seat_m,
             gait: None,
             upright,
@@ -115,11 +119,13 @@ impl Walker {
         let (position_m, velocity_mps) = self.trajectory.at(time_ns)?;
         let heading_rad = (self.walk.at(time_ns).heading_rad + PI).rem_euclid(TAU) - PI;
         let floor_m = self.hall.as_ref().map_or(0.0, |hall| underfoot(hall, position_m, heading_rad).0);
-        Some(PersonState { position_m, velocity_mps, heading_rad, floor_m, height_m: self.height_m() })
+        Some(PersonState { position_m, velocity_mps, heading_rad, floor_m, height_m: self.height_m(time_ns) })
     }
 
-    fn height_m(&self) -> f64 {
-        self.build.height_m() - self.seat_m.map_or(0.0, |seat_m| self.build.hip_height_m() - seat_m)
+    fn height_m(&self, time_ns: i64) -> f64 {
+        let sunk_m = self.sitting.as_ref().map_or(0.0, |sitting| sitting.sunk_m(time_ns, &self.build));
+        let seated_m = self.seat_m.map_or(0.0, |seat_m| self.build.hip_height_m() - seat_m);
+        self.build.height_m() - seated_m - sunk_m
     }
 
     /// Writes the vertices of the walking body in the site frame; false (and nothing written) while the person
@@ -173,12 +179,18 @@ impl Walker {
             return Some((gait.pose(&self.build, state.position_m, heading_rad, phase, speed_mps), state));
         }
         let upper = walk::upper_body(&instant, &self.build);
-        let pelvis = PelvisPose::new(state.position_m, instant.heading_rad, &upper, instant.hip_height_m);
-        let feet = walk::foot_poses(&self.walk, &instant, &self.build);
-        let holds = match &self.gestures {
+        let mut hips_m = instant.hip_height_m;
+        let mut feet = walk::foot_poses(&self.walk, &instant, &self.build);
+        let mut holds = match &self.gestures {
             Some(gestures) => gestures.holds(&self.build, time_ns, instant.speed_mps),
             None => self.holds,
         };
+        if let Some(sitting) = &self.sitting {
+            hips_m -= sitting.sunk_m(time_ns, &self.build);
+            feet = sitting.feet(time_ns, instant.heading_rad, feet);
+            holds = sitting.holds(time_ns, &self.build).unwrap_or(holds);
+        }
+        let pelvis = PelvisPose::new(state.position_m, instant.heading_rad, &upper, hips_m);
         Some((Pose::new(&self.build, instant.heading_rad, &upper, &pelvis, &feet, &holds), state))
     }
 
@@ -198,8 +210,7 @@ fn underfoot(hall: &Hall, position_m: DVec2, heading_rad: f64) -> (f64, DVec2) {
     // Between the edges that it crosses all is linear.
     let mut cuts = vec![0.0, 1.0];
     for floor in &hall.floors {
-        let corners = floor.outline_m.iter().copied().map(DVec2::from_array);
-        for (a, b) in corners.clone().zip(corners.cycle().skip(1)) {
+        for [a, b] in floor.edges() {
             cuts.push(((a - from_m).perp_dot(b - a) / way_m.perp_dot(b - a)).clamp(0.0, 1.0));
         }
     }

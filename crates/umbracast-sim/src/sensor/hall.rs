@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use umbracast::Site;
 use umbracast::geometry::{DVec2, DVec3, Pose};
 use umbracast::lidar::{Model, RangeImage, Turn};
-use umbracast::site::Hall;
+use umbracast::site::{Floor, Hall};
 
 use super::panes::{Meets, Mirrored, Panes};
 
@@ -18,11 +18,11 @@ const CEILING: u8 = 60;
 const WALL: u8 = 55;
 const PILLAR: u8 = 45;
 const FURNITURE: u8 = 35;
-/// So far to either side of an edge the floor has the height that it has beside it.
-const BESIDE_M: f64 = 1e-6;
-
 /// Dust on glass, and what comes straight back.
 const PANE: u8 = 10;
+
+/// So far to either side of an edge the floor has the height that it has beside it.
+const BESIDE_M: f64 = 1e-6;
 
 /// Ranges and reflectivities of all beams at all azimuths of the head, at `beam * azimuths + azimuth`: a frame reads
 /// one beam after the other in even strides.
@@ -200,11 +200,7 @@ fn floors(hall: &Hall, origin_m: DVec3, direction: DVec3) -> f64 {
     let others = hall.floors.iter().enumerate().filter_map(|(i, floor)| {
         plane(floor.height_at_m(origin_m.truncate()), DVec2::from_array(floor.slope), Some(i))
     });
-    let edges = hall.floors.iter().flat_map(|floor| {
-        let corners = floor.outline_m.iter().copied().map(DVec2::from_array);
-        corners.clone().zip(corners.cycle().skip(1))
-    });
-    let faces = edges.filter_map(|(from, to)| {
+    let faces = hall.floors.iter().flat_map(Floor::edges).filter_map(|[from, to]| {
         let range_m = wall(origin_m.truncate(), direction.truncate(), [from, to])?;
         let aside_m = (to - from).normalize_or_zero().perp() * BESIDE_M;
         let sides_m = [aside_m, -aside_m].map(|aside_m| hall.floor_m(at_m(range_m) + aside_m));
