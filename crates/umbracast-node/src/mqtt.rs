@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -20,6 +20,9 @@ const WAITING: usize = 4096;
 const RETRY: Duration = Duration::from_secs(1);
 /// A broker is asked whether it is there when it was silent for so long.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
+/// Whoever ends waits for the broker's last acknowledgments: so often, so long.
+const NAPS: usize = 500;
+const NAP: Duration = Duration::from_millis(2);
 
 /// `[network.mqtt]` of the site file.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -40,8 +43,16 @@ pub struct Sender {
     client: Client,
     hall: String,
     lost: AtomicU64,
-    stop: Arc<AtomicBool>,
+    state: Arc<State>,
     thread: Option<JoinHandle<()>>,
+}
+
+/// What the sender and the thread that talks to the broker share.
+#[derive(Default)]
+struct State {
+    stop: AtomicBool,
+    /// What the broker has not acknowledged yet.
+    open: AtomicI64,
 }
 
 impl Sender {
@@ -66,12 +77,12 @@ impl Sender {
             options.set_transport(Transport::Tls(tls));
         }
         let (client, connection) = Client::new(options, WAITING);
-        let stop = Arc::new(AtomicBool::new(false));
+        let state = Arc::new(State::default());
         let thread = std::thread::spawn({
-            let (client, stop) = (client.clone(), stop.clone());
-            move || talk(connection, &client, &status, &stop)
+            let (client, state) = (client.clone(), state.clone());
+            move || talk(connection, &client, &status, &state)
         });
-        Ok(Self { client, hall: hall.to_owned(), lost: AtomicU64::new(0), stop, thread: Some(thread) })
+        Ok(Self { client, hall: hall.to_owned(), lost: AtomicU64::new(0), state, thread: Some(thread) })
     }
 
     /// Sends what a link has come to, as the page's events say it, to `umbracast/HALL/warnings/AP`, at least once. Waits for
@@ -80,8 +91,7 @@ impl Sender {
         // What separates levels and patterns of MQTT is in no name that can be subscribed to.
         let access_point = event.access_point.replace(['/', '+', '#'], "_");
         let topic = format!("umbracast/{}/warnings/{access_point}", self.hall);
-        let text = event.json().to_string();
-        if self.client.try_publish(topic, QoS::AtLeastOnce, false, text).is_err() {
+        if !self.state.publish(&self.client, &topic, false, event.json().to_string()) {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
@@ -94,32 +104,47 @@ impl Sender {
 
 impl Drop for Sender {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
         // Behind what waits; a broker that is not there gets the last will's word from nobody, as it has none of ours.
-        let said = self.client.try_publish(
-            format!("umbracast/{}/status", self.hall),
-            QoS::AtLeastOnce,
-            true,
-            "offline",
-        );
-        let _ = said.and_then(|()| self.client.try_disconnect());
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // It does not panic; if it did, there is nothing left to end.
+        let status = format!("umbracast/{}/status", self.hall);
+        self.state.publish(&self.client, &status, true, "offline".to_owned());
+        self.state.stop.store(true, Ordering::Release);
+        let Some(thread) = self.thread.take() else { return };
+        // A connection that is closed with acknowledgments unread is reset, and what the broker had not read is lost with it.
+        let is_heard = || self.state.open.load(Ordering::Acquire) <= 0 || thread.is_finished();
+        for _ in (0..NAPS).take_while(|_| !is_heard()) {
+            std::thread::sleep(NAP);
         }
+        let _ = self.client.try_disconnect();
+        let _ = thread.join(); // It does not panic; if it did, there is nothing left to end.
+    }
+}
+
+impl State {
+    /// At least once. False where too much waits already.
+    fn publish(&self, client: &Client, topic: &str, retain: bool, text: String) -> bool {
+        self.open.fetch_add(1, Ordering::AcqRel);
+        let taken = client.try_publish(topic, QoS::AtLeastOnce, retain, text).is_ok();
+        if !taken {
+            self.open.fetch_sub(1, Ordering::AcqRel);
+        }
+        taken
     }
 }
 
 /// Sends and receives until the client has said good-bye, or nobody is there to say it to.
-fn talk(mut connection: Connection, client: &Client, status: &str, stop: &AtomicBool) {
+fn talk(mut connection: Connection, client: &Client, status: &str, state: &State) {
     use rumqttc::{Event, Outgoing, Packet};
     for event in connection.iter() {
         match event {
             Ok(Event::Incoming(Packet::ConnAck(_))) => {
-                let _ = client.try_publish(status, QoS::AtLeastOnce, true, "online");
+                state.publish(client, status, true, "online".to_owned());
+            }
+            Ok(Event::Incoming(Packet::PubAck(_))) => {
+                state.open.fetch_sub(1, Ordering::AcqRel);
             }
             Ok(Event::Outgoing(Outgoing::Disconnect)) => return,
             Ok(_) => {}
-            Err(_) if stop.load(Ordering::Relaxed) => return,
+            Err(_) if state.stop.load(Ordering::Acquire) => return,
             Err(_) => std::thread::sleep(RETRY),
         }
     }
@@ -145,12 +170,12 @@ mod tests {
 
     use serde_json::Value;
     use umbracast_io::rows::LinkRow;
-    use umbracast_live::warnings::State;
+    use umbracast_live::warnings;
 
     fn event() -> Event {
         let mut link = LinkRow { track: 7, onset_s: [Some(0.2), Some(0.4), None], ..LinkRow::default() };
         link.p[umbracast::STEPS - 1] = 0.75;
-        Event { access_point: "door/a".to_owned(), link, state: State::Warned }
+        Event { access_point: "door/a".to_owned(), link, state: warnings::State::Warned }
     }
 
     /// The next packet of MQTT 3.1.1: its first byte, and what follows its length.
@@ -174,6 +199,17 @@ mod tests {
 
     /// The next publication's topic and payload, acknowledged.
     fn publication(stream: &mut TcpStream) -> (String, String) {
+        let (topic, text, number) = unacknowledged(stream);
+        acknowledge(stream, number);
+        (topic, text)
+    }
+
+    fn acknowledge(stream: &mut TcpStream, [high, low]: [u8; 2]) {
+        stream.write_all(&[0x40, 2, high, low]).unwrap();
+    }
+
+    /// The next publication's topic, payload and number.
+    fn unacknowledged(stream: &mut TcpStream) -> (String, String, [u8; 2]) {
         loop {
             let (kind, rest) = packet(stream);
             if kind >> 4 != 3 {
@@ -181,10 +217,8 @@ mod tests {
             }
             let length = usize::from(u16::from_be_bytes([rest[0], rest[1]]));
             let topic = String::from_utf8(rest[2..2 + length].to_vec()).unwrap();
-            let number = &rest[2 + length..4 + length];
-            // Who has said good-bye right behind it waits for no acknowledgment, and may be gone.
-            let _ = stream.write_all(&[0x40, 2, number[0], number[1]]);
-            return (topic, String::from_utf8(rest[4 + length..].to_vec()).unwrap());
+            let text = String::from_utf8(rest[4 + length..].to_vec()).unwrap();
+            return (topic, text, [rest[2 + length], rest[3 + length]]);
         }
     }
 
@@ -211,7 +245,14 @@ mod tests {
         );
         assert_eq!((&told["onset_p50_s"], &told["onset_p90_s"]), (&0.4.into(), &Value::Null));
         let ended = std::thread::spawn(move || drop(sender));
-        assert_eq!(publication(&mut stream).1, "offline");
+        // Good-bye is not said before the last word is acknowledged: a connection that is closed with acknowledgments unread is
+        // reset, and what the broker had not read yet is lost.
+        let (_, last, number) = unacknowledged(&mut stream);
+        assert_eq!(last, "offline");
+        stream.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
+        assert!(stream.read(&mut [0]).is_err(), "nothing comes before the acknowledgment");
+        stream.set_read_timeout(None).unwrap();
+        acknowledge(&mut stream, number);
         assert_eq!(packet(&mut stream).0 >> 4, 14, "good-bye");
         drop(stream);
         ended.join().unwrap();
