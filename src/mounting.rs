@@ -20,6 +20,8 @@ const EVERY: u32 = 5;
 const RETURNS: usize = 1500;
 /// What a return is taken to be of a surface by, round after round, metres.
 const GATES_M: [f64; 8] = [0.8, 0.8, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1];
+/// The last of them do where a sensor hangs as it did.
+const GATES_AGAIN_M: &[f64] = &[0.2, 0.1];
 /// One standard deviation of a return; more returns of a surface than so many tell no more of how it is turned.
 const RETURN_M: f64 = 0.04;
 const RETURNS_MAX: f64 = 200.0;
@@ -148,15 +150,18 @@ impl Mountings {
         self.points_m.extend(sampled(image, self.frames));
         let before = mounting.doubted.take();
         let Mounting { given, used, .. } = &*mounting;
-        let Some(found) = fitted(&self.points_m, given, used, &self.surroundings, &mut self.sums) else {
-            return;
-        };
         let near = |a: &Six, b: &Six, turn_rad: f64, shift_m: f64| {
             let off = |axes: std::ops::Range<usize>| axes.map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
             off(0..3) < turn_rad && off(3..6) < shift_m
         };
+        let as_used = |found: &Six| near(found, used, TURN_RAD, SHIFT_M);
+        let mut fit = |gates_m: &[f64]| {
+            fitted(&self.points_m, given, used, gates_m, &self.surroundings, &mut self.sums)
+        };
+        let again = if before.is_none() { fit(GATES_AGAIN_M).filter(as_used) } else { None };
+        let Some(found) = again.or_else(|| fit(&GATES_M)) else { return };
         match before {
-            _ if near(&found, &mounting.used, TURN_RAD, SHIFT_M) => mounting.settled = true,
+            _ if as_used(&found) => mounting.settled = true,
             None => mounting.doubted = Some(found),
             Some(before) if near(&found, &before, SAME_RAD, SAME_M) => {
                 mounting.used = found;
@@ -229,6 +234,7 @@ fn fitted(
     points_m: &[DVec3],
     given: &Pose,
     start: &Six,
+    gates_m: &[f64],
     surroundings: &Surroundings,
     sums: &mut Vec<Sums>,
 ) -> Option<Six> {
@@ -236,7 +242,7 @@ fn fitted(
     let mut by = *start;
     let mut on = (0, 0);
     sums.resize(surfaces.len(), Sums::default());
-    for gate_m in GATES_M {
+    for &gate_m in gates_m {
         let pose = corrected(given, &by);
         sums.fill(Sums::default());
         on = (0, 0);
@@ -331,7 +337,14 @@ mod tests {
         let given = site.sensors[0].site_from_sensor();
         let turn = turn_deg * std::f64::consts::PI / 180.0;
         let truth = corrected(&given, &[turn.x, turn.y, turn.z, shift_m.x, shift_m.y, shift_m.z]);
-        fitted(&returns(&truth, hall), &given, &[0.0; 6], &Surroundings::new(&site.hall), &mut Vec::new())
+        fitted(
+            &returns(&truth, hall),
+            &given,
+            &[0.0; 6],
+            &GATES_M,
+            &Surroundings::new(&site.hall),
+            &mut Vec::new(),
+        )
     }
 
     #[test]

@@ -27,12 +27,12 @@ use crate::{STEP_S, STEPS, Site};
 /// Quantiles of times that are reported.
 const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 
-/// Most body-ray tests of a crowd's frame: everybody who may stand in the way of somebody at a step, a meeting, times samples.
-/// Forty people who all meet in 500 m^2 would ask for four times as many with two access points; a quarter of the samples moves
-/// their F1 and calibration by less than .002.
-const TESTS_MAX: usize = 1 << 16;
-/// Up to so many meetings all samples are taken: ten people with two access points have fewer.
-const MEETINGS_FREE: usize = 1 << 10;
+/// Most body-ray tests of a frame: everybody who may stand in the way of somebody at a step, a meeting, times samples. Ten people
+/// with two access points have a thousand meetings at most, and all samples.
+const TESTS_MAX: usize = 1 << 18;
+/// What a person takes of that by being seen and followed, which lasts as long as so many tests: a crowd's frame is not to last
+/// longer for it. Forty people are left the fewest samples, which moves their F1 and calibration by less than .002.
+const TESTS_PER_PERSON: usize = 6000;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
 const SAMPLES_MIN: usize = WORD;
 
@@ -200,10 +200,8 @@ impl Sampler {
                 self.ends.push(self.meetings.len());
             }
         }
-        self.affordable = match self.meetings.len() {
-            ..=MEETINGS_FREE => usize::MAX,
-            meetings => (TESTS_MAX / meetings).max(SAMPLES_MIN) / WORD * WORD,
-        };
+        let tests = TESTS_MAX.saturating_sub(TESTS_PER_PERSON * self.present);
+        self.affordable = (tests / self.meetings.len().max(1)).max(SAMPLES_MIN) / WORD * WORD;
     }
 
     /// Whether the frame before had more meetings than could be asked with all samples.

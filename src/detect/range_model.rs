@@ -194,30 +194,31 @@ impl RangeModel {
         (bin + WHOLE).to_bits() & 0x7f_ffff
     }
 
+    /// The first pixel of a column whose beams look between two azimuths, if all of them look into the same bin, as those of most
+    /// sensors do nearly always: its pixels follow one another.
+    #[inline(always)]
+    pub fn shared_bin(&self, [least_cdeg, most_cdeg]: [f32; 2]) -> Option<usize> {
+        let [first, last] = [least_cdeg, most_cdeg].map(|azimuth_cdeg| self.bin(azimuth_cdeg));
+        (first == last && most_cdeg - least_cdeg < 18_000.0).then(|| first as usize * self.rows)
+    }
+
+    /// [`RangeModel::any_new`] of a column whose pixels follow one another from this one on.
+    #[inline(always)]
+    pub fn any_new_from(&self, first: usize, ranges_m: &[f32]) -> bool {
+        let n = ranges_m.len().min(self.rows);
+        let (limits_m, ranges_m) = (&self.limit_m[first..][..n], &ranges_m[..n]);
+        let mut new = 0;
+        for i in 0..n {
+            new |= u32::from(!is_known(limits_m[i], ranges_m[i]));
+        }
+        new != 0
+    }
+
     /// Whether any return of a column is new, or is one that cannot be told, as NaN.
     #[inline(always)]
     pub fn any_new(&self, pixels: &[u32], ranges_m: &[f32]) -> bool {
-        let is_known = |limit_m: f32, range_m: f32| (range_m == 0.0) | (range_m >= limit_m);
-        let least = pixels.iter().fold(u32::MAX, |least, &pixel| least.min(pixel));
-        let most = pixels.iter().fold(0, |most, &pixel| most.max(pixel));
-        let (bin, last) = (least as usize / self.rows, most as usize / self.rows);
-        if last > bin + 1 {
-            let known = |(&pixel, &range_m): (&u32, &f32)| is_known(self.limit_m(pixel as usize), range_m);
-            return !pixels.iter().zip(ranges_m).fold(true, |all, of| all & known(of));
-        }
-        // The beams of a column look into one bin or two beside each other, if the sensor does not fan them out: then
-        // the limits of both lie in a row, and nothing need be looked up.
-        let n = ranges_m.len().min(pixels.len()).min(self.rows);
-        let next = (last * self.rows) as u32;
-        let (pixels, ranges_m) = (&pixels[..n], &ranges_m[..n]);
-        let (limits_m, of_next_m) =
-            (&self.limit_m[bin * self.rows..][..n], &self.limit_m[last * self.rows..][..n]);
-        let mut new = 0;
-        for i in 0..n {
-            let limit_m = if pixels[i] < next { limits_m[i] } else { of_next_m[i] };
-            new |= u32::from(!is_known(limit_m, ranges_m[i]));
-        }
-        new != 0
+        let known = |(&pixel, &range_m): (&u32, &f32)| is_known(self.limit_m(pixel as usize), range_m);
+        !pixels.iter().zip(ranges_m).fold(true, |all, of| all & known(of))
     }
 
     /// Returns nearer than this are new. Zero, so that nothing is, until the scene is known.
@@ -473,6 +474,12 @@ impl RangeModel {
     fn limit_of(&self, pixels: [usize; 3]) -> f32 {
         pixels.map(|pixel| self.nearest_m[pixel]).into_iter().fold(f32::INFINITY, f32::min) - self.margin_m
     }
+}
+
+/// Whether a return is none or lies no nearer than its pixel's limit.
+#[inline(always)]
+fn is_known(limit_m: f32, range_m: f32) -> bool {
+    (range_m == 0.0) | (range_m >= limit_m)
 }
 
 /// The nearest range that came back in at least `least` revolutions. Where none did although the pixel often

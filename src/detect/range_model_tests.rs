@@ -30,6 +30,7 @@ fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
     (0..model.limit_m.len()).for_each(|pixel| model.limit_m[pixel] = 2.0 + (pixel * 7 % 13) as f32);
     let columns = [
         [500.0; ROWS],
+        [510.0, 520.0, 580.0, 590.0],
         [590.0, 595.0, 600.0, 605.0],
         [35_990.0, 36_010.0, 35_900.0, 0.0],
         [0.0, 500.0, 9e3, 2e4],
@@ -38,13 +39,22 @@ fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
         let mut pixels = [0; ROWS];
         model.pixels(&azimuths_cdeg, &mut pixels);
         let limits_m = pixels.map(|pixel| model.limit_m(pixel as usize));
-        assert!(!model.any_new(&pixels, &limits_m), "{azimuths_cdeg:?}");
-        assert!(!model.any_new(&pixels, &[0.0; ROWS]), "nothing came back");
+        // What is told of a column whose beams share a bin is the same.
+        let outermost = [azimuths_cdeg[0], azimuths_cdeg[ROWS - 1]];
+        let any_new = |ranges_m: &[f32; ROWS]| {
+            let new = model.any_new(&pixels, ranges_m);
+            let shared = model.shared_bin(outermost);
+            assert_eq!(shared.is_some(), pixels[ROWS - 1] == pixels[0] + ROWS as u32 - 1);
+            assert!(shared.is_none_or(|first| model.any_new_from(first, ranges_m) == new));
+            new
+        };
+        assert!(!any_new(&limits_m), "{azimuths_cdeg:?}");
+        assert!(!any_new(&[0.0; ROWS]), "nothing came back");
         for row in 0..ROWS {
             for nearer_m in [limits_m[row] - 0.001, f32::NAN] {
                 let mut ranges_m = limits_m;
                 ranges_m[row] = nearer_m;
-                assert!(model.any_new(&pixels, &ranges_m), "{azimuths_cdeg:?}, row {row}");
+                assert!(any_new(&ranges_m), "{azimuths_cdeg:?}, row {row}");
             }
         }
     }

@@ -269,15 +269,31 @@ impl SensorModel {
         turned.extend(image.beams.iter().map(|beam| [beam.turned_ns as f32, beam.azimuth_offset_cdeg]));
         azimuths_cdeg.resize(beams, 0.0);
         pixels.resize(beams, 0);
+        let least_and_most = |i: usize| {
+            let all = turned.iter().map(|beam| beam[i]);
+            [all.clone().fold(f32::INFINITY, f32::min), all.fold(f32::NEG_INFINITY, f32::max)]
+        };
+        let [turned_ns, offset_cdeg] = [0, 1].map(least_and_most);
         for (c, (column, ranges_m)) in image.columns.iter().zip(image.range_m.chunks_exact(beams)).enumerate()
         {
-            for (azimuth_cdeg, [turned_ns, offset_cdeg]) in azimuths_cdeg.iter_mut().zip(&*turned) {
+            let azimuth_cdeg = |turned_ns: f32, offset_cdeg: f32| {
                 let turned_cdeg = column.azimuth_rate_cdeg_per_ns * turned_ns;
-                *azimuth_cdeg = column.azimuth_cdeg + turned_cdeg + offset_cdeg;
+                column.azimuth_cdeg + turned_cdeg + offset_cdeg
+            };
+            // Nearly every column sees nothing but the hall.
+            let may_skip = !learn.is_all() && !ranges.has_furniture();
+            let clockwise = column.azimuth_rate_cdeg_per_ns >= 0.0;
+            let outermost =
+                |i: usize| azimuth_cdeg(turned_ns[if clockwise { i } else { 1 - i }], offset_cdeg[i]);
+            let shared = if may_skip { ranges.shared_bin([outermost(0), outermost(1)]) } else { None };
+            if shared.is_some_and(|first| !ranges.any_new_from(first, ranges_m)) {
+                continue;
+            }
+            for (azimuth, [turned_ns, offset_cdeg]) in azimuths_cdeg.iter_mut().zip(&*turned) {
+                *azimuth = azimuth_cdeg(*turned_ns, *offset_cdeg);
             }
             ranges.pixels(azimuths_cdeg, pixels);
-            // Nearly every column sees nothing but the hall.
-            if !learn.is_all() && !ranges.has_furniture() && !ranges.any_new(pixels, ranges_m) {
+            if may_skip && shared.is_none() && !ranges.any_new(pixels, ranges_m) {
                 continue;
             }
             for (b, &range_m) in ranges_m.iter().enumerate() {

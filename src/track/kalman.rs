@@ -82,6 +82,18 @@ impl Filter {
         State { x, P }
     }
 
+    /// Position and velocity of [`Filter::state_after`].
+    pub fn mean_after(&self, dt_s: f64) -> (DVec2, DVec2) {
+        let [x, y, vx, vy]: [f64; 4] = mean(self.weighted());
+        let (position_m, velocity_mps) = (DVec2::new(x, y), DVec2::new(vx, vy));
+        (position_m + dt_s.max(0.0) * velocity_mps, velocity_mps)
+    }
+
+    /// Position and velocity of [`Filter::state`].
+    pub fn mean(&self) -> (DVec2, DVec2) {
+        self.mean_after(0.0)
+    }
+
     fn weighted(&self) -> impl Iterator<Item = (f64, &Full)> + Clone {
         self.hypotheses.iter().map(|h| (h.weight, &h.state))
     }
@@ -122,7 +134,7 @@ impl Filter {
 
     /// Takes a measured position whose error has covariance `R`.
     pub fn correct(&mut self, position_m: DVec2, R: Mat2) {
-        let axes = Axes::along(self.state().velocity_mps());
+        let axes = Axes::along(self.mean().1);
         // A weight is a logarithm until all are known.
         for h in &mut self.hypotheses {
             h.weight = h.weight.ln() + h.state.correct(position_m, R, &axes);
@@ -235,18 +247,25 @@ fn process_noise(psd_m2ps3: f64, dt_s: f64) -> Q {
 /// One Gaussian with the mean and covariance of a weighted mixture, of the state's first `M` numbers.
 fn mixture<'a, const M: usize>(parts: impl Iterator<Item = (f64, &'a Full)> + Clone) -> Gaussian<M> {
     let total: f64 = parts.clone().map(|part| part.0).sum();
-    let mut mean = Gaussian { x: [0.0; M], P: [[0.0; M]; M] };
-    for (weight, part) in parts.clone() {
-        for i in 0..M {
-            mean.x[i] += weight / total * part.x[i];
-        }
-    }
+    let mut mixture = Gaussian { x: mean(parts.clone()), P: [[0.0; M]; M] };
     for (weight, part) in parts {
-        let d: [f64; M] = std::array::from_fn(|i| part.x[i] - mean.x[i]);
+        let d: [f64; M] = std::array::from_fn(|i| part.x[i] - mixture.x[i]);
         for i in 0..M {
             for j in 0..M {
-                mean.P[i][j] += weight / total * (part.P[i][j] + d[i] * d[j]);
+                mixture.P[i][j] += weight / total * (part.P[i][j] + d[i] * d[j]);
             }
+        }
+    }
+    mixture
+}
+
+/// The mean of [`mixture`].
+fn mean<'a, const M: usize>(parts: impl Iterator<Item = (f64, &'a Full)> + Clone) -> [f64; M] {
+    let total: f64 = parts.clone().map(|part| part.0).sum();
+    let mut mean = [0.0; M];
+    for (weight, part) in parts {
+        for i in 0..M {
+            mean[i] += weight / total * part.x[i];
         }
     }
     mean
