@@ -61,7 +61,7 @@ fn people_move_links_turn_and_the_last_minute_can_be_gone_back_through() {
     );
     page.until("document.body.dataset.blocked > 0");
     page.screenshot("page.png");
-    assert!(page.value("document.querySelectorAll('#links tbody tr.blocked').length").as_u64() > Some(0));
+    page.until("document.querySelectorAll('#links tbody tr.blocked').length > 0");
 
     // A frame before now stays while new ones come.
     page.until("kept.length > 25");

@@ -14,9 +14,10 @@ use crate::messages::{self, Schema};
 use crate::results::{Message, Results};
 use crate::rows::{PeopleLinkRow, PeopleRow};
 
-/// A chunk of what goes on for hours, at most, bytes: a second of two HDL-32E. The index of the file, some 250 bytes a
-/// chunk, stays in memory until the file ends, so chunks should be few.
-const LIVE_CHUNK_BYTES: u64 = 4 << 20;
+/// A chunk of what goes on for hours, at most, bytes: more than two HDL-32E give in a second, after which it is written anyway.
+/// Its buffer has that size from the start; one that outgrows it is moved, and the memory that it leaves is not given back. The
+/// index of the file, some 250 bytes a chunk, stays in memory until the file ends, so chunks should be few.
+const LIVE_CHUNK_BYTES: u64 = 8 << 20;
 
 /// Writes a recording, in chunks of a frame or two.
 pub struct RecordingWriter {
