@@ -5,7 +5,7 @@ use super::range_model::{RangeModel, Verdict};
 use super::{Point, Prior};
 use crate::Health;
 use crate::geometry::{DVec3, Pose};
-use crate::lidar::{Cloud, Model, RangeImage, Scan, SensorPoint};
+use crate::lidar::{Cloud, Column, Model, RangeImage, Scan, SensorPoint};
 use crate::site::{Hall, Sensor};
 
 /// Width of a pixel of an organised scan: a little more than one column of a sensor at 10 Hz.
@@ -222,10 +222,9 @@ impl SensorModel {
                     let (c, b) = (i / beams, i % beams);
                     if range_m >= self.range_min_m && range_m <= self.range_max_m {
                         let (column, beam) = (&image.columns[c], &image.beams[b]);
-                        let turned_cdeg = column.azimuth_rate_cdeg_per_ns * beam.turned_ns as f32;
-                        let pixel = self
-                            .ranges
-                            .pixel(b, column.azimuth_cdeg + turned_cdeg + beam.azimuth_offset_cdeg);
+                        let looks_cdeg =
+                            azimuth_cdeg(column, beam.turned_ns as f32, beam.azimuth_offset_cdeg);
+                        let pixel = self.ranges.pixel(b, looks_cdeg);
                         let position_m = organised_point(of, image, c, b, range_m).position_m;
                         returns.push(Return { scan, pixel, position_m });
                     }
@@ -276,21 +275,17 @@ impl SensorModel {
         let [turned_ns, offset_cdeg] = [0, 1].map(least_and_most);
         for (c, (column, ranges_m)) in image.columns.iter().zip(image.range_m.chunks_exact(beams)).enumerate()
         {
-            let azimuth_cdeg = |turned_ns: f32, offset_cdeg: f32| {
-                let turned_cdeg = column.azimuth_rate_cdeg_per_ns * turned_ns;
-                column.azimuth_cdeg + turned_cdeg + offset_cdeg
-            };
             // Nearly every column sees nothing but the hall.
             let may_skip = !learn.is_all() && !ranges.has_furniture();
             let clockwise = column.azimuth_rate_cdeg_per_ns >= 0.0;
             let outermost =
-                |i: usize| azimuth_cdeg(turned_ns[if clockwise { i } else { 1 - i }], offset_cdeg[i]);
+                |i: usize| azimuth_cdeg(column, turned_ns[if clockwise { i } else { 1 - i }], offset_cdeg[i]);
             let shared = if may_skip { ranges.shared_bin([outermost(0), outermost(1)]) } else { None };
             if shared.is_some_and(|first| !ranges.any_new_from(first, ranges_m)) {
                 continue;
             }
             for (azimuth, [turned_ns, offset_cdeg]) in azimuths_cdeg.iter_mut().zip(&*turned) {
-                *azimuth = azimuth_cdeg(*turned_ns, *offset_cdeg);
+                *azimuth = azimuth_cdeg(column, *turned_ns, *offset_cdeg);
             }
             ranges.pixels(azimuths_cdeg, pixels);
             if may_skip && shared.is_none() && !ranges.any_new(pixels, ranges_m) {
@@ -392,6 +387,12 @@ impl SensorModel {
             key(a).cmp(&key(b)).then_with(|| place(a).cmp(&place(b)))
         });
     }
+}
+
+/// Where a beam looks that fires so long after its column begins, and so far to the right of the head.
+#[inline(always)]
+fn azimuth_cdeg(column: &Column, turned_ns: f32, offset_cdeg: f32) -> f32 {
+    column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * turned_ns + offset_cdeg
 }
 
 /// A sensor that is not known has no pixels to fill.

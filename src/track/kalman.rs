@@ -82,16 +82,25 @@ impl Filter {
         State { x, P }
     }
 
-    /// Position and velocity of [`Filter::state_after`].
-    pub fn mean_after(&self, dt_s: f64) -> (DVec2, DVec2) {
-        let [x, y, vx, vy]: [f64; 4] = mean(self.weighted());
-        let (position_m, velocity_mps) = (DVec2::new(x, y), DVec2::new(vx, vy));
-        (position_m + dt_s.max(0.0) * velocity_mps, velocity_mps)
+    /// The position of [`Filter::state_after`], without its covariance.
+    pub fn position_after(&self, dt_s: f64) -> DVec2 {
+        let [x, y, ..] = self.means();
+        DVec2::new(x, y) + dt_s.max(0.0) * self.velocity_mps()
     }
 
-    /// Position and velocity of [`Filter::state`].
-    pub fn mean(&self) -> (DVec2, DVec2) {
-        self.mean_after(0.0)
+    /// The same of [`Filter::state`].
+    pub fn position_m(&self) -> DVec2 {
+        self.position_after(0.0)
+    }
+
+    /// The velocity of [`Filter::state`].
+    pub fn velocity_mps(&self) -> DVec2 {
+        let [_, _, vx, vy] = self.means();
+        DVec2::new(vx, vy)
+    }
+
+    fn means(&self) -> [f64; 4] {
+        mean(self.weighted())
     }
 
     fn weighted(&self) -> impl Iterator<Item = (f64, &Full)> + Clone {
@@ -134,7 +143,7 @@ impl Filter {
 
     /// Takes a measured position whose error has covariance `R`.
     pub fn correct(&mut self, position_m: DVec2, R: Mat2) {
-        let axes = Axes::along(self.mean().1);
+        let axes = Axes::along(self.velocity_mps());
         // A weight is a logarithm until all are known.
         for h in &mut self.hypotheses {
             h.weight = h.weight.ln() + h.state.correct(position_m, R, &axes);

@@ -146,7 +146,7 @@ impl MixtureTracker {
         let Memory { bodies, expected, .. } = memory;
         visibility.look(views);
         bodies.clear();
-        let body = |p: &Person| p.body(p.filter.mean_after(step_s).0, &visibility.hall);
+        let body = |p: &Person| p.body(p.filter.position_after(step_s), &visibility.hall);
         bodies.extend(people.iter().map(body));
         expected.clear();
         expected.extend(bodies.iter().map(|body| {
@@ -164,7 +164,7 @@ impl MixtureTracker {
         let Self { numbers, people, memory, .. } = self;
         let Memory { order, expected, places_m, assignment, .. } = memory;
         places_m.clear();
-        places_m.extend(people.iter().map(|p| p.filter.mean().0));
+        places_m.extend(people.iter().map(|p| p.filter.position_m()));
         let reach_m = GATE_M + FASTEST_MPS * seconds(last_ns, time_ns);
         let cost = |p: usize, d: usize| {
             let (person, detection) = (&people[p], &detections[order[d]]);
@@ -203,7 +203,7 @@ impl MixtureTracker {
         ranks.clear();
         ranks.extend(self.people.iter().map(|p| (Reverse(p.confirmed), Reverse(p.matches), p.id)));
         places_m.clear();
-        places_m.extend(self.people.iter().map(|p| p.filter.mean().0));
+        places_m.extend(self.people.iter().map(|p| p.filter.position_m()));
         for i in 0..self.people.len() {
             let (person, place_m) = (&self.people[i], places_m[i]);
             let doubles = |(k, other): (usize, &Person)| {
@@ -237,7 +237,7 @@ impl MixtureTracker {
         taken.resize(order.len(), false);
         assignment.column_of.iter().flatten().for_each(|&d| taken[d] = true);
         places_m.clear();
-        places_m.extend(people.iter().map(|p| p.filter.mean().0));
+        places_m.extend(people.iter().map(|p| p.filter.position_m()));
         for (&d, _) in order.iter().zip(taken).filter(|(_, taken)| !**taken) {
             let detection = &detections[d];
             let around = places_m.iter().filter(|place| place.distance(detection.position_m) < CROWD_M);

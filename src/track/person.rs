@@ -161,7 +161,7 @@ impl Person {
     }
 
     fn speed_mps(&self) -> f64 {
-        self.filter.mean().1.length()
+        self.filter.velocity_mps().length()
     }
 
     /// The frame's detection of this person, `step_s` after the last frame; the filter stands at it.
@@ -206,7 +206,7 @@ impl Person {
 
     /// Where it stands, if it is furniture.
     pub(super) fn furniture_m(&self, time_ns: i64) -> Option<DVec2> {
-        self.origin.is_furniture(time_ns).then(|| self.filter.mean().0)
+        self.origin.is_furniture(time_ns).then(|| self.filter.position_m())
     }
 
     /// Whether it has a detection in this frame.
