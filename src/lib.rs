@@ -31,6 +31,7 @@
 //! # Ok::<(), umbracast::Error>(())
 //! ```
 
+mod elementary;
 pub mod error;
 pub mod geometry;
 pub mod health;

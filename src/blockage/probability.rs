@@ -18,6 +18,7 @@ use super::rays::{Near, Rays};
 use super::shadows::{Meeting, Shadows};
 use super::things::Things;
 use super::trajectories::{Disc, MOMENTS, Trajectories};
+use crate::elementary::wide;
 use crate::forecast::Forecast;
 use crate::geometry::DVec3;
 use crate::site::{Hall, Ue};
@@ -134,35 +135,16 @@ impl Sampler {
         }
     }
 
-    /// Draws everybody's trajectories and finds out who can come in whose way. A person's draws depend on the seed, the
-    /// track and nothing else, so the samples of one frame and the next differ only by what the tracks learned.
-    pub fn draw<'a>(
-        &mut self,
-        numbers: &Numbers,
-        ue: &Ue,
-        aps_m: &[DVec3],
-        people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
-    ) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has just said that it has what the function was compiled for.
-            return unsafe { self.draw_avx2(numbers, ue, aps_m, people) };
-        }
-        self.draw_portably(numbers, ue, aps_m, people);
-    }
-
-    /// [`Sampler::draw`], once more for processors with wider registers. No instruction that rounds otherwise is used
-    /// (fused multiply-add is another feature), so both give the same bits.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn draw_avx2<'a>(
-        &mut self,
-        numbers: &Numbers,
-        ue: &Ue,
-        aps_m: &[DVec3],
-        people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
-    ) {
-        self.draw_portably(numbers, ue, aps_m, people);
+    wide! {
+        /// Draws everybody's trajectories and finds out who can come in whose way. A person's draws depend on the seed, the
+        /// track and nothing else, so the samples of one frame and the next differ only by what the tracks learned.
+        pub fn draw<'a>(
+            &mut self,
+            numbers: &Numbers,
+            ue: &Ue,
+            aps_m: &[DVec3],
+            people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
+        ) = draw_avx2 or draw_portably
     }
 
     #[inline(always)]
@@ -209,22 +191,12 @@ impl Sampler {
         self.samples < numbers.samples
     }
 
-    /// What becomes of the link between access point `ap` of those drawn for and `person`. It counts as blocked now from
-    /// `threshold` on.
-    pub fn chances(&mut self, ue: &Ue, ap: usize, ap_m: DVec3, person: usize, threshold: f64) -> Chances {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has just said that it has what the function was compiled for.
-            return unsafe { self.chances_avx2(ue, ap, ap_m, person, threshold) };
-        }
-        self.chances_portably(ue, ap, ap_m, person, threshold)
-    }
-
-    /// [`Sampler::chances`], once more as [`Sampler::draw`] is.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn chances_avx2(&mut self, ue: &Ue, ap: usize, ap_m: DVec3, person: usize, threshold: f64) -> Chances {
-        self.chances_portably(ue, ap, ap_m, person, threshold)
+    wide! {
+        /// What becomes of the link between access point `ap` of those drawn for and `person`. It counts as blocked now from
+        /// `threshold` on.
+        pub fn chances(
+            &mut self, ue: &Ue, ap: usize, ap_m: DVec3, person: usize, threshold: f64,
+        ) -> Chances = chances_avx2 or chances_portably
     }
 
     #[inline(always)]

@@ -10,6 +10,7 @@ use serde::Deserialize;
 
 use super::features::{AxisFeatures, EVEN, ODD};
 use crate::Error;
+use crate::elementary::{tanh, wide};
 use crate::geometry::DVec2;
 
 /// Numbers that the network gives: the offset from the view's base away from the sensor and to the left of that, in
@@ -148,9 +149,14 @@ impl Network {
         (view.base_m + a * offset.x + l * offset.y, covariance)
     }
 
+    wide! {
+        fn forward(&self, view: &AxisFeatures) -> [[f64; OUTPUTS]; 2] = forward_avx2 or forward_portably
+    }
+
     /// What the network says of a view and of its mirror image, whose odd inputs have the other sign: the sums over the even
     /// ones are the same.
-    fn forward(&self, view: &AxisFeatures) -> [[f64; OUTPUTS]; 2] {
+    #[inline(always)]
+    fn forward_portably(&self, view: &AxisFeatures) -> [[f64; OUTPUTS]; 2] {
         let inputs = self.model.inputs(&view.even, &view.odd);
         let bias: [f64; OUTPUTS] = from_fn(|o| self.model.output_bias[o]);
         let mut outputs = [bias; 2];
@@ -167,10 +173,10 @@ impl Network {
                     mirrored[u] -= product;
                 }
             }
-            for (outputs, sums) in outputs.iter_mut().zip([own, mirrored]) {
-                for u in 0..UNITS {
-                    let unit = (sums[u] + units.bias[u]).tanh();
-                    (0..OUTPUTS).for_each(|o| outputs[o] += units.to_outputs[o][u] * unit);
+            for (outputs, mut sums) in outputs.iter_mut().zip([own, mirrored]) {
+                (0..UNITS).for_each(|u| sums[u] = tanh(sums[u] + units.bias[u]));
+                for (output, weights) in outputs.iter_mut().zip(&units.to_outputs) {
+                    *output += weights.iter().zip(&sums).map(|(weight, unit)| weight * unit).sum::<f64>();
                 }
             }
         }

@@ -2,7 +2,8 @@
 //! body, and parts nearer than two bodies can stand become one. Where people are expected moves both thresholds.
 
 use super::arms::{ALONE_M, ARM_M, have_one_head, is_arm};
-use super::guided::owners;
+use super::means::{PASSES, means, one_more, people_if};
+use super::memory::{Memory, PEOPLE_OF_CLUSTER};
 use super::part::Part;
 use super::{Cluster, Prior};
 use crate::geometry::{DVec2, DVec3};
@@ -24,8 +25,6 @@ const ONE_PERSON_M: f64 = 0.33;
 const LIMB_M: f64 = 0.55;
 /// Low: its top is below this share of the person's, for a leg ends below the hip.
 const LIMB_TOP_SHARE: f64 = 0.55;
-/// Passes of k-means; it settles in three or four.
-const PASSES: usize = 10;
 /// How sure a known person's place is at most where pieces are given away, and in a crowd: there a track that took a
 /// neighbour's points would otherwise be told by them that it is right.
 const PIECES_SIGMA_M: f64 = 0.05;
@@ -36,29 +35,21 @@ const BESIDE_M: f64 = 0.30;
 /// Points that deviate more than this along their longest axis are more than four people in a row.
 const CROWD_M: f64 = 0.7;
 
-/// Kept from frame to frame.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Memory {
-    /// Parts from west to east.
-    order: Vec<usize>,
-    /// Pairs of parts near each other, with how far apart.
-    candidates: Vec<(f64, usize, usize)>,
-    into: Vec<usize>,
-    /// By prior: confirmed, and nobody's body is there.
-    without_body: Vec<bool>,
-    /// Lists of points that are no longer needed.
-    pub(super) spare: Vec<Cluster>,
-}
-
 /// Splits a cluster as long as one person more is likelier; parts go to `parts`. `moved_m` are all points, each
 /// moved behind the surface that its sensor saw.
-pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts: &mut Vec<Part>) {
+pub(super) fn split(
+    moved_m: &[DVec3],
+    priors: &[Prior],
+    cluster: Cluster,
+    parts: &mut Vec<Part>,
+    memory: &mut Memory,
+) {
     if cluster.len() < 2 * POINTS_MIN {
         parts.push(Part::new(moved_m, cluster));
         return;
     }
     let all = Part::new(moved_m, cluster);
-    let axis_m = long_axis(moved_m, &all);
+    let axis_m = all.axis_m(moved_m);
     let is_crowd = axis_m.length() > CROWD_M;
     // Most are one person alone, for whom nothing need be remembered.
     if !is_crowd
@@ -68,72 +59,106 @@ pub(super) fn split(moved_m: &[DVec3], priors: &[Prior], cluster: Cluster, parts
         parts.push(all);
         return;
     }
-    let known: Vec<usize> = expected(moved_m, priors, &all.points).collect();
+    let mut known = memory.people.take(PEOPLE_OF_CLUSTER);
+    known.extend(expected(moved_m, priors, &all.points));
+    split_more(moved_m, priors, &known, &all, axis_m, parts, memory);
+    memory.people.give(known);
+    memory.points.give(all.points);
+}
+
+/// The same for a cluster within which these confirmed people are expected, and which may be more than one.
+fn split_more(
+    moved_m: &[DVec3],
+    priors: &[Prior],
+    known: &[usize],
+    all: &Part,
+    axis_m: DVec2,
+    parts: &mut Vec<Part>,
+    memory: &mut Memory,
+) {
+    let (is_crowd, cluster) = (axis_m.length() > CROWD_M, &all.points);
     if is_crowd && known.is_empty() {
         // The work grows with the square of the people, so a crowd is halved first; whom the cut divides, the
         // merge makes whole again.
-        let ends_m = vec![all.mean_m() - axis_m, all.mean_m() + axis_m];
-        for half in means(moved_m, &all.points, ends_m).into_iter().flatten() {
-            split(moved_m, priors, half.points, parts);
+        if let Some(mut halves) = means(moved_m, cluster, all.ends_m(axis_m), memory) {
+            halves.drain(..).for_each(|half| split(moved_m, priors, half.points, parts, memory));
+            memory.parts.give(halves);
         }
         return;
     }
-    let cluster = &all.points;
-    let expected_m = || known.iter().map(|&k| priors[k].position_m).collect();
+    let expected_m = known.iter().map(|&k| priors[k].position_m);
     let guided = match is_crowd {
         true => None,
-        false => means(moved_m, cluster, expected_m()).filter(|people| are_people(people, EXPECTED_HALVES_M)),
+        false => {
+            people_if(moved_m, cluster, expected_m, memory, |people| are_people(people, EXPECTED_HALVES_M))
+        }
     };
     if is_crowd || guided.is_none() && known.len() > 1 {
-        among_known(moved_m, priors, &known, cluster, parts);
+        among_known(moved_m, priors, known, cluster, parts, memory);
         return;
     }
-    let mut people = guided.unwrap_or_else(|| vec![all.clone()]);
+    let mut people = guided.unwrap_or_else(|| {
+        let (mut one, mut points) = (memory.parts.take(PEOPLE_OF_CLUSTER), memory.take_points());
+        points.extend(cluster);
+        one.push(Part { points, ..*all });
+        one
+    });
     // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
     // are never counted: two of them may be one person or two. Nor are the halves of somebody alone with his arms out.
-    while let Some(more) = means(moved_m, cluster, one_more(moved_m, &people))
-        && are_people(&more, HALVES_M)
-        && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
-        && !(more.len() == 2
-            && expected_near(&[&all], priors) < 2
-            && are_of_one_body(moved_m, &more, known.len() == 1))
-    {
-        people = more;
+    let are_more = |more: &[Part]| {
+        are_people(more, HALVES_M)
+            && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
+            && !(more.len() == 2
+                && expected_near(&[all], priors) < 2
+                && are_of_one_body(moved_m, more, known.len() == 1))
+    };
+    while let Some(more) = people_if(moved_m, cluster, one_more(moved_m, &people), memory, are_more) {
+        memory.give_parts(std::mem::replace(&mut people, more));
     }
     parts.append(&mut people);
+    memory.parts.give(people);
 }
 
 /// Gives each point of a cluster to the known person whose body explains it best, so that who shows little costs nobody
 /// else anything; what nobody known explains is split as if nobody were known.
-fn among_known(moved_m: &[DVec3], priors: &[Prior], known: &[usize], cluster: &[u32], parts: &mut Vec<Part>) {
-    let people: Vec<&Prior> = known.iter().map(|&k| &priors[k]).collect();
-    let mut own = vec![Cluster::new(); people.len()];
-    let mut strangers = Cluster::new();
-    for (&i, owner) in cluster.iter().zip(owners(moved_m, cluster, &people, CROWD_SIGMA_M)) {
-        match owner {
-            Some(k) => own[k].push(i),
-            None => strangers.push(i),
-        }
-    }
-    for (&k, points) in known.iter().zip(own) {
-        if points.is_empty() {
+fn among_known(
+    moved_m: &[DVec3],
+    priors: &[Prior],
+    known: &[usize],
+    cluster: &[u32],
+    parts: &mut Vec<Part>,
+    memory: &mut Memory,
+) {
+    let people = known.iter().map(|&k| &priors[k]);
+    let (mut own, strangers) = memory.share_out(moved_m, cluster, people, CROWD_SIGMA_M);
+    for (&k, mut whole) in known.iter().zip(own.drain(..)) {
+        if whole.points.is_empty() {
+            memory.points.give(whole.points);
             continue;
         }
-        let whole = Part::new(moved_m, points);
-        let axis_m = long_axis(moved_m, &whole);
-        let ends_m = vec![whole.mean_m() - axis_m, whole.mean_m() + axis_m];
-        let two = means(moved_m, &whole.points, ends_m)
-            .filter(|two| are_people(two, BESIDE_M) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M));
-        let mut halves = two.unwrap_or_else(|| vec![whole]);
+        whole.look(moved_m);
+        let ends_m = whole.ends_m(whole.axis_m(moved_m));
+        let are_two =
+            |two: &[Part]| are_people(two, BESIDE_M) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M);
+        let first = parts.len();
+        match people_if(moved_m, &whole.points, ends_m, memory, are_two) {
+            Some(mut two) => {
+                parts.append(&mut two);
+                memory.parts.give(two);
+                memory.points.give(whole.points);
+            }
+            None => parts.push(whole),
+        }
         // Who stands beside somebody known is new; the known one is where he is expected.
         let off_m = |part: &Part| part.mean_m().distance(priors[k].position_m);
-        halves.sort_by(|a, b| off_m(a).total_cmp(&off_m(b)));
-        halves[0].owner = Some(k);
-        halves[0].expected = true;
-        parts.append(&mut halves);
+        parts[first..].sort_by(|a, b| off_m(a).total_cmp(&off_m(b)));
+        parts[first].owner = Some(k);
+        parts[first].expected = true;
     }
-    if !strangers.is_empty() {
-        split(moved_m, &[], strangers, parts);
+    memory.parts.give(own);
+    match strangers.is_empty() {
+        true => memory.points.give(strangers),
+        false => split(moved_m, &[], strangers, parts, memory),
     }
 }
 
@@ -155,7 +180,7 @@ fn are_people(parts: &[Part], apart_m: f64) -> bool {
 /// their body.
 pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], memory: &mut Memory) {
     let reach_m = ONE_PERSON_M.max(LIMB_M).max(ARM_M);
-    let Memory { order, candidates, into, spare, .. } = memory;
+    let Memory { order, candidates, into, points, .. } = memory;
     order.clear();
     order.extend(0..parts.len());
     order.sort_unstable_by(|&a, &b| parts[a].mean_m().x.total_cmp(&parts[b].mean_m().x).then(a.cmp(&b)));
@@ -186,7 +211,7 @@ pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], 
         if i == j || !is_one_person(moved_m, &parts[i], &parts[j], priors) {
             continue;
         }
-        spare.push(join(parts, i, j));
+        points.give(join(parts, i, j));
         into[j] = i;
     }
     tidy(parts);
@@ -195,7 +220,7 @@ pub(super) fn merge(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], 
 /// Gives the points of pieces to the expected people whose bodies are nowhere: legs where the beams pass below the
 /// hips, or the few points that others let through. Without an expected person such pieces are nobody.
 pub(super) fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Prior], memory: &mut Memory) {
-    let Memory { without_body, .. } = memory;
+    let mut without_body = std::mem::take(&mut memory.without_body);
     let off_m = |part: &Part, k: usize| priors[k].position_m.distance(part.mean_m());
     let is_near = |part: &Part, k: usize| off_m(part, k) < LIMB_M + priors[k].position_sigma_m.min(LIMB_M);
     let confirmed = || (0..priors.len()).filter(|&k| priors[k].confirmed);
@@ -208,27 +233,33 @@ pub(super) fn give_pieces(moved_m: &[DVec3], parts: &mut Vec<Part>, priors: &[Pr
             without_body[k] = false;
         }
     }
-    let is_theirs = |piece: &Part| confirmed().any(|k| without_body[k] && is_near(piece, k));
-    if !parts.iter().any(|part| is_piece(part) && is_theirs(part)) {
-        return;
-    }
-    let (near, others): (Vec<Part>, Vec<Part>) =
-        parts.drain(..).partition(|part| is_piece(part) && is_theirs(part));
-    parts.extend(others);
-    let points: Cluster = near.into_iter().flat_map(|piece| piece.points).collect();
-    let people: Vec<&Prior> = priors.iter().filter(|prior| prior.confirmed).collect();
-    let mut own = vec![Cluster::new(); people.len()];
-    for (&i, owner) in points.iter().zip(owners(moved_m, &points, &people, PIECES_SIGMA_M)) {
-        if let Some(k) = owner {
-            own[k].push(i);
+    let is_theirs = |part: &Part| is_piece(part) && confirmed().any(|k| without_body[k] && is_near(part, k));
+    let mut pieces = memory.take_points();
+    parts.retain_mut(|part| {
+        let goes = is_theirs(part);
+        if goes {
+            pieces.append(&mut part.points);
+            memory.points.give(std::mem::take(&mut part.points));
         }
-    }
-    for (k, mut points) in confirmed().zip(own) {
-        if without_body[k] && !points.is_empty() {
-            points.sort_unstable();
-            parts.push(Part { expected: true, ..Part::new(moved_m, points) });
+        !goes
+    });
+    if !pieces.is_empty() {
+        let people = priors.iter().filter(|prior| prior.confirmed);
+        let (mut own, nobodys) = memory.share_out(moved_m, &pieces, people, PIECES_SIGMA_M);
+        for (k, mut part) in confirmed().zip(own.drain(..)) {
+            if without_body[k] && !part.points.is_empty() {
+                part.points.sort_unstable();
+                part.look(moved_m);
+                parts.push(Part { expected: true, ..part });
+            } else {
+                memory.points.give(part.points);
+            }
         }
+        memory.parts.give(own);
+        memory.points.give(nobodys);
     }
+    memory.points.give(pieces);
+    memory.without_body = without_body;
 }
 
 /// True for what may be somebody's leg or head, but does not look like a whole person, and is not known to be somebody's.
@@ -336,63 +367,6 @@ fn has_halves(moved_m: &[DVec3], part: &Part, axis_m: DVec2) -> bool {
     means_m[0].distance(means_m[1]) > HALVES_M && halves.iter().all(is_person)
 }
 
-/// The means of the parts, those of the longest replaced by two, half a step to either side of its middle.
-fn one_more(moved_m: &[DVec3], parts: &[Part]) -> Vec<DVec2> {
-    let axes_m: Vec<DVec2> = parts.iter().map(|part| long_axis(moved_m, part)).collect();
-    let longest = (0..parts.len()).max_by(|&a, &b| axes_m[a].length().total_cmp(&axes_m[b].length()));
-    let mut means_m: Vec<DVec2> = parts.iter().map(Part::mean_m).collect();
-    if let Some(longest) = longest {
-        means_m.push(means_m[longest] + axes_m[longest]);
-        means_m[longest] -= axes_m[longest];
-    }
-    means_m
-}
-
-/// Along the larger deviation in plan view, as long as it.
-fn long_axis(moved_m: &[DVec3], part: &Part) -> DVec2 {
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for &i in &part.points {
-        let off = moved_m[i as usize].truncate() - part.mean_m();
-        xx += off.x * off.x;
-        xy += off.x * off.y;
-        yy += off.y * off.y;
-    }
-    let larger = 0.5 * (xx + yy + ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt());
-    DVec2::from_angle(0.5 * f64::atan2(2.0 * xy, xx - yy)) * (larger / part.points.len().max(1) as f64).sqrt()
-}
-
-/// k-means of the cluster from these means; `None` with fewer than two, or when one of them loses all its points.
-fn means(moved_m: &[DVec3], cluster: &[u32], mut means_m: Vec<DVec2>) -> Option<Vec<Part>> {
-    if means_m.len() < 2 {
-        return None;
-    }
-    let nearest = |means_m: &[DVec2], i: u32| {
-        let p = moved_m[i as usize].truncate();
-        let off_m2 = means_m.iter().map(|mean_m| mean_m.distance_squared(p)).enumerate();
-        off_m2.min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(mean, _)| mean)
-    };
-    for _ in 0..PASSES {
-        let mut sums = vec![(DVec2::ZERO, 0.0); means_m.len()];
-        for &i in cluster {
-            let sum = &mut sums[nearest(&means_m, i)];
-            sum.0 += moved_m[i as usize].truncate();
-            sum.1 += 1.0;
-        }
-        let last = std::mem::replace(&mut means_m, sums.iter().map(|(sum, n)| sum / n).collect());
-        if means_m.iter().any(|mean| mean.is_nan()) {
-            return None;
-        }
-        if last == means_m {
-            break;
-        }
-    }
-    let mut points = vec![Cluster::new(); means_m.len()];
-    for &i in cluster {
-        points[nearest(&means_m, i)].push(i);
-    }
-    Some(points.into_iter().map(|points| Part::new(moved_m, points)).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -409,8 +383,9 @@ mod tests {
 
     fn people(points_m: &[DVec3], priors: &[Prior]) -> usize {
         let mut parts = Vec::new();
-        split(points_m, priors, (0..points_m.len() as u32).collect(), &mut parts);
-        merge(points_m, &mut parts, priors, &mut Memory::default());
+        let memory = &mut Memory::default();
+        split(points_m, priors, (0..points_m.len() as u32).collect(), &mut parts, memory);
+        merge(points_m, &mut parts, priors, memory);
         parts.len()
     }
 
@@ -455,9 +430,10 @@ mod tests {
         let points_m: Vec<DVec3> = body(0.0, 0.0).into_iter().chain(body(0.72, 0.0)).chain(head).collect();
         let known = [prior(0.0, 0.0), prior(0.36, 0.0), prior(0.72, 0.0)];
         let mut parts = Vec::new();
-        split(&points_m, &known, (0..points_m.len() as u32).collect(), &mut parts);
-        merge(&points_m, &mut parts, &known, &mut Memory::default());
-        give_pieces(&points_m, &mut parts, &known, &mut Memory::default());
+        let memory = &mut Memory::default();
+        split(&points_m, &known, (0..points_m.len() as u32).collect(), &mut parts, memory);
+        merge(&points_m, &mut parts, &known, memory);
+        give_pieces(&points_m, &mut parts, &known, memory);
         assert_eq!(parts.len(), 3);
         assert!(parts.iter().any(|part| part.expected && (80..83).all(|i| part.points.contains(&i))));
     }

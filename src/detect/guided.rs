@@ -16,16 +16,33 @@ const MEAN_SIGMA_M: f64 = 0.1;
 /// The same for a single point.
 const POINT_SIGMA_M: f64 = 0.2;
 
-/// The place of each of `points` in `people`, if anybody's. `moved_m` are all points, each moved behind the surface
+/// Kept from cluster to cluster.
+#[derive(Debug, Clone, Default)]
+pub struct Memory {
+    known: Vec<Known>,
+    /// The place of each point's owner in `people`, if anybody's.
+    pub owners: Vec<Option<usize>>,
+}
+
+/// Finds whose each of `points` is; `memory.owners` has it. `moved_m` are all points, each moved behind the surface
 /// that its sensor saw. k-means, where each person's place stays near the expected one and a body has a shape.
 /// Nobody's place is taken to be surer than `sigma_min_m`.
-pub fn owners(moved_m: &[DVec3], points: &[u32], people: &[&Prior], sigma_min_m: f64) -> Vec<Option<usize>> {
-    let mut known: Vec<Known> = people.iter().map(|prior| Known::new(prior, sigma_min_m)).collect();
-    let mut owners = vec![None; points.len()];
+pub fn find_owners<'a>(
+    moved_m: &[DVec3],
+    points: &[u32],
+    people: impl Iterator<Item = &'a Prior>,
+    sigma_min_m: f64,
+    memory: &mut Memory,
+) {
+    let Memory { known, owners } = memory;
+    known.clear();
+    known.extend(people.map(|prior| Known::new(prior, sigma_min_m)));
+    owners.clear();
+    owners.resize(points.len(), None);
     for pass in 0..PASSES {
         let mut changed = pass == 0;
-        for (&i, owner) in points.iter().zip(&mut owners) {
-            let likeliest = likeliest(moved_m[i as usize], &known);
+        for (&i, owner) in points.iter().zip(&mut *owners) {
+            let likeliest = likeliest(moved_m[i as usize], known);
             changed |= likeliest != *owner;
             *owner = likeliest;
         }
@@ -33,18 +50,18 @@ pub fn owners(moved_m: &[DVec3], points: &[u32], people: &[&Prior], sigma_min_m:
             break;
         }
         known.iter_mut().for_each(|one| (one.sum_m, one.points) = (DVec2::ZERO, 0.0));
-        for (&i, k) in points.iter().zip(&owners).filter_map(|(i, owner)| Some((i, (*owner)?))) {
+        for (&i, k) in points.iter().zip(&*owners).filter_map(|(i, owner)| Some((i, (*owner)?))) {
             known[k].sum_m += moved_m[i as usize].truncate();
             known[k].points += 1.0;
         }
         known.iter_mut().for_each(Known::settle);
     }
-    owners
 }
 
 /// Somebody who is known, and where the points are taken to show him.
-struct Known<'a> {
-    prior: &'a Prior,
+#[derive(Debug, Clone)]
+struct Known {
+    prior: Prior,
     /// Unit vector; none of who stands.
     heading: Option<DVec2>,
     variance_m2: f64,
@@ -56,12 +73,12 @@ struct Known<'a> {
     points: f64,
 }
 
-impl<'a> Known<'a> {
-    fn new(prior: &'a Prior, sigma_min_m: f64) -> Self {
+impl Known {
+    fn new(prior: &Prior, sigma_min_m: f64) -> Self {
         let velocity_mps = prior.velocity_mps;
         let variance_m2 = prior.position_sigma_m.max(sigma_min_m).powi(2);
         Self {
-            prior,
+            prior: *prior,
             heading: (velocity_mps.length() >= WALKS_FROM_MPS).then(|| velocity_mps.normalize()),
             variance_m2,
             place_m: prior.position_m,
@@ -140,14 +157,17 @@ mod tests {
         let feet = [(0.3, 0.05), (-0.3, 0.0), (0.3, 0.45), (-0.3, 0.5)];
         let points_m: Vec<DVec3> = feet.iter().map(|&(x, y)| DVec3::new(x, y, 0.1)).collect();
         let people = [prior(0.05, 0.0, DVec2::X), prior(-0.05, 0.5, DVec2::X)];
-        let people: Vec<&Prior> = people.iter().collect();
-        assert_eq!(owners(&points_m, &[0, 1, 2, 3], &people, 0.05), [Some(0), Some(0), Some(1), Some(1)]);
+        let mut memory = Memory::default();
+        find_owners(&points_m, &[0, 1, 2, 3], people.iter(), 0.05, &mut memory);
+        assert_eq!(memory.owners, [Some(0), Some(0), Some(1), Some(1)]);
     }
 
     #[test]
     fn what_lies_apart_from_everybody_known_is_nobodys() {
         let points_m = [DVec3::new(0.0, 0.1, 1.2), DVec3::new(0.1, 1.0, 1.2)];
         let known = prior(0.0, 0.0, DVec2::ZERO);
-        assert_eq!(owners(&points_m, &[0, 1], &[&known], 0.05), [Some(0), None]);
+        let mut memory = Memory::default();
+        find_owners(&points_m, &[0, 1], [known].iter(), 0.05, &mut memory);
+        assert_eq!(memory.owners, [Some(0), None]);
     }
 }

@@ -14,6 +14,8 @@ pub mod features;
 mod dp_means;
 mod guided;
 mod part;
+mod memory;
+mod means;
 mod arms;
 mod evidence;
 mod split_merge;

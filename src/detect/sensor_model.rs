@@ -4,6 +4,7 @@ use super::first_sight::Return;
 use super::range_model::{RangeModel, Verdict};
 use super::{Point, Prior};
 use crate::Health;
+use crate::elementary::wide;
 use crate::geometry::{DVec3, Pose};
 use crate::lidar::{Cloud, Column, Model, RangeImage, Scan, SensorPoint};
 use crate::site::{Hall, Sensor};
@@ -190,27 +191,10 @@ impl SensorModel {
         }
     }
 
-    fn organised(&mut self, look: Look, image: &RangeImage, health: &mut Health, points: &mut Vec<Point>) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has just said that it has what the function was compiled for.
-            return unsafe { self.organised_avx2(look, image, health, points) };
-        }
-        self.organised_portably(look, image, health, points);
-    }
-
-    /// Once more for processors with wider registers; no instruction that rounds otherwise is used, so both give the same
-    /// bits.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn organised_avx2(
-        &mut self,
-        look: Look,
-        image: &RangeImage,
-        health: &mut Health,
-        points: &mut Vec<Point>,
-    ) {
-        self.organised_portably(look, image, health, points);
+    wide! {
+        fn organised(
+            &mut self, look: Look, image: &RangeImage, health: &mut Health, points: &mut Vec<Point>,
+        ) = organised_avx2 or organised_portably
     }
 
     /// The returns of a scan, the `scan`-th of its frame, with their pixels.

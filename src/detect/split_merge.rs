@@ -2,8 +2,8 @@
 
 use super::cluster::PlanGrid;
 use super::dp_means::MergeMean;
-use super::evidence::Memory;
 use super::features::away;
+use super::memory::Memory;
 use super::part::Part;
 use super::{Cluster, Point, Prior, above_floor, dp_means, evidence};
 use crate::Site;
@@ -31,11 +31,6 @@ const OURS: Radius =
     Radius { radius_m: 0.2, per_range: 0.005, shift_m: 0.1, points_min: evidence::POINTS_MIN };
 /// As hdl_people_tracking has it.
 const ADAPTED: Radius = Radius { radius_m: 0.2, per_range: 0.0, shift_m: 0.0, points_min: 16 };
-
-/// Of so many points is nearly everybody, unless he is beside a sensor: lists are made for that many at once.
-const POINTS_OF_ONE: usize = 512;
-/// So many lists that are no longer needed are kept.
-const SPARE_MAX: usize = 256;
 
 /// Groups foreground points into people.
 ///
@@ -118,8 +113,7 @@ impl Clusterer {
     /// assert_eq!(clusters.len(), 2);
     /// ```
     pub fn clusters(&mut self, points: &[Point], priors: &[Prior], clusters: &mut Vec<Cluster>) {
-        self.memory.spare.append(clusters);
-        self.memory.spare.truncate(SPARE_MAX);
+        clusters.drain(..).for_each(|cluster| self.memory.give_points(cluster));
         self.components(points);
         match self.method {
             ClusterMethod::Evidence => self.by_evidence(if self.guided { priors } else { &[] }, clusters),
@@ -140,13 +134,13 @@ impl Clusterer {
     fn by_evidence(&mut self, priors: &[Prior], clusters: &mut Vec<Cluster>) {
         let Self { moved_m, parts, memory, .. } = self;
         for component in self.components.drain(..) {
-            evidence::split(moved_m, priors, component, parts);
+            evidence::split(moved_m, priors, component, parts, memory);
         }
         evidence::merge(moved_m, parts, priors, memory);
         evidence::give_pieces(moved_m, parts, priors, memory);
         for part in parts.drain(..) {
             let is_person = part.expected || part.points.len() >= self.radius.points_min;
-            if is_person { clusters.push(part.points) } else { memory.spare.push(part.points) }
+            if is_person { clusters.push(part.points) } else { memory.give_points(part.points) }
         }
     }
 
@@ -173,13 +167,7 @@ impl Clusterer {
         }
         let found =
             self.grid.components(&self.plan_m, &self.radius_m, self.radius.radius_m, &mut self.labels);
-        let spare = &mut self.memory.spare;
-        self.components.resize_with(found, || {
-            let mut list = spare.pop().unwrap_or_default();
-            list.clear();
-            list.reserve(POINTS_OF_ONE);
-            list
-        });
+        self.components.resize_with(found, || self.memory.take_points());
         for (&label, i) in self.labels.iter().zip(0..) {
             self.components[label as usize].push(i);
         }

@@ -4,6 +4,8 @@
 //! [`LANES`] gate columns, each row by row of the input. People go in groups of [`GROUP`], whose sums stay in
 //! registers while a panel streams by.
 
+use crate::elementary::{multiply_add_f32, sigmoid_f32, tanh_f32};
+
 /// Gate columns of a panel: two AVX2 registers.
 pub(super) const LANES: usize = 16;
 /// People a panel serves at once: 5 x 2 sums, 2 weights and 1 input fill 13 of 16 registers.
@@ -112,7 +114,8 @@ fn weighted_sums<const FUSED: bool>(panel: &[Lanes], rows: &[[f32; GROUP]], bias
     for (weights, inputs) in panel.iter().zip(rows) {
         for person in 0..GROUP {
             for lane in 0..LANES {
-                sums[person][lane] = multiply_add::<FUSED>(weights[lane], inputs[person], sums[person][lane]);
+                sums[person][lane] =
+                    multiply_add_f32::<FUSED>(weights[lane], inputs[person], sums[person][lane]);
             }
         }
     }
@@ -130,50 +133,16 @@ fn update<const FUSED: bool>(
     for person in 0..GROUP {
         let mut hidden = [0.0; LANES];
         for lane in 0..LANES {
-            let kept = sigmoid::<FUSED>(forget[person][lane]) * cell[person][lane];
-            let added = sigmoid::<FUSED>(input[person][lane]) * tanh::<FUSED>(candidate[person][lane]);
+            let kept = sigmoid_f32::<FUSED>(forget[person][lane]) * cell[person][lane];
+            let added =
+                sigmoid_f32::<FUSED>(input[person][lane]) * tanh_f32::<FUSED>(candidate[person][lane]);
             cell[person][lane] = kept + added;
-            hidden[lane] = sigmoid::<FUSED>(output[person][lane]) * tanh::<FUSED>(cell[person][lane]);
+            hidden[lane] = sigmoid_f32::<FUSED>(output[person][lane]) * tanh_f32::<FUSED>(cell[person][lane]);
         }
         for lane in 0..LANES {
             next_hidden[lane][person] = hidden[lane];
         }
     }
-}
-
-#[inline(always)]
-fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
-}
-
-#[inline(always)]
-fn sigmoid<const FUSED: bool>(x: f32) -> f32 {
-    1.0 / (1.0 + exp::<FUSED>(-x))
-}
-
-#[inline(always)]
-fn tanh<const FUSED: bool>(x: f32) -> f32 {
-    2.0 * sigmoid::<FUSED>(2.0 * x) - 1.0
-}
-
-/// e^x to 2 units in the last place, without a branch or a call, so that lanes go side by side: x = n ln 2 + r,
-/// a polynomial for e^r (coefficients: Cephes, `expf`), 2^n put into the exponent.
-#[inline(always)]
-fn exp<const FUSED: bool>(x: f32) -> f32 {
-    /// Adding it rounds to a whole number, which then stands in the low bits.
-    const ROUND: f32 = 12_582_912.0;
-    const LN_2_HIGH: f32 = 0.693_359_4;
-    const LN_2_LOW: f32 = -2.121_944_4e-4;
-    let x = x.clamp(-87.0, 87.0);
-    let rounded = multiply_add::<FUSED>(x, std::f32::consts::LOG2_E, ROUND);
-    let n = rounded - ROUND;
-    let r = multiply_add::<FUSED>(n, -LN_2_LOW, multiply_add::<FUSED>(n, -LN_2_HIGH, x));
-    let mut p = 1.987_569_1e-4;
-    for coefficient in [1.398_2e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5, 1.0, 1.0] {
-        p = multiply_add::<FUSED>(p, r, coefficient);
-    }
-    let two_to_n = f32::from_bits((rounded.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
-    p * two_to_n
 }
 
 #[cfg(test)]
@@ -204,18 +173,5 @@ mod tests {
                 assert!((plain - here).abs() < 1e-6, "{plain} and {here}");
             }
         }
-    }
-
-    #[test]
-    fn exp_and_its_children_are_exact_to_single_precision() {
-        for i in -4000..=4000 {
-            let x = i as f32 * 0.02;
-            let (found, expected) = (f64::from(exp::<false>(x)), f64::from(x).exp());
-            assert!((found / expected - 1.0).abs() < 3e-7, "exp({x}) = {found}, expected {expected}");
-            let (found, expected) = (f64::from(tanh::<false>(x)), f64::from(x).tanh());
-            assert!((found - expected).abs() < 3e-7, "tanh({x}) = {found}, expected {expected}");
-        }
-        assert_eq!(sigmoid::<false>(1000.0), 1.0);
-        assert!(sigmoid::<false>(-1000.0) < 1e-37);
     }
 }

@@ -16,6 +16,7 @@ use super::constant_velocity::ACCELERATION_PSD_M2PS3;
 use super::inputs::{INPUTS, Seen, mirror, see};
 use super::tensors::tensor;
 use super::{Coupling, Forecast, Gaussian2, constant_velocity};
+use crate::elementary::{sigmoid_f32, wide};
 use crate::geometry::DVec2;
 use crate::track::Track;
 use crate::{Error, STEP_S, STEPS};
@@ -178,27 +179,14 @@ fn coupling(outputs: &[f64; OUTPUTS], seen: &Seen, axes: [DVec2; 2]) -> Coupling
 }
 
 impl Network {
-    fn outputs(&self, inputs: &[f32; INPUTS]) -> [f32; OUTPUTS] {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has just said that it has what the function was compiled for.
-            return unsafe { self.outputs_avx2(inputs) };
-        }
-        self.outputs_portably(inputs)
-    }
-
-    /// Once more for processors with wider registers; no instruction that rounds otherwise is used, so both give the same
-    /// bits.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn outputs_avx2(&self, inputs: &[f32; INPUTS]) -> [f32; OUTPUTS] {
-        self.outputs_portably(inputs)
+    wide! {
+        fn outputs(&self, inputs: &[f32; INPUTS]) -> [f32; OUTPUTS] = outputs_avx2 or outputs_portably
     }
 
     #[inline(always)]
     fn outputs_portably(&self, inputs: &[f32; INPUTS]) -> [f32; OUTPUTS] {
         // x sigmoid(x): smooth, and cheap enough.
-        let bent = |x: f32| x / (1.0 + (-x).exp());
+        let bent = |x: f32| x * sigmoid_f32::<false>(x);
         let first = self.first.of(inputs).map(bent);
         let second = self.second.of(&first).map(bent);
         self.head.of(&second)

@@ -4,9 +4,12 @@
 //! of the head and a gap below it; while the person walks, the beams sweep over the head.
 
 use super::remembered::{Remembered, Words};
+use crate::elementary::{exp, ln, wide};
 
 /// Lowest height of an adult that is thought of, metres.
 const ADULT_M: f64 = 1.30;
+/// Cells that are added up side by side.
+const LANES: usize = 8;
 /// From one height to the next, metres.
 const STEP_M: f64 = 0.01;
 /// Heights below an adult's that are thought of: down to 0.85 m, a child of two.
@@ -52,10 +55,10 @@ impl Height {
     /// An adult, or with chance `children_share` a child, of whom `adult_mean_m` and `adult_sigma_m` say nothing.
     pub(super) fn new(adult_mean_m: f64, adult_sigma_m: f64, children_share: f64) -> Self {
         // Relative to the density of adults at their mean.
-        let density = std::f64::consts::TAU.sqrt() * adult_sigma_m / (CHILD_MAX_M - height_m(0));
+        let density = std::f64::consts::TAU.sqrt() * adult_sigma_m / (CHILD_MAX_M - HEIGHTS_M[0]);
         let child = (children_share / (1.0 - children_share) * density).ln();
-        let adult = |i: usize| -0.5 * ((height_m(i) - adult_mean_m) / adult_sigma_m).powi(2);
-        let is_child = |i: usize| i < LOWER || height_m(i) < CHILD_MAX_M && adult(i) < child;
+        let adult = |i: usize| -0.5 * ((HEIGHTS_M[i] - adult_mean_m) / adult_sigma_m).powi(2);
+        let is_child = |i: usize| i < LOWER || HEIGHTS_M[i] < CHILD_MAX_M && adult(i) < child;
         let log_p = std::array::from_fn(|i| if is_child(i) { child } else { adult(i) });
         let adults = (0..CELLS).find(|&i| !is_child(i)).unwrap_or(0);
         Self { log_p, adults, mean_m: adult_mean_m, sigma_m: adult_sigma_m }
@@ -69,49 +72,78 @@ impl Height {
         self.sigma_m
     }
 
-    /// Takes the highest point of a frame, where so many beams meet a metre of upright head.
-    pub(super) fn see(&mut self, top_m: f64, beams_per_m: f64) {
+    wide! {
+        /// Takes the highest point of a frame, where so many beams meet a metre of upright head.
+        pub(super) fn see(&mut self, top_m: f64, beams_per_m: f64) = see_avx2 or see_portably
+    }
+
+    #[inline(always)]
+    fn see_portably(&mut self, top_m: f64, beams_per_m: f64) {
         let gap_m = if beams_per_m > 0.0 { GAP_SHARE / beams_per_m } else { GAP_UNKNOWN_M };
-        let mut p: [f64; CELLS] = std::array::from_fn(|i| {
-            // Even between a gap below the top of the head and the top, softened by the point's error.
-            let below_m = height_m(i) - top_m;
-            let even = rise(below_m / TOP_SIGMA_M) - rise((below_m - gap_m) / TOP_SIGMA_M);
-            (1.0 - OUTLIER) * even / gap_m + OUTLIER
-        });
+        let mut p = [0.0; CELLS];
+        let (across, density) = (steepness(gap_m), (1.0 - OUTLIER) / gap_m);
+        for i in 0..CELLS {
+            // Even between a gap below the top of the head and the top, softened by the point's error: with the logistic
+            // curve, which lies within 0.01 of a normal distribution's, 1 / (1 + below) - 1 / (1 + below across).
+            let below = steepness(top_m - HEIGHTS_M[i]);
+            let farther = below * across;
+            p[i] = density * (farther - below) / ((1.0 + below) * (1.0 + farther)) + OUTLIER;
+        }
         if beams_per_m <= 0.0 {
             // Where no beam meets the head, an adult looks as low as a child: which of them it is stays open.
             let (children, adults) = p.split_at_mut(self.adults);
-            let weights = self.log_p[self.adults..].iter().map(|log_p| log_p.exp());
+            let weights = self.log_p[self.adults..].iter().map(|log_p| exp(*log_p));
             let (sum, weighted) =
                 weights.zip(adults).fold((0.0, 0.0), |(sum, all), (w, p)| (sum + w, all + w * *p));
             if sum > 0.0 {
                 children.fill(weighted / sum);
             }
         }
-        for (log_p, p) in self.log_p.iter_mut().zip(&p) {
-            *log_p += NEW_IN_A_FRAME * p.ln();
+        for i in 0..CELLS {
+            self.log_p[i] += NEW_IN_A_FRAME * ln(p[i]);
         }
-        let most = self.log_p.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let (mut sum, mut weighted, mut squares) = (0.0, 0.0, 0.0);
-        for (i, log_p) in self.log_p.iter_mut().enumerate() {
-            *log_p -= most;
-            let p = log_p.exp();
-            sum += p;
-            weighted += p * height_m(i);
-            squares += p * height_m(i).powi(2);
+        let mut most = [f64::NEG_INFINITY; LANES];
+        for log_p in self.log_p.as_chunks::<LANES>().0 {
+            for k in 0..LANES {
+                most[k] = if log_p[k] > most[k] { log_p[k] } else { most[k] };
+            }
         }
+        let most = most.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let mut sums = [[0.0; LANES]; 3];
+        for (log_p, height_m) in
+            self.log_p.as_chunks_mut::<LANES>().0.iter_mut().zip(HEIGHTS_M.as_chunks::<LANES>().0)
+        {
+            for k in 0..LANES {
+                log_p[k] -= most;
+                let p = exp(log_p[k]);
+                sums[0][k] += p;
+                sums[1][k] += p * height_m[k];
+                sums[2][k] += p * height_m[k] * height_m[k];
+            }
+        }
+        let [sum, weighted, squares] = sums.map(|lanes| lanes.into_iter().sum::<f64>());
         self.mean_m = weighted / sum;
         self.sigma_m = (squares / sum - self.mean_m.powi(2)).max(0.0).sqrt();
     }
 }
 
-fn height_m(cell: usize) -> f64 {
-    ADULT_M + STEP_M * (cell as f64 - LOWER as f64)
-}
+/// Of each cell.
+const HEIGHTS_M: [f64; CELLS] = {
+    let (mut heights_m, mut cell) = ([0.0; CELLS], 0);
+    while cell < CELLS {
+        heights_m[cell] = ADULT_M + STEP_M * (cell as f64 - LOWER as f64);
+        cell += 1;
+    }
+    heights_m
+};
 
-/// From 0 to 1 as a normal distribution's does, by the logistic curve that lies within 0.01 of it.
-fn rise(sigmas: f64) -> f64 {
-    1.0 / (1.0 + (-1.702 * sigmas).exp())
+/// By how much the odds of a logistic curve over points' errors change within a distance, within what products of two can
+/// hold.
+#[inline(always)]
+fn steepness(m: f64) -> f64 {
+    const MOST: f64 = 300.0;
+    let powers = m * (1.702 / TOP_SIGMA_M);
+    exp(if powers < MOST { powers } else { MOST })
 }
 
 #[cfg(test)]

@@ -54,6 +54,8 @@ struct Eye {
     sensor_from_site: Pose,
     range_m: (f64, f64),
     fan: Option<Fan>,
+    /// Of the fan's beams: how far each rises in a metre, ascending.
+    rises: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -121,16 +123,14 @@ impl Visibility {
                 sensor_from_site: view.site_from_sensor.inverse(),
                 range_m: self.ranges_m.get(view.sensor).copied().unwrap_or((0.0, f64::INFINITY)),
                 fan: None,
+                rises: Vec::new(),
             };
             match self.eyes.get_mut(i) {
                 // The fan's memory stays.
-                Some(old) => *old = Eye { fan: old.fan.take(), ..eye },
+                Some(old) => *old = Eye { fan: old.fan.take(), rises: std::mem::take(&mut old.rises), ..eye },
                 None => self.eyes.push(eye),
             }
-            match (&mut self.eyes[i].fan, &view.fan) {
-                (Some(own), Some(fan)) => own.copy_from(fan),
-                (own, fan) => own.clone_from(fan),
-            }
+            self.eyes[i].take(view.fan.as_ref());
         }
     }
 
@@ -166,25 +166,37 @@ impl Visibility {
 }
 
 impl Eye {
+    /// Sees by a scan's beams.
+    fn take(&mut self, fan: Option<&Fan>) {
+        let [own, new] = [self.fan.as_ref(), fan].map(|fan| fan.map_or(&[][..], |fan| &fan.elevations_rad));
+        if own != new {
+            self.rises.clear();
+            self.rises.extend(new.iter().map(|rad| rad.tan()));
+        }
+        match (&mut self.fan, fan) {
+            (Some(own), Some(fan)) => own.copy_from(fan),
+            (own, fan) => *own = fan.cloned(),
+        }
+    }
+
     /// Adds what a body gives to this sensor.
     fn view(&self, body: &Body, between: &mut Between, view: &mut BodyView) {
         let across = (body.position_m - self.origin_m.truncate()).perp().normalize_or_zero();
         let feet_m = [-0.5, 0.5].map(|side| body.position_m + across * (side * BODY_RADIUS_M));
-        let z_m = |edge: usize| body.height_m * edge as f64 / SLICES as f64;
+        let z_m = |edge: usize| body.height_m * (edge as f64 / SLICES as f64);
         let above = |foot_m: DVec2, up_m: f64| foot_m.extend(body.floor_m + up_m);
-        let edges: [[Edge; SLICES + 1]; 2] =
-            feet_m.map(|foot_m| std::array::from_fn(|edge| self.edge(above(foot_m, z_m(edge)))));
+        let sides = feet_m.map(|foot_m| Side::of(self, above(foot_m, 0.0), z_m));
         between.cross(self.origin_m.truncate(), feet_m);
         for slice in 0..SLICES {
             let (low_m, high_m) = (z_m(slice), z_m(slice + 1));
-            for (side, (foot_m, edges)) in feet_m.iter().zip(&edges).enumerate() {
-                let beams = self.beams_between(&edges[slice], &edges[slice + 1]);
+            for (i, (foot_m, side)) in feet_m.iter().zip(&sides).enumerate() {
+                let beams = self.beams_between(&side.edges[slice], &side.edges[slice + 1]);
                 if beams == 0.0 {
                     continue;
                 }
-                let returns = beams * self.columns_on(&edges[slice]) * 0.5;
+                let returns = beams * side.columns_on(slice) * 0.5;
                 view.returns_alone += returns;
-                if between.hide(side, self.origin_m, above(*foot_m, 0.5 * (low_m + high_m))) {
+                if between.hide(i, self.origin_m, above(*foot_m, 0.5 * (low_m + high_m))) {
                     continue;
                 }
                 view.top_m = view.top_m.max(high_m);
@@ -196,17 +208,9 @@ impl Eye {
         }
     }
 
-    fn edge(&self, point_m: DVec3) -> Edge {
-        let at_m = self.sensor_from_site.point(point_m);
-        let away_m = at_m.x.hypot(at_m.y);
-        let beam = self.fan.as_ref().map_or(0.0, |fan| beam_at(fan, at_m.z.atan2(away_m)));
-        Edge { at_m, away_m, beam }
-    }
-
     /// Beams that pass between two points of a vertical line.
     fn beams_between(&self, low: &Edge, high: &Edge) -> f64 {
-        let range_m = low.at_m.length();
-        if range_m < self.range_m.0 || range_m > self.range_m.1 {
+        if low.range_m < self.range_m.0 || low.range_m > self.range_m.1 {
             return 0.0;
         }
         match self.fan {
@@ -214,25 +218,50 @@ impl Eye {
             None => RETURNS_OF_UNKNOWN_BEAMS / SLICES as f64,
         }
     }
-
-    /// Columns that meet a body at a point.
-    fn columns_on(&self, at: &Edge) -> f64 {
-        let Some(fan) = &self.fan else { return 1.0 };
-        let width_rad = 2.0 * BODY_RADIUS_M / at.away_m.max(BODY_RADIUS_M);
-        let columns = fan.columns[sector((-at.at_m.y).atan2(at.at_m.x))];
-        f64::from(columns) * width_rad * SECTORS as f64 / TAU
-    }
 }
 
-/// A point of a body's side as a sensor sees it.
+/// A body's side, from the feet up, as a sensor sees it.
+struct Side {
+    edges: [Edge; SLICES + 1],
+    /// Columns in the direction of its middle; none where they are not known.
+    columns_per_rad: Option<f64>,
+}
+
+/// A point of a body's side.
 #[derive(Clone, Copy)]
 struct Edge {
-    /// In the sensor's frame.
-    at_m: DVec3,
-    /// Horizontally from the sensor's axis.
+    range_m: f64,
+    /// Across the sensor's axis.
     away_m: f64,
     /// Beams below it; 0 where they are not known.
     beam: f64,
+}
+
+impl Side {
+    /// Of the vertical line above `foot_m`, with edges at heights `z_m`.
+    fn of(eye: &Eye, foot_m: DVec3, z_m: impl Fn(usize) -> f64) -> Self {
+        let up = eye.sensor_from_site.direction(DVec3::Z);
+        let foot_m = eye.sensor_from_site.point(foot_m);
+        let at_m = |edge: usize| foot_m + up * z_m(edge);
+        let edges = std::array::from_fn(|edge| {
+            let at_m = at_m(edge);
+            let away_m2 = at_m.x * at_m.x + at_m.y * at_m.y;
+            let away_m = away_m2.sqrt();
+            let beam = beam_at(&eye.rises, at_m.z / away_m.max(f64::MIN_POSITIVE));
+            Edge { range_m: (away_m2 + at_m.z * at_m.z).sqrt(), away_m, beam }
+        });
+        let columns_per_rad = eye.fan.as_ref().map(|fan| {
+            let middle_m = at_m(SLICES / 2);
+            f64::from(fan.columns[sector((-middle_m.y).atan2(middle_m.x))]) * SECTORS as f64 / TAU
+        });
+        Self { edges, columns_per_rad }
+    }
+
+    /// Columns that meet the body at an edge.
+    fn columns_on(&self, edge: usize) -> f64 {
+        let width_rad = 2.0 * BODY_RADIUS_M / self.edges[edge].away_m.max(BODY_RADIUS_M);
+        self.columns_per_rad.map_or(1.0, |columns_per_rad| columns_per_rad * width_rad)
+    }
 }
 
 impl Between {
@@ -261,16 +290,15 @@ impl Between {
     }
 }
 
-/// How many beams lie below an elevation, counted smoothly: half a beam at the lowest one.
-fn beam_at(fan: &Fan, elevation_rad: f64) -> f64 {
-    let all = &fan.elevations_rad;
-    let n = all.partition_point(|&e| e < elevation_rad);
+/// How many beams lie below a direction that rises so far in a metre, counted smoothly: half a beam at the lowest one.
+fn beam_at(rises: &[f64], rise: f64) -> f64 {
+    let n = rises.partition_point(|&of_beam| of_beam < rise);
     let (low, high) = match n {
         0 => return 0.0,
-        n if n == all.len() => return n as f64,
-        n => (all[n - 1], all[n]),
+        n if n == rises.len() => return n as f64,
+        n => (rises[n - 1], rises[n]),
     };
-    n as f64 - 0.5 + (elevation_rad - low) / (high - low)
+    n as f64 - 0.5 + (rise - low) / (high - low)
 }
 
 /// Between which shares of its length the line from the eye to the target is within an upright cylinder, if at all. One

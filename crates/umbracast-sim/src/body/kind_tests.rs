@@ -20,19 +20,16 @@ fn walker(kind: Kind, seed: u64) -> Walker {
         300..400 => DVec2::ZERO,
         _ => DVec2::new(0.0, 1.0),
     };
+    Walker::of_kind(way(600, velocity), seed, kind)
+}
+
+/// With this velocity in each of so many steps.
+fn way(steps: usize, velocity_mps: impl Fn(usize) -> DVec2) -> Trajectory {
     let mut positions_m = vec![DVec2::ZERO];
-    for i in 0..600 {
-        positions_m.push(positions_m[i] + velocity(i) * 0.01);
+    for i in 0..steps {
+        positions_m.push(positions_m[i] + velocity_mps(i) * 0.01);
     }
-    let way = Trajectory {
-        person: 0,
-        start_ns: 0,
-        step_ns: STEP_NS,
-        positions_m,
-        arrived_ns: None,
-        height_m: None,
-    };
-    Walker::of_kind(way, seed, kind)
+    Trajectory { person: 0, start_ns: 0, step_ns: STEP_NS, positions_m, arrived_ns: None, height_m: None }
 }
 
 fn mesh(walker: &Walker, step: i64) -> Vec<DVec3> {
@@ -237,19 +234,7 @@ fn a_turned_chair_is_the_same_chair() {
 /// Walks for 2 s, rests for 12 s, walks on.
 #[test]
 fn who_stays_sits_down_and_gets_up_again_and_no_foot_slides() {
-    let mut positions_m = vec![DVec2::ZERO];
-    for i in 0..1600 {
-        let velocity_mps = if (200..1400).contains(&i) { DVec2::ZERO } else { DVec2::X };
-        positions_m.push(positions_m[i] + velocity_mps * 0.01);
-    }
-    let way = Trajectory {
-        person: 0,
-        start_ns: 0,
-        step_ns: STEP_NS,
-        positions_m,
-        arrived_ns: None,
-        height_m: None,
-    };
+    let way = way(1600, |step| if (200..1400).contains(&step) { DVec2::ZERO } else { DVec2::X });
     for seed in 0..5 {
         let walker = Walker::of_kind(way.clone(), seed, Kind::Sitting);
         let standing_m = walker.build.height_m();
