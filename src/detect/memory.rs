@@ -23,6 +23,7 @@ pub(super) struct Memory {
     /// By prior: confirmed, and nobody's body is there.
     pub(super) without_body: Vec<bool>,
     guided: guided::Memory,
+    /// Lists by what they hold: points, parts, places of means, people by their priors.
     pub(super) points: Pool<u32>,
     pub(super) parts: Pool<Part>,
     pub(super) places: Pool<DVec2>,
@@ -62,11 +63,6 @@ impl Memory {
     /// An empty list of points.
     pub(super) fn take_points(&mut self) -> Cluster {
         self.points.take(POINTS_OF_ONE)
-    }
-
-    /// A list of points that is no longer needed.
-    pub(super) fn give_points(&mut self, points: Cluster) {
-        self.points.give(points);
     }
 
     /// Parts that are no longer needed, with their points.

@@ -113,7 +113,7 @@ impl Clusterer {
     /// assert_eq!(clusters.len(), 2);
     /// ```
     pub fn clusters(&mut self, points: &[Point], priors: &[Prior], clusters: &mut Vec<Cluster>) {
-        clusters.drain(..).for_each(|cluster| self.memory.give_points(cluster));
+        clusters.drain(..).for_each(|cluster| self.memory.points.give(cluster));
         self.components(points);
         match self.method {
             ClusterMethod::Evidence => self.by_evidence(if self.guided { priors } else { &[] }, clusters),
@@ -140,7 +140,7 @@ impl Clusterer {
         evidence::give_pieces(moved_m, parts, priors, memory);
         for part in parts.drain(..) {
             let is_person = part.expected || part.points.len() >= self.radius.points_min;
-            if is_person { clusters.push(part.points) } else { memory.give_points(part.points) }
+            if is_person { clusters.push(part.points) } else { memory.points.give(part.points) }
         }
     }
 
