@@ -132,6 +132,15 @@ mod tests {
     }
 
     #[test]
+    fn a_number_is_read_to_its_last_bit() {
+        let list = r#"{ "time_ns": 0, "objects": [{ "position_m": [-1.9855232961837246, 0.0], "size_m": [0.5, 0.5, 1.7] }] }"#;
+        assert_eq!(
+            read(list.as_bytes()).unwrap().objects[0].position_m[0].to_string(),
+            "-1.9855232961837246"
+        );
+    }
+
+    #[test]
     fn numbers_that_cannot_be_are_left_out() {
         let of = |object: &str| {
             let list = read(format!("{{\"time_ns\": 0, \"objects\": [{object}]}}").as_bytes())?;
