@@ -4,42 +4,28 @@
 /// A method that does what another, always inlined, does, compiled once more for processors with wider registers. No
 /// instruction that rounds otherwise is used (fused multiply-add is another feature), so both give the same bits.
 macro_rules! wide {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? (
-        &mut self $(, $arg:ident: $kind:ty)* $(,)?
+    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? (&mut self $($rest:tt)*) $($what:tt)*) => {
+        $crate::elementary::wide! { @ [$(#[$doc])* $vis] $name [$(<$life>)?] self [&mut self] ($($rest)*) $($what)* }
+    };
+    ($(#[$doc:meta])* $vis:vis fn $name:ident (&self $($rest:tt)*) $($what:tt)*) => {
+        $crate::elementary::wide! { @ [$(#[$doc])* $vis] $name [] self [&self] ($($rest)*) $($what)* }
+    };
+    (@ [$($before:tt)*] $name:ident [$($life:tt)*] $this:ident [$($receiver:tt)*] (
+        $(, $arg:ident: $kind:ty)* $(,)?
     ) $(-> $out:ty)? = $wide:ident or $portable:ident) => {
-        $(#[$doc])*
-        $vis fn $name $(<$life>)? (&mut self $(, $arg: $kind)*) $(-> $out)? {
+        $($before)* fn $name $($life)* ($($receiver)* $(, $arg: $kind)*) $(-> $out)? {
             #[cfg(target_arch = "x86_64")]
             if std::arch::is_x86_feature_detected!("avx2") {
                 // SAFETY: the processor has just said that it has what the function was compiled for.
-                return unsafe { self.$wide($($arg),*) };
+                return unsafe { $this.$wide($($arg),*) };
             }
-            self.$portable($($arg),*)
+            $this.$portable($($arg),*)
         }
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
-        fn $wide $(<$life>)? (&mut self $(, $arg: $kind)*) $(-> $out)? {
-            self.$portable($($arg),*)
-        }
-    };
-    ($(#[$doc:meta])* $vis:vis fn $name:ident (
-        &self $(, $arg:ident: $kind:ty)* $(,)?
-    ) $(-> $out:ty)? = $wide:ident or $portable:ident) => {
-        $(#[$doc])*
-        $vis fn $name(&self $(, $arg: $kind)*) $(-> $out)? {
-            #[cfg(target_arch = "x86_64")]
-            if std::arch::is_x86_feature_detected!("avx2") {
-                // SAFETY: as above.
-                return unsafe { self.$wide($($arg),*) };
-            }
-            self.$portable($($arg),*)
-        }
-
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx2")]
-        fn $wide(&self $(, $arg: $kind)*) $(-> $out)? {
-            self.$portable($($arg),*)
+        fn $wide $($life)* ($($receiver)* $(, $arg: $kind)*) $(-> $out)? {
+            $this.$portable($($arg),*)
         }
     };
 }

@@ -8,8 +8,9 @@ use crate::elementary::{exp, ln, wide};
 
 /// Lowest height of an adult that is thought of, metres.
 const ADULT_M: f64 = 1.30;
-/// Cells that are added up side by side.
+/// Cells that are added up side by side: no cell may be left over.
 const LANES: usize = 8;
+const _: () = assert!(CELLS.is_multiple_of(LANES));
 /// From one height to the next, metres.
 const STEP_M: f64 = 0.01;
 /// Heights below an adult's that are thought of: down to 0.85 m, a child of two.
