@@ -34,6 +34,9 @@ const TESTS_MAX: usize = 1 << 18;
 /// What a person takes of that by being seen and followed, which lasts as long as so many tests: a crowd's frame is not to last
 /// longer for it. Forty people are left the fewest samples, which moves their F1 and calibration by less than .002.
 const TESTS_PER_PERSON: usize = 6000;
+/// Room for a crowd's meetings from the start: memory that nobody wrote to costs nothing, and a list that doubles when more
+/// people come leaves its old place behind.
+const MEETINGS: usize = 1 << 16;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
 const SAMPLES_MIN: usize = WORD;
 
@@ -124,7 +127,7 @@ impl Sampler {
             samples: numbers.samples,
             affordable: numbers.samples,
             shadows: Shadows::default(),
-            meetings: Vec::new(),
+            meetings: Vec::with_capacity(MEETINGS),
             ends: Vec::new(),
             rays: Rays::default(),
             crossing: Crossing::default(),

@@ -75,6 +75,9 @@ struct Columns {
 /// Columns come as evenly as this, as a share of their period.
 const HAIR: f64 = 0.01;
 
+/// Room for more columns than this is not made before they come: the finest sensor gives half as many to a frame.
+const COLUMNS_MAX: usize = 4096;
+
 /// What the assembler knows of one sensor.
 #[derive(Debug)]
 struct Intake {
@@ -262,11 +265,14 @@ impl Assembler {
                 late = true;
                 continue;
             }
-            let image = self.open.entry(number).or_default().entry(sensor).or_insert_with(|| RangeImage {
-                beams: model.beams.clone(),
-                columns: Vec::new(),
-                range_m: Vec::new(),
-                reflectivity: Vec::new(),
+            let image = self.open.entry(number).or_default().entry(sensor).or_insert_with(|| {
+                let columns = ((STEP_NS as f64 / model.column_period_ns) as usize + 1).min(COLUMNS_MAX);
+                RangeImage {
+                    beams: model.beams.clone(),
+                    columns: Vec::with_capacity(columns),
+                    range_m: Vec::with_capacity(columns * beams),
+                    reflectivity: Vec::with_capacity(columns * beams),
+                }
             });
             // Columns come in order but for packets that overtook one another.
             let at = image.columns.partition_point(|other| other.time_ns < column.time_ns);

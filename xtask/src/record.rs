@@ -7,6 +7,7 @@ mod crowds;
 mod gestures;
 mod glass;
 mod house;
+mod live;
 mod living;
 mod locked;
 mod nodes;
@@ -64,12 +65,12 @@ const JOBS: [Job; 38] = [
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", Needs::Nothing, glass::glass),
     job("gestures", "people who talk with their hands beside a sensor", Needs::Nothing, gestures::gestures),
     job("cut", "what a frame gains that closes as soon as the part with people has", Needs::Nothing, crowds::cut),
-    job("live", "ten minutes live, three times over, the page open", Needs::Asking, house::live),
+    job("live", "ten minutes live, three times over, the page open", Needs::Asking, live::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", Needs::Asking, nodes::nodes),
     job("halls", "1 to 64 halls on one host", Needs::Asking, nodes::halls),
     job("deployed", "the files for containers and clusters, run here", Needs::Asking, nodes::deployed),
-    job("faults", "a live run in which something fails", Needs::Nothing, house::faults),
-    job("kills", "a recording run killed at twenty moments", Needs::Nothing, house::kills),
+    job("faults", "a live run in which something fails", Needs::Nothing, live::faults),
+    job("kills", "a recording run killed at twenty moments", Needs::Nothing, live::kills),
     job("same-bytes", "the same seed on one thread and on two", Needs::Nothing, house::same_bytes),
     job("resume", "an experiment killed and gone on with", Needs::Nothing, house::resume),
     job("explain", "why the paper's figures are what they are", Needs::Nothing, scores::explain),

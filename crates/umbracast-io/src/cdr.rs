@@ -16,6 +16,13 @@ impl Default for Encoder {
 }
 
 impl Encoder {
+    /// With room for so many bytes: what is long is then not moved while it grows.
+    pub fn with_room(bytes: usize) -> Self {
+        let mut encoder = Self::default();
+        encoder.bytes.reserve(bytes);
+        encoder
+    }
+
     /// The message.
     pub fn finish(self) -> Vec<u8> {
         self.bytes

@@ -129,7 +129,7 @@ pub fn text(value: &str) -> Vec<u8> {
 
 /// The packets of one frame; a packet of another length cannot be recorded in this message and is left out.
 pub fn scan(time_ns: i64, sensor: &str, packets: &[Packet]) -> Vec<u8> {
-    let mut e = Encoder::default();
+    let mut e = Encoder::with_room(room(sensor, packets));
     e.header(time_ns, sensor);
     let whole = || packets.iter().filter(|packet| packet.payload.len() == PACKET_BYTES);
     e.u32(whole().count() as u32);
@@ -142,7 +142,7 @@ pub fn scan(time_ns: i64, sensor: &str, packets: &[Packet]) -> Vec<u8> {
 
 /// The packets of one frame in a [`SENSOR_PACKETS`] message.
 pub fn sensor_packets(time_ns: i64, sensor: &str, packets: &[Packet]) -> Vec<u8> {
-    let mut e = Encoder::default();
+    let mut e = Encoder::with_room(room(sensor, packets));
     e.header(time_ns, sensor);
     e.u32(packets.len() as u32);
     for packet in packets {
@@ -151,6 +151,12 @@ pub fn sensor_packets(time_ns: i64, sensor: &str, packets: &[Packet]) -> Vec<u8>
         e.array(&packet.payload);
     }
     e.finish()
+}
+
+/// Bytes that a message of packets has at most: header and length, and each packet with its time, its length and what aligns
+/// the next.
+fn room(sensor: &str, packets: &[Packet]) -> usize {
+    32 + sensor.len() + packets.iter().map(|packet| packet.payload.len() + 16).sum::<usize>()
 }
 
 /// The packets of [`sensor_packets`], or `None` where the bytes are something else.

@@ -133,6 +133,7 @@ pub struct LinkRow {
 
 /// The rows of one outcome.
 pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, links: &mut Vec<LinkRow>) {
+    tracks.reserve(outcome.tracks.len());
     for (track, forecast) in outcome.tracks.iter().zip(&outcome.forecasts) {
         let steps = forecast.steps.map(|s| [s.mean_m.x, s.mean_m.y, s.xx_m2, s.xy_m2, s.yy_m2]);
         tracks.push(TrackRow { scene, steps, ..of_track(outcome.frame, outcome.time_ns, track) });

@@ -4,6 +4,7 @@
 //! A frame's rows are one message: `std_msgs/Header header`, `uint64 frame`, and the rows without their keys. A value
 //! that a table leaves empty is NaN, or 2 where it is yes or no; an access point goes by its name.
 
+use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value};
 
 use crate::cdr::{Decoder, Encoder};
@@ -154,25 +155,41 @@ pub fn decode<R: WireRow>(bytes: &[u8], access_points: &[String]) -> Option<(u64
     Some((frame, time_ns, rows))
 }
 
-/// A row as JSON without its keys; what is not finite or not there is null.
-pub fn json<R: WireRow>(row: R, access_points: &[String]) -> Value {
-    let mut object = Map::new();
-    each(&mut { row }, |name, cell| {
-        let value = match cell {
-            Cell::U32(v) => (*v).into(),
-            Cell::U64(v) => (*v).into(),
-            Cell::I64(v) => (*v).into(),
-            Cell::F64(v) => (*v).into(),
-            Cell::Bool(v) => (*v).into(),
-            Cell::MaybeBool(v) => v.map_or(Value::Null, Value::from),
-            Cell::MaybeF64(v) => v.map_or(Value::Null, Value::from),
-            Cell::AccessPoint(v) => {
-                access_points.get(*v as usize).map_or(Value::Null, |name| name.as_str().into())
+/// A frame's rows as JSON, each without its keys; what is not finite or not there is null. `access_points` are the site's
+/// names, by index.
+#[derive(Debug, Clone, Copy)]
+pub struct Json<'a, R>(pub &'a [R], pub &'a [String]);
+
+impl<R: WireRow> Serialize for Json<'_, R> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().map(|&row| JsonRow(row, self.1)))
+    }
+}
+
+struct JsonRow<'a, R>(R, &'a [String]);
+
+impl<R: WireRow> Serialize for JsonRow<'_, R> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let &Self(mut row, access_points) = self;
+        let (mut object, mut written) = (serializer.serialize_map(None)?, Ok(()));
+        each(&mut row, |name, cell| {
+            if written.is_err() {
+                return;
             }
-        };
-        object.insert(name.to_string(), value);
-    });
-    Value::Object(object)
+            written = match cell {
+                Cell::U32(v) => object.serialize_entry(name, v),
+                Cell::U64(v) => object.serialize_entry(name, v),
+                Cell::I64(v) => object.serialize_entry(name, v),
+                Cell::F64(v) => object.serialize_entry(name, v),
+                Cell::Bool(v) => object.serialize_entry(name, v),
+                Cell::MaybeBool(v) => object.serialize_entry(name, v),
+                Cell::MaybeF64(v) => object.serialize_entry(name, v),
+                Cell::AccessPoint(v) => object.serialize_entry(name, &access_points.get(*v as usize)),
+            };
+        });
+        written?;
+        object.end()
+    }
 }
 
 /// JSON Schema of the same.
@@ -251,7 +268,7 @@ mod tests {
 
     #[test]
     fn json_has_the_names_of_the_table_and_null_for_nothing() {
-        let value = json(link(), &access_points());
+        let value = &serde_json::to_value(Json(&[link()], &access_points())).unwrap()[0];
         assert_eq!(value["access_point"], "centre");
         assert_eq!(value["blocked_w3"], true);
         assert_eq!(value["onset_p50_s"], Value::Null);

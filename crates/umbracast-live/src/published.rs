@@ -3,12 +3,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::Value;
 use umbracast::detect::Point;
 use umbracast::{Frame, Health, Outcome, Site};
 use umbracast_io::results::Results;
 use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
-use umbracast_io::wire;
+use umbracast_io::wire::Json;
 
 use crate::warnings::Event;
 
@@ -84,29 +85,46 @@ impl Published {
         }
     }
 
-    /// As the page, `curl` and every client get it. Names are those of the tables.
-    pub fn json(&self, with_points: bool) -> Value {
+    /// As the page, `curl` and every client get it, so long after it was published. Names are those of the tables.
+    pub fn json(&self, with_points: bool, age: Option<Duration>) -> impl Serialize {
         let ms = |time: Duration| (time.as_secs_f64() * 1e6).round() / 1e3;
-        let access_points = &self.access_points;
-        let mut value = json!({
-            "frame": self.frame,
-            "time_ns": self.time_ns,
-            "published_ns": self.published_ns,
-            "latency_ms": ms(self.latency),
-            "step_ms": ms(self.step),
-            "frames_skipped": self.frames_skipped,
-            "reloads": self.reloads,
-            "sensors": self.sensors,
-            "health": self.health,
-            "tracks": self.tracks.iter().map(|&row| wire::json(row, access_points)).collect::<Vec<_>>(),
-            "blockages": self.links.iter().map(|&row| wire::json(row, access_points)).collect::<Vec<_>>(),
-            "events": self.events.iter().map(|event| event.json()).collect::<Vec<_>>(),
-        });
-        if with_points {
-            value["points_cm"] = json!(self.points_cm.as_flattened());
+        Sent {
+            frame: self.frame,
+            time_ns: self.time_ns,
+            published_ns: self.published_ns,
+            age_ms: age.map(|age| age.as_millis() as u64),
+            latency_ms: ms(self.latency),
+            step_ms: ms(self.step),
+            frames_skipped: self.frames_skipped,
+            reloads: self.reloads,
+            sensors: &self.sensors,
+            health: &self.health,
+            tracks: Json(&self.tracks, &self.access_points),
+            blockages: Json(&self.links, &self.access_points),
+            events: self.events.iter().map(Event::json).collect(),
+            points_cm: with_points.then(|| self.points_cm.as_flattened()),
         }
-        value
     }
+}
+
+/// A frame's fields as they are sent.
+#[derive(Serialize)]
+struct Sent<'a> {
+    frame: u64,
+    time_ns: i64,
+    published_ns: i64,
+    age_ms: Option<u64>,
+    latency_ms: f64,
+    step_ms: f64,
+    frames_skipped: u64,
+    reloads: u64,
+    sensors: &'a [bool],
+    health: &'a Health,
+    tracks: Json<'a, TrackRow>,
+    blockages: Json<'a, LinkRow>,
+    events: Vec<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    points_cm: Option<&'a [i32]>,
 }
 
 /// What is drawn of a frame's new points.

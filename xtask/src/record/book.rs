@@ -153,6 +153,6 @@ impl Book {
 }
 
 /// Words as they are typed.
-fn spoken(words: &[OsString]) -> String {
+pub fn spoken(words: &[OsString]) -> String {
     words.iter().map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
 }

@@ -256,9 +256,9 @@ impl FrameQuery {
     }
 }
 
-async fn frame(State(shared): State<Arc<Shared>>, Query(query): Query<FrameQuery>) -> Json<Value> {
+async fn frame(State(shared): State<Arc<Shared>>, Query(query): Query<FrameQuery>) -> Response {
     let newest = shared.newest.borrow().clone();
-    Json(shared.frame_json(&newest, query.with_points()))
+    Json(newest.json(query.with_points(), shared.age(&newest))).into_response()
 }
 
 async fn live(
@@ -285,7 +285,8 @@ async fn stream(mut socket: WebSocket, shared: Arc<Shared>, _place: Stream, with
                     return;
                 }
                 let frame = newest.borrow_and_update().clone();
-                let text = shared.frame_json(&frame, with_points).to_string();
+                let json = frame.json(with_points, shared.age(&frame));
+                let Ok(text) = serde_json::to_string(&json) else { continue };
                 // Fails where the other end takes nothing: see `connections`.
                 if socket.send(Message::Text(text.into())).await.is_err() {
                     return;
@@ -341,12 +342,6 @@ async fn metrics_text(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
 }
 
 impl Shared {
-    fn frame_json(&self, published: &Published, with_points: bool) -> Value {
-        let mut value = published.json(with_points);
-        value["age_ms"] = json!(self.age(published).map(|age| age.as_millis() as u64));
-        value
-    }
-
     /// How long ago it was published; none before the first frame.
     fn age(&self, published: &Published) -> Option<Duration> {
         let age_ns = self.watched.clock.now_ns() - published.published_ns;

@@ -1,0 +1,156 @@
+//! What a run that sensors send to promises: nothing lost, in time, memory flat, and whatever fails survived.
+
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use super::book::{Book, spoken};
+use super::house::script;
+use crate::tools::{Result, argument, files_below};
+
+/// So long do the sensors of [`live`] send,
+const SECONDS: u64 = 600;
+/// and so long after their start everybody is followed, and every buffer there.
+const START: Duration = Duration::from_secs(10);
+
+/// A live run in which something fails.
+pub fn faults(book: &mut Book) -> Result<()> {
+    let faults = "cargo run --release --quiet --package umbracast-live --example faults";
+    script(book, faults, faults)
+}
+
+/// Ten minutes of simulated sensors over loopback, recorded, the page open: what was lost, how late warnings came, and
+/// how much memory it took in the first minute and in the last. Sensors are a process of their own, as in a hall: how their
+/// memory grows is not what is asked.
+pub fn live(book: &mut Book) -> Result<()> {
+    let ouster = book.scratch("ouster.toml");
+    let site = "[[site.sensors]]\nname = \"lidar\"\nmodel = \"os0-128\"\nposition_m = [16.0, 0.0, 9.0]\n\
+                rotation_deg = { yaw = 180.0, pitch = 35.0, roll = 0.0 }\nrange_noise_m = 0.02\n";
+    std::fs::write(&ouster, site).map_err(|e| format!("{}: {e}", ouster.display()))?;
+    live_run(book, "10", None)?;
+    live_run(book, "40", None)?;
+    live_run(book, "10", Some(&ouster))?;
+    book.line(&format!("# ouster.toml:\n{site}"));
+    Ok(())
+}
+
+/// Sensors, the run that they send to, and who looks on, each a process of its own.
+fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
+    let (hall, folder) = (book.scratch("hall"), book.scratch("live"));
+    let of_site: Vec<OsString> =
+        site.into_iter().flat_map(|site| ["--site".into(), argument(site)]).collect();
+    let words = |line: &str, further: &[OsString]| -> Vec<OsString> {
+        line.split(' ').map(OsString::from).chain(further.iter().chain(&of_site).cloned()).collect()
+    };
+    book.umbracast_says(words("simulate --people 1 --stroll 1 --out", &[argument(&hall)]))?;
+    // It ends by itself some seconds after the last packet.
+    let listen = words(
+        &format!("live --port 24000 --json --quiet --serve 127.0.0.1:8600 --seconds {}", SECONDS + 10),
+        &["--empty".into(), argument(hall.join("empty.mcap")), "--record".into(), argument(&folder)],
+    );
+    let send = words(
+        &format!(
+            "simulate --people {people} --packets udp:127.0.0.1:24000 --json --quiet --stroll {SECONDS}"
+        ),
+        &[],
+    );
+    book.command(&format!(
+        "umbracast {} & umbracast {} & nice -n 19 chromium --headless ...",
+        spoken(&listen),
+        spoken(&send)
+    ));
+    let start = |words: &[OsString]| {
+        let mut command = Command::new(book.umbracast());
+        command.args(words).stdout(Stdio::piped()).stderr(Stdio::null());
+        command.spawn().map_err(|e| format!("umbracast: {e}"))
+    };
+    let live = start(&listen)?;
+    sleep(Duration::from_secs(1));
+    let sensors = start(&send)?;
+    let page = look_on();
+    sleep(START);
+    let mut resident_kb = Vec::new();
+    while let Some(kb) = resident(live.id()) {
+        resident_kb.push(kb);
+        sleep(Duration::from_secs(1));
+    }
+    match page {
+        Some(mut page) => page.kill().and_then(|()| page.wait().map(drop)).map_err(|e| e.to_string())?,
+        None => book.line("no chromium: nobody looked at the page"),
+    }
+    for process in [live, sensors] {
+        let output = process.wait_with_output().map_err(|e| e.to_string())?;
+        book.line(String::from_utf8_lossy(&output.stdout).trim_end());
+    }
+    let minute = resident_kb.len().min(60);
+    let mean = |kb: &[u64]| kb.iter().sum::<u64>() as f64 / kb.len().max(1) as f64 / 1024.0;
+    let (first, last) = (mean(&resident_kb[..minute]), mean(&resident_kb[resident_kb.len() - minute..]));
+    let grown = 100.0 * (last / first - 1.0);
+    book.line(&format!(
+        "resident, mean of the minute after the first ten seconds and of the last: {first:.1} MiB, {last:.1} MiB ({grown:+.1} %)\n"
+    ));
+    [hall, folder].iter().try_for_each(|folder| {
+        std::fs::remove_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))
+    })
+}
+
+/// A browser with the page. Who looks has a computer of his own: here he takes what is left.
+fn look_on() -> Option<Child> {
+    let mut browser = Command::new("nice");
+    browser.args(["-n", "19", "chromium", "--headless", "--no-sandbox", "--disable-gpu"]);
+    browser.args(["--remote-debugging-port=0", "http://127.0.0.1:8600/"]);
+    browser.stdout(Stdio::null()).stderr(Stdio::null()).spawn().ok()
+}
+
+/// KiB that a process holds; `None` once it has ended.
+fn resident(id: u32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{id}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.trim().trim_end_matches(" kB").trim().parse().ok()
+}
+
+/// A recording run killed at twenty moments, drawn by chance: what each file still holds.
+pub fn kills(book: &mut Book) -> Result<()> {
+    const KILLS: u64 = 20;
+    book.command(
+        "umbracast live --demo --people 4 --no-serve --record /tmp/live, killed (SIGKILL) twenty times",
+    );
+    book.line("killed after, s   bytes      `umbracast inspect`  frames with results   seconds of them");
+    // A row of numbers that nobody chose, the same in every record.
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    for _ in 0..KILLS {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let after = Duration::from_millis(1500 + (state >> 33) % 5000);
+        let folder = book.scratch("live");
+        let mut live = Command::new(book.umbracast());
+        live.args(["live", "--demo", "--people", "4", "--no-serve", "--quiet", "--record"]).arg(&folder);
+        let live = live.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        let mut live = live.map_err(|e| format!("umbracast: {e}"))?;
+        sleep(after);
+        live.kill().and_then(|()| live.wait()).map_err(|e| e.to_string())?;
+        let files = files_below(&folder, ".mcap");
+        let [file] = &files[..] else { return Err(format!("expected one recording, found {}", files.len())) };
+        let bytes = std::fs::metadata(file).map_err(|e| e.to_string())?.len();
+        let looked = Command::new(book.umbracast()).arg("inspect").arg(file).output();
+        let looked = looked.map_err(|e| format!("umbracast: {e}"))?;
+        let said = String::from_utf8_lossy(&looked.stdout).into_owned();
+        let results = said.lines().find(|line| line.contains("/umbracast/blockages"));
+        let messages = results.and_then(|line| line.split_whitespace().rev().nth(1)).unwrap_or("0");
+        let frames: u32 =
+            messages.parse().map_err(|_| format!("expected a number of messages, found {messages}"))?;
+        let opened = match looked.status.code() {
+            Some(0) => "opens whole".to_owned(),
+            Some(3) => "opens, end cut".to_owned(),
+            code => format!("fails: {code:?}"),
+        };
+        let lived = after.as_secs_f64();
+        book.line(&format!(
+            "{lived:15.3} {bytes:11}   {opened:20} {frames:18} {:17.1}",
+            f64::from(frames) * 0.1
+        ));
+        std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    }
+    Ok(())
+}
