@@ -88,7 +88,7 @@ impl Published {
     /// As the page, `curl` and every client get it, so long after it was published. Names are those of the tables.
     pub fn json(&self, with_points: bool, age: Option<Duration>) -> impl Serialize {
         let ms = |time: Duration| (time.as_secs_f64() * 1e6).round() / 1e3;
-        Sent {
+        FrameJson {
             frame: self.frame,
             time_ns: self.time_ns,
             published_ns: self.published_ns,
@@ -109,7 +109,7 @@ impl Published {
 
 /// A frame's fields as they are sent.
 #[derive(Serialize)]
-struct Sent<'a> {
+struct FrameJson<'a> {
     frame: u64,
     time_ns: i64,
     published_ns: i64,
