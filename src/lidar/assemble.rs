@@ -76,7 +76,7 @@ struct Columns {
 const HAIR: f64 = 0.01;
 
 /// Room for more columns than this is not made before they come: the finest sensor gives half as many to a frame.
-const COLUMNS_MAX: usize = 4096;
+const ROOM_COLUMNS: usize = 4096;
 
 /// What the assembler knows of one sensor.
 #[derive(Debug)]
@@ -266,7 +266,7 @@ impl Assembler {
                 continue;
             }
             let image = self.open.entry(number).or_default().entry(sensor).or_insert_with(|| {
-                let columns = ((STEP_NS as f64 / model.column_period_ns) as usize + 1).min(COLUMNS_MAX);
+                let columns = ((STEP_NS as f64 / model.column_period_ns) as usize + 1).min(ROOM_COLUMNS);
                 RangeImage {
                     beams: model.beams.clone(),
                     columns: Vec::with_capacity(columns),
