@@ -8,12 +8,13 @@ use std::process::Command;
 const HEAD: &str = "\
 # Commands
 
-The command is `umbracast`. From a checkout `cargo run --release --` stands for it; `cargo install --path
-crates/umbracast-cli` puts it where the shell finds it. Exit codes: 0 done, 1 failed, 2 wrong arguments, 3 done but data
-was lost or skipped (the last line says what). Terms are explained in [GLOSSARY.md](GLOSSARY.md), and [USING.md](USING.md)
-goes through the commands in the order in which one needs them.
+The command is `umbracast`. `cargo install --path crates/umbracast-cli` installs it. From a checkout, `cargo run --release --`
+in front of the arguments does the same without installing.
 
-This page is made from the help of the command by a test, `crates/umbracast-cli/tests/commands_page.rs`.
+Exit codes: 0 done, 1 failed, 2 wrong arguments, 3 done but data was lost or skipped (the last line says what).
+[GLOSSARY.md](GLOSSARY.md) explains the terms. [USING.md](USING.md) goes through the commands in the order of their use.
+
+The test `crates/umbracast-cli/tests/commands_page.rs` makes this page from the command's help.
 ";
 
 /// What `umbracast WORDS --help` prints.

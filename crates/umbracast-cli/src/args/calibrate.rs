@@ -9,22 +9,23 @@ use super::SiteArgs;
 /// `calibrate`
 #[derive(Debug, Args)]
 pub struct Calibrate {
-    /// One scene of a minute or more in which people walk where the sensors share the floor, in any form that `run` reads.
+    /// A scene of a minute or more in which people walk where the sensors share the floor, in any form that `run`
+    /// reads.
     #[arg(required = true, value_name = "RECORDING")]
     pub recording: Vec<PathBuf>,
     #[command(flatten)]
     pub site: SiteArgs,
-    /// The hall without people, in any form that RECORDING may have; default: empty.mcap beside the recording, else
-    /// learned on the way.
+    /// The hall without people, in any form that RECORDING may have. Default: empty.mcap beside the recording;
+    /// without it the background is learned while running.
     #[arg(long, value_name = "PATH")]
     pub empty: Option<PathBuf>,
-    /// Learn the background on the way even where there is an empty recording.
+    /// Learn the background while running, even if there is an empty recording.
     #[arg(long)]
     pub no_empty: bool,
-    /// The site file as it was given, with the poses and clocks found.
+    /// File to write: the given site file with the poses and clocks that were found.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Floor plan of what the sensors saw, by the poses before and after (SVG); default: beside --out.
+    /// SVG floor plan of what the sensors saw, with the poses before and after. Default: beside --out.
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
 }

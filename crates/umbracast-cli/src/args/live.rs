@@ -22,15 +22,15 @@ pub enum LogForm {
 pub struct Live {
     #[command(flatten)]
     pub site: SiteArgs,
-    /// Simulate the site's sensors and people who walk, in place of real ones: true packets over loopback.
+    /// Simulate walking people and the site's sensors, which send packets over loopback.
     #[arg(long)]
     pub demo: bool,
     #[command(flatten)]
     pub crowd: CrowdArgs,
-    /// Whose method: hdl, paper or default.
+    /// The method: hdl, paper or default.
     #[arg(long, default_value = "default")]
     pub mode: Mode,
-    /// The hall without people: a recording, clouds or captures. Default: learned on the way.
+    /// The hall without people: a recording, clouds or captures. Default: the background is learned while running.
     #[arg(long, value_name = "PATH")]
     pub empty: Option<PathBuf>,
     /// Weights of the LSTM in place of the embedded ones.
@@ -40,15 +40,15 @@ pub struct Live {
     pub page: PageArgs,
     #[command(flatten)]
     pub record: RecordArgs,
-    /// UDP port of the site's first sensor; the others follow. 0: free ones. Default: what the site file says, or its
-    /// sensors' own.
+    /// UDP port of the site's first sensor; the others use the ports after it. 0 takes free ports. Default: the site
+    /// file's ports, else those of the models.
     #[arg(long, value_name = "PORT")]
     pub port: Option<u16>,
-    /// How the events of the run (a sensor gone, frames skipped, a disk that fails) are told on stderr: lines for people, or
-    /// a JSON object a line.
+    /// Form of the log on stderr (a sensor gone, frames skipped, a disk that fails): text for people, or one JSON
+    /// object in each line.
     #[arg(long, default_value = "text", env = "UMBRACAST_LOG", value_name = "FORM")]
     pub log: LogForm,
-    /// End after so many seconds; default: on a signal.
+    /// End after this many seconds. Default: run until a signal comes.
     #[arg(long, value_name = "S", value_parser = positive)]
     pub seconds: Option<f64>,
 }
@@ -58,10 +58,11 @@ pub struct Live {
 pub struct Check {
     #[command(flatten)]
     pub site: SiteArgs,
-    /// Listen for so many seconds.
+    /// Listen for this many seconds.
     #[arg(long, default_value_t = 3.0, value_name = "S", value_parser = positive)]
     pub seconds: f64,
-    /// UDP port of the site's first sensor; the others follow. Default: what the site file says, or its sensors' own.
+    /// UDP port of the site's first sensor; the others use the ports after it. Default: the site file's ports, else
+    /// those of the models.
     #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
     pub port: Option<u16>,
 }
@@ -74,13 +75,13 @@ pub struct View {
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub site: SiteArgs,
-    /// Whose method: hdl, paper or default.
+    /// The method: hdl, paper or default.
     #[arg(long, default_value = "default")]
     pub mode: Mode,
-    /// How many times faster than it was.
+    /// Play this many times faster than recorded.
     #[arg(long, default_value_t = 1.0, value_name = "X", value_parser = positive)]
     pub rate: f64,
-    /// Begin anew at the end, until a signal comes.
+    /// Begin again at the end, until a signal comes.
     #[arg(long)]
     pub again: bool,
     #[command(flatten)]
@@ -95,11 +96,11 @@ pub struct ReplayPackets {
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub site: SiteArgs,
-    /// Where each sensor's packets go, in the site's order; the last one given goes for those that follow, on the ports
-    /// that follow.
+    /// Addresses for the sensors' packets, in the site's order. Further sensors use the last address with the ports
+    /// after it.
     #[arg(long, default_value = "127.0.0.1:2368", value_name = "HOST:PORT", value_delimiter = ',')]
     pub to: Vec<SocketAddr>,
-    /// How many times faster than it was.
+    /// Play this many times faster than recorded.
     #[arg(long, default_value_t = 1.0, value_name = "X", value_parser = positive)]
     pub rate: f64,
 }
@@ -133,11 +134,11 @@ impl FromStr for Packets {
 /// The page.
 #[derive(Debug, Clone, Args)]
 pub struct PageArgs {
-    /// Where the page and its interface are served. Other hosts can reach another address than loopback: it needs a
-    /// token, in the environment variable UMBRACAST_TOKEN.
+    /// Address of the page and its interface. An address that other hosts can reach needs a token in the environment
+    /// variable UMBRACAST_TOKEN.
     #[arg(long, default_value = "127.0.0.1:8600", value_name = "HOST:PORT")]
     pub serve: SocketAddr,
-    /// Serve the page over TLS with this certificate (PEM, its issuers behind it); needs a program built with the feature
+    /// Serve the page over TLS with this certificate (PEM, followed by its issuers). Needs a build with the feature
     /// `tls`.
     #[arg(long, value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
@@ -155,16 +156,16 @@ pub struct RecordArgs {
     /// Record packets and results into this folder.
     #[arg(long, value_name = "DIR")]
     pub record: Option<PathBuf>,
-    /// A new file after so many megabytes.
+    /// Begin a new file after this many megabytes.
     #[arg(long, default_value_t = 4096, value_name = "MB", requires = "record", value_parser = clap::value_parser!(u64).range(1..1 << 40))]
     pub record_mb: u64,
-    /// A new file after so many minutes.
+    /// Begin a new file after this many minutes.
     #[arg(long, default_value_t = 60, value_name = "MIN", requires = "record", value_parser = clap::value_parser!(u64).range(1..1 << 30))]
     pub record_minutes: u64,
-    /// Keep the newest so many files and delete older ones; default: delete none.
+    /// Keep this many of the newest files and delete older ones. Default: delete none.
     #[arg(long, value_name = "N", requires = "record")]
     pub record_keep: Option<usize>,
-    /// Record the foreground points too, as PointCloud2: what every viewer draws.
+    /// Also record the foreground points, as PointCloud2.
     #[arg(long, requires = "record")]
     pub record_points: bool,
 }

@@ -23,7 +23,7 @@ pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPacket
 #[cfg(feature = "node")]
 pub use node::Node;
 
-/// Sees people with LiDARs, foresees where they walk, and tells which radio links they are about to block.
+/// Detects people with LiDARs, forecasts where they walk, and says which radio links they will block.
 #[derive(Debug, Parser)]
 #[command(name = "umbracast", version, after_help = "Without a command: demo.")]
 pub struct Cli {
@@ -38,10 +38,10 @@ pub struct Cli {
 /// Flags of every command.
 #[derive(Debug, Clone, Args)]
 pub struct Common {
-    /// Threads to use; 0 means one a core. Results do not depend on it.
+    /// Threads to use; 0 means one for each core. Results do not depend on it.
     #[arg(long, global = true, default_value_t = 0, value_name = "N")]
     pub threads: usize,
-    /// Print for machines.
+    /// Print JSON for programs.
     #[arg(long, global = true)]
     pub json: bool,
     /// Show no progress.
@@ -52,43 +52,43 @@ pub struct Common {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The main job on the embedded site: simulate one scene, run all stages, score, write a report.
+    /// Simulate one scene on the embedded site, run all stages, score them and write a report.
     Demo(Demo),
-    /// Simulate scenes to recordings with their truth.
+    /// Simulate scenes and write recordings with their truth.
     Simulate(Simulate),
-    /// Recordings, PCD clouds or pcap captures through the pipeline; writes tracks and links.
+    /// Run the pipeline on recordings, PCD clouds or pcap captures; write tracks and links.
     Run(Run),
-    /// Sensors in, warnings out: receives packets, runs all stages as frames close, serves a page, records.
+    /// Receive sensors' packets, run all stages as frames close, serve a page with warnings, and record.
     Live(Live),
-    /// One process of a hall whose stages run on several hosts, over Zenoh.
+    /// Run one process of a hall whose stages run on several hosts, over Zenoh.
     #[cfg(feature = "node")]
     Node(Node),
-    /// List the halls of a network with their nodes: who is there, what they use, and what is wrong.
+    /// List the halls of a network with their nodes, load and faults.
     #[cfg(feature = "node")]
     Fleet(Fleet),
-    /// Listen to the sensors of a site and say what is wrong with them, before the first person comes.
+    /// Listen to the sensors of a site and report their faults, before the first person comes.
     Check(Check),
-    /// Find where the sensors of a site hang, from a recording in which people walk.
+    /// Find the poses and clocks of a site's sensors from a recording of walking people.
     Calibrate(Calibrate),
-    /// Watch a recording in the browser as if it were live.
+    /// Show a recording in the browser as if it were live.
     View(View),
-    /// Send the packets of recordings again, at the pace they came.
+    /// Send the packets of recordings again, at their original pace.
     Replay(ReplayPackets),
     /// Score every stage: a run against its truth, or freshly simulated scenes in memory.
     Evaluate(Evaluate),
     /// Put the main figures of several reports into one table.
     Compare(Compare),
-    /// Leave out each mechanism of the default mode alone, and say what it is worth.
+    /// Leave out each mechanism of the default mode alone and measure what it is worth.
     Ablate(Ablate),
-    /// Show where a person gives how many returns, and which places are blind.
+    /// Show how many returns a person gives at each place, and which places are blind.
     Coverage(Coverage),
-    /// The paper's whole experiment: 500 scenes, every mode, AABB and OBB. Goes on where it was stopped.
+    /// Run the paper's whole experiment: 500 scenes, every mode, AABB and OBB. A stopped run resumes.
     Reproduce(Reproduce),
-    /// Say what is in a file.
+    /// Show what is in a file.
     Inspect(Inspect),
     /// Print the commented default configuration, or check a file.
     Config(Config),
-    /// Fit what the program learned from data: networks, body and thresholds.
+    /// Fit what the program learns from data: networks, body and thresholds.
     #[command(subcommand)]
     Train(Train),
 }
@@ -106,7 +106,7 @@ impl Default for Command {
 /// Where everything stands.
 #[derive(Debug, Clone, Args)]
 pub struct SiteArgs {
-    /// TOML file laid over the defaults: site, and any other setting that differs.
+    /// TOML file with the site and any other setting that differs from the defaults.
     #[arg(long, value_name = "FILE")]
     pub site: Option<PathBuf>,
 }
@@ -117,10 +117,10 @@ pub struct CrowdArgs {
     /// The crowd: orca-03, orca-06, mixed or pairs.
     #[arg(long, default_value = "orca-03")]
     pub preset: Preset,
-    /// People in a scene.
+    /// People in each scene.
     #[arg(long, default_value_t = 10, value_name = "N", value_parser = one_or_more)]
     pub people: usize,
-    /// Seed of the first scene; the next ones count on. Tests begin at 200000.
+    /// Seed of the first scene; each next scene has the next number. Test seeds begin at 200000.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
 }
@@ -128,19 +128,19 @@ pub struct CrowdArgs {
 /// How recorded people are read.
 #[derive(Debug, Clone, Args)]
 pub struct Replay {
-    /// Frames a second of trajectories whose file does not say.
+    /// Frames a second of trajectories, if their file does not say.
     #[arg(long, value_name = "HZ")]
     pub fps: Option<f64>,
-    /// Unit of PeTrack text, m or cm; default: what the file says, else m.
+    /// Unit of PeTrack text, m or cm. Default: what the file says, else m.
     #[arg(long)]
     pub unit: Option<Unit>,
     /// Smoothing of the trajectories, standard deviation in seconds; 0 for none.
     #[arg(long, default_value_t = 0.12, value_name = "S")]
     pub smooth: f64,
-    /// Of a longer recording replay the middle, so many seconds.
+    /// Replay this many seconds from the middle of a longer recording.
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
-    /// Move people who walk elsewhere to the middle of the site's hall: their recording has a frame of its own.
+    /// Move people to the middle of the site's hall, for recordings with a frame of their own.
     #[arg(long)]
     pub centre: bool,
 }
@@ -148,12 +148,12 @@ pub struct Replay {
 /// What bodies they have.
 #[derive(Debug, Clone, Args)]
 pub struct BodyArgs {
-    /// Kinds of bodies and their shares of the people, KIND[=SHARE]: bag, phone (at the ear), pockets (hands in
-    /// them), child, wheelchair, cmu-walk (needs --gait), gesturing (with both hands), sitting (wherever they stay); the
-    /// rest are plain. Several with commas.
+    /// Kinds of bodies with their shares of the people: bag, phone (at the ear), pockets (hands in them), child,
+    /// wheelchair, cmu-walk (needs --gait), gesturing (with both hands), sitting (where they stay). All others are
+    /// plain. Separate several with commas.
     #[arg(long, value_name = "KIND[=SHARE]", value_delimiter = ',', value_parser = body_share)]
     pub bodies: Vec<(Kind, f64)>,
-    /// Motion capture of somebody who walks, BVH: how people of the kind cmu-walk move.
+    /// BVH motion capture of a walk, for people of the kind cmu-walk.
     #[arg(long, value_name = "FILE", requires = "bodies")]
     pub gait: Option<PathBuf>,
 }
@@ -176,7 +176,7 @@ pub struct Demo {
     pub site: SiteArgs,
     #[command(flatten)]
     pub crowd: CrowdArgs,
-    /// Where the report goes.
+    /// Folder for the report.
     #[arg(long, default_value = "report", value_name = "DIR")]
     pub out: PathBuf,
 }
@@ -188,32 +188,33 @@ pub struct Simulate {
     pub site: SiteArgs,
     #[command(flatten)]
     pub crowd: CrowdArgs,
-    /// Nobody arrives: people walk to and fro across the circle for so many seconds.
+    /// Let people walk to and fro across the circle for this many seconds; nobody arrives.
     #[arg(long, value_name = "S", conflicts_with = "trajectories", value_parser = clap::value_parser!(u32).range(1..))]
     pub stroll: Option<u32>,
-    /// How many scenes.
+    /// Number of scenes.
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: u32,
-    /// Replay these trajectories in place of a crowd: TrajNet++ ndjson, CSV `t_s,id,x_m,y_m[,height_m]`, or
-    /// PeTrack text. One scene a file.
+    /// Replay these trajectories in place of a crowd: TrajNet++ ndjson, CSV `t_s,id,x_m,y_m[,height_m]`, or PeTrack
+    /// text. Each file is a scene.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub trajectories: Vec<PathBuf>,
     #[command(flatten)]
     pub replay: Replay,
     #[command(flatten)]
     pub bodies: BodyArgs,
-    /// Write PointCloud2 clouds too (up to 1.2 GB a scene).
+    /// Also write PointCloud2 clouds (up to 1.2 GB for each scene).
     #[arg(long)]
     pub clouds: bool,
-    /// Write every table as CSV too.
+    /// Also write every table as CSV.
     #[arg(long)]
     pub csv: bool,
-    /// The sensors' packets as they send them. udp:HOST:PORT: in real time, the site's first sensor to that port and the
-    /// others to those that follow, or each to one of several addresses with commas. pcap: captures beside the recordings,
-    /// one of all sensors, or one for each where neither `udp_port` nor `address` tells them apart.
+    /// Write the packets that the sensors would send. udp:HOST:PORT sends them in real time: the first sensor to that
+    /// port and the others to the ports after it, or each sensor to its own address in a list with commas. pcap
+    /// writes captures beside the recordings: one with all sensors, or one for each sensor if neither `udp_port` nor
+    /// `address` tells them apart.
     #[arg(long, value_name = "udp:HOST:PORT|pcap")]
     pub packets: Option<Packets>,
-    /// Where the recordings go; may be left out with --packets udp.
+    /// Folder for the recordings; optional with --packets udp.
     #[arg(long, value_name = "DIR", required_unless_present = "packets")]
     pub out: Option<PathBuf>,
 }
@@ -221,35 +222,36 @@ pub struct Simulate {
 /// `run`
 #[derive(Debug, Args)]
 pub struct Run {
-    /// A folder of recordings or PCD clouds, or files: .mcap, .db3, .pcd, or .pcap. A capture of all sensors is a scene of its
-    /// own; captures of single sensors are one scene, one for each sensor in the site's order.
+    /// A folder of recordings or PCD clouds, or files: .mcap, .db3, .pcd or .pcap. A capture with all sensors is a
+    /// scene of its own. Captures of single sensors are one scene together; give one for each sensor, in the site's
+    /// order.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub site: SiteArgs,
-    /// Whose method: hdl, paper or default.
+    /// The method: hdl, paper or default.
     #[arg(long, default_value = "default")]
     pub mode: Mode,
-    /// The hall without people, in any form that INPUT may have; default: empty.mcap beside the recordings, else learned
-    /// on the way.
+    /// The hall without people, in any form that INPUT may have. Default: empty.mcap beside the recordings; without
+    /// it the background is learned while running.
     #[arg(long, value_name = "PATH")]
     pub empty: Option<PathBuf>,
-    /// Learn the background on the way even where there is an empty recording.
+    /// Learn the background while running, even if there is an empty recording.
     #[arg(long)]
     pub no_empty: bool,
     /// Weights of the LSTM in place of the embedded ones.
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
-    /// Write every table as CSV too.
+    /// Also write every table as CSV.
     #[arg(long)]
     pub csv: bool,
-    /// Write the results of each scene as a recording too, results-0000.mcap, which ROS 2, Foxglove and Rerun open.
+    /// Also write the results of each scene as a recording of ROS 2 messages, results-0000.mcap.
     #[arg(long)]
     pub mcap: bool,
-    /// The foreground points too, as PointCloud2 in that recording.
+    /// Add the foreground points to that recording, as PointCloud2.
     #[arg(long, requires = "mcap")]
     pub points: bool,
-    /// Where detections, tracks and links go.
+    /// Folder for detections, tracks and links.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }
@@ -257,43 +259,43 @@ pub struct Run {
 /// `evaluate`
 #[derive(Debug, Args)]
 pub struct Evaluate {
-    /// What `run` wrote; left out with --scenes.
+    /// The folder that `run` wrote; omit it with --scenes.
     #[arg(value_name = "DIR")]
     pub dir: Option<PathBuf>,
-    /// What `simulate` wrote.
+    /// The folder that `simulate` wrote.
     #[arg(long, value_name = "DIR", requires = "dir")]
     pub truth: Option<PathBuf>,
-    /// Boxes of people drawn by hand, CSV `frame_file,label_index,x_m,y_m,...` in the sensor's frame.
+    /// Boxes drawn by hand around people, CSV `frame_file,label_index,x_m,y_m,...` in the sensor's frame.
     #[arg(long, value_name = "FILE", requires = "dir", conflicts_with = "truth")]
     pub labels: Option<PathBuf>,
     /// Simulate and run this many scenes of each preset in memory, and score them.
     #[arg(long, value_name = "N", conflicts_with = "dir", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: Option<u32>,
-    /// The crowds of --scenes: orca-03, orca-06, mixed, pairs; several with commas.
+    /// The crowds of --scenes: orca-03, orca-06, mixed, pairs. Separate several with commas.
     #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
     pub preset: Vec<Preset>,
-    /// Real walkers in place of a crowd; one scene a file.
+    /// Replay recorded walkers in place of a crowd. Each file is a scene.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["dir", "scenes"])]
     pub trajectories: Vec<PathBuf>,
     #[command(flatten)]
     pub replay: Replay,
     #[command(flatten)]
     pub bodies: BodyArgs,
-    /// People in a scene of --scenes.
+    /// People in each scene of --scenes.
     #[arg(long, default_value_t = 10, value_name = "N", value_parser = one_or_more)]
     pub people: usize,
-    /// Seed of the first scene; tests begin at 200000.
+    /// Seed of the first scene. Test seeds begin at 200000.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Modes of --scenes; several with commas.
+    /// Modes of --scenes. Separate several with commas.
     #[arg(long, value_delimiter = ',', default_value = "hdl,paper,default")]
     pub mode: Vec<Mode>,
     #[command(flatten)]
     pub site: SiteArgs,
-    /// Weights of the LSTM in place of the embedded ones; those that `run` was given.
+    /// Weights of the LSTM in place of the embedded ones; give the same as to `run`.
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
-    /// Where the report goes.
+    /// Folder for the report.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -309,22 +311,22 @@ pub struct Compare {
 /// `ablate`
 #[derive(Debug, Args)]
 pub struct Ablate {
-    /// Mechanisms to leave out, as the table calls them; several with commas. Default: every one.
+    /// Mechanisms to leave out, by their names in the table. Separate several with commas. Default: all.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub mechanisms: Vec<String>,
-    /// Data to try them on, as the table calls them; several with commas. Default: all there are.
+    /// Data to score, by their names in the table. Separate several with commas. Default: all that are there.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub sets: Vec<String>,
     /// Scenes of each drawn crowd.
     #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: u32,
-    /// Seed of the first scene: one for tuning.
+    /// Seed of the first scene, a tuning seed.
     #[arg(long, default_value_t = 150_000, value_name = "N")]
     pub seed: u64,
-    /// Folder of the recordings: real walkers, bottleneck, captured gait, labelled clouds.
+    /// Folder with the recordings of real walkers, bottleneck, captured gait and labelled clouds.
     #[arg(long, value_name = "DIR", env = "UMBRACAST_DATA")]
     pub data: Option<PathBuf>,
-    /// Where the rows (CSV) and the picture (SVG) go.
+    /// Folder for the rows (CSV) and the picture (SVG).
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -334,16 +336,16 @@ pub struct Ablate {
 pub struct Coverage {
     #[command(flatten)]
     pub site: SiteArgs,
-    /// From place to place, metres.
+    /// Distance between places, metres.
     #[arg(long, default_value_t = 0.5, value_name = "M")]
     pub step: f64,
     /// Standing height of the body, metres.
     #[arg(long, default_value_t = 1.72, value_name = "M")]
     pub height: f64,
-    /// Headings to average, each with a build of its own.
+    /// Number of headings to average, each with its own build.
     #[arg(long, default_value_t = 6, value_name = "N")]
     pub headings: usize,
-    /// Where table (Parquet and CSV) and floor plan (SVG) go.
+    /// Folder for the table (Parquet and CSV) and the floor plan (SVG).
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -351,15 +353,15 @@ pub struct Coverage {
 /// `reproduce`
 #[derive(Debug, Args)]
 pub struct Reproduce {
-    /// How many scenes.
+    /// Number of scenes.
     #[arg(long, default_value_t = 500, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: u32,
-    /// 40 scenes.
+    /// Run 40 scenes only.
     #[arg(long, conflicts_with = "scenes")]
     pub quick: bool,
     #[command(flatten)]
     pub crowd: CrowdArgs,
-    /// Real walkers in place of a crowd; one scene a file.
+    /// Replay recorded walkers in place of a crowd. Each file is a scene.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["scenes", "quick"])]
     pub trajectories: Vec<PathBuf>,
     #[command(flatten)]
@@ -369,13 +371,13 @@ pub struct Reproduce {
     /// Weights of the LSTM in place of the embedded ones; `train lstm` says how to fit them as the paper does.
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
-    /// Run every n-th scene only, from the i-th on (i from 0), and write no report.
+    /// Run every N-th scene only, beginning with scene I (from 0), and write no report.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
-    /// Run nothing: take the scenes that shards left in these folders. All other flags as for the shards.
+    /// Run nothing, and take the scenes that shards left in these folders. Give all other flags as for the shards.
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
     pub merge: Vec<PathBuf>,
-    /// Where scenes and report go; scenes that are there already are not run again.
+    /// Folder for scenes and report. Scenes that are already there are not run again.
     #[arg(long, default_value = "reproduce", value_name = "DIR")]
     pub out: PathBuf,
 }
@@ -383,7 +385,7 @@ pub struct Reproduce {
 /// `inspect`
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// A recording, table, capture, cloud, a network's weights or configuration.
+    /// A recording, table, capture, cloud, weights of a network, or configuration.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
 }
@@ -402,27 +404,28 @@ pub struct Config {
 /// What `train` fits.
 #[derive(Debug, Subcommand)]
 pub enum Train {
-    /// The model of the body axis, on simulated returns. Takes some minutes.
+    /// Fit the model of the body axis on simulated returns; takes some minutes.
     Axis(TrainAxis),
-    /// The default forecast's residual network, on tracks of simulated and replayed people.
+    /// Fit the default forecast's residual network on tracks of simulated and replayed people.
     Residual(TrainResidual),
-    /// What extents of detections tell of how wide a body is, on tuning scenes; prints constants of the source.
+    /// Fit how a body's width follows from the extents of detections, on tuning scenes; prints constants for the
+    /// source.
     Width(TrainScenes),
-    /// The body that stage 3 puts into the links' way, on recorded tuning scenes.
+    /// Fit stage 3's model of a body on recorded tuning scenes.
     Body(TrainBody),
-    /// The probability from which on a link is called blocked, on tuning scenes.
+    /// Fit the probability at which a link is called blocked, on tuning scenes.
     Thresholds(TrainScenes),
-    /// The paper's LSTM: a program of its own, `train/`; this prints the command that builds and runs it.
+    /// Print the command that builds and runs the program in `train/`, which fits the paper's LSTM.
     Lstm(TrainLstm),
 }
 
 /// Where weights come from and go to.
 #[derive(Debug, Args)]
 pub struct Fitted {
-    /// The source's commit, for the card.
+    /// Commit of the source, for the card.
     #[arg(long)]
     pub commit: Option<String>,
-    /// Where the fitted file and its card go.
+    /// Folder for the fitted file and its card.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }
@@ -440,18 +443,18 @@ pub struct TrainResidual {
     /// Passes over the data.
     #[arg(long, default_value_t = 15, value_name = "N")]
     pub epochs: usize,
-    /// Drawn scenes to train on.
+    /// Number of drawn scenes to train on.
     #[arg(long, default_value_t = 36, value_name = "N")]
     pub scenes: u64,
     /// Seed of the first scene; 1 to 99999.
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     pub first_scene: u64,
-    /// Recorded people to learn from beside the drawn crowds.
+    /// Recorded people to learn from in addition to the drawn crowds.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub trajectories: Vec<PathBuf>,
     #[command(flatten)]
     pub replay: Replay,
-    /// Seed of the first weights and of the samples' order.
+    /// Seed of the initial weights and of the samples' order.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     #[command(flatten)]
@@ -461,7 +464,8 @@ pub struct TrainResidual {
 /// `train body`
 #[derive(Debug, Args)]
 pub struct TrainBody {
-    /// Folders in pairs: what `simulate` wrote with tuning seeds (100000 to 199999), and what `run` made of it.
+    /// Pairs of folders: one that `simulate` wrote with tuning seeds (100000 to 199999), and one that `run` made from
+    /// it.
     #[arg(required = true, value_names = ["SIMULATED", "RUN"], num_args = 2..)]
     pub recordings: Vec<PathBuf>,
 }
@@ -469,7 +473,7 @@ pub struct TrainBody {
 /// `train width`, `train thresholds`
 #[derive(Debug, Args)]
 pub struct TrainScenes {
-    /// How many scenes, of several crowds in turn.
+    /// Number of scenes, of several crowds in turn.
     #[arg(long, default_value_t = 12, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: u32,
 }
@@ -477,7 +481,7 @@ pub struct TrainScenes {
 /// `train lstm`
 #[derive(Debug, Args)]
 pub struct TrainLstm {
-    /// What that program understands.
+    /// Arguments for that program.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENT")]
     pub arguments: Vec<String>,
 }
