@@ -207,7 +207,8 @@ impl Summary {
         ];
         let mut table = Table::new("Returns from a standing person in one revolution", 1, &header);
         table.rows = self.rows.iter().map(Row::cells).collect();
-        table.noted("By two: at least 6 returns to each of two sensors. Median: returns at the middle place.")
+        table
+            .noted("By two: each of two sensors gets at least 6 returns. Median: the median place's returns.")
     }
 
     fn worst(&self) -> Table {

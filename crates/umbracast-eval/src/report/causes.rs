@@ -50,7 +50,7 @@ pub fn causes(group: &Group) -> Table {
         }
     }
     table.noted(
-        "The owner: instances in which the UE is outside of the owner's body throughout. Anything: others, the owner or \
-         the hall, in all instances.",
+        "The owner: only instances in which the UE stays outside the owner's body. Anything: others, the owner \
+         or the hall, in all instances.",
     )
 }

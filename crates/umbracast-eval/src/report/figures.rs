@@ -138,8 +138,8 @@ fn boxes(group: &Group, access_point: &str, published: bool) -> Result<Option<Fi
     caption += if group.modes.len() == 1 { "the run." } else { "each mode." };
     caption += shades(panels.iter());
     if published {
-        caption += " The paper (its Algorithm 1) finds more recall and the higher F1 with OBB, more precision with \
-                    AABB, and precision and recall crossing near 300 ms.";
+        caption += " In the paper (its Algorithm 1) recall and F1 are higher with OBB, precision is higher \
+                 with AABB, and precision and recall cross near 300 ms.";
         caption += &base_rates(group, access_point);
     }
     let title = match published {
@@ -160,7 +160,7 @@ fn metrics(group: &Group, access_point: &str, published: bool) -> Result<Figure,
     let panels = four_panels(published, lines);
     let mut caption = "Accuracy, precision, recall and F1 over the prediction window.".to_owned();
     if published {
-        caption += " Diamonds: what the paper prints for 300 ms, and the level at which its F1 settles.";
+        caption += " Diamonds: the paper's values for 300 ms, and the level at which its F1 settles.";
         caption += &base_rates(group, access_point);
     }
     caption += shades(panels.iter());
@@ -198,9 +198,11 @@ fn displacement(group: &Group, published: bool) -> Result<Figure, Error> {
     }
     let carried_on = by_step(&group.constant_velocity_m);
     panel.series.push(series("constant velocity of the true state", GREY, Mark::Dashed(1.6), carried_on));
-    let caption = "Mean distance between forecast and true position at each step, over people with a track who have \
-                   not arrived. Dashed: true position and velocity carried on, so that only the future is unknown."
-        .to_owned();
+    let caption =
+        "Mean distance between forecast and true position at each step, over people with a track who have \
+                   not arrived. Dashed: constant velocity from the true state, so that only the future is \
+                            unknown."
+            .to_owned();
     let caption = caption + shades(std::iter::once(&panel));
     Figure::of("displacement", ("Displacement error of the forecast".into(), caption), &[panel], HALF)
 }
@@ -237,11 +239,12 @@ fn reliability(group: &Group, access_point: &str) -> Result<Option<Figure>, Erro
     }
     shares.series.push(series("perfect", GREY, Mark::Dashed(1.5), vec![(0.0, 0.0), (1.0, 1.0)]));
     let ece = |w: usize| links.windows[w - 1].ece.unwrap_or(f64::NAN);
-    let title = format!("Are the probabilities honest? Mode {}, access point {access_point}", mode.name());
+    let title =
+        format!("Calibration of the probabilities: mode {}, access point {access_point}", mode.name());
     let caption = format!(
-        "Predictions sorted by their probability into {bins} bins of equal width; each mark is a bin. On the \
-         diagonal, of the links predicted to be blocked with 30 % indeed 30 % are. Second chart: how many predictions a bin \
-         holds; where they are few, the mark in the first may lie far off by chance. Expected calibration error at \
+        "Predictions are sorted by probability into {bins} bins of equal width; each mark is a bin. On the \
+         diagonal, 30 % of the links with a predicted probability of 30 % are blocked. Second chart: number of \
+         predictions in each bin. With few predictions a mark may be far off by chance. Expected calibration error at \
          100, 300 and 900 ms: {:.3}, {:.3} and {:.3}.",
         ece(1),
         ece(3),
@@ -283,8 +286,8 @@ fn ladder(group: &Group, access_point: &str) -> Result<Option<Figure>, Error> {
     }
     let title = format!("What limits the result, access point {access_point}");
     let caption =
-        "Dashed: F1 of oracles that know where everybody will be and take people for the body named. The \
-                   upright body knows all but the gait; what follows the gait can pass it."
+        "Dashed: F1 of oracles. An oracle knows where everybody will be and models each person as the named \
+         body. The upright body ignores the gait, so a method that follows the gait can score above it."
             .to_owned();
     Figure::of("ladder", (title, caption), &[panel], HALF).map(Some)
 }

@@ -122,9 +122,9 @@ fn opening(group: &Group, published: bool) -> String {
         _ => format!(" First figures: mode {} at access point {}.", mode.mode.name(), escaped(first)),
     };
     let mut text = format!(
-        "<p class=\"lead\">LiDARs see people walk. Umbracast predicts where each will be in the next 0.9 s, and which \
-         radio links between access points and people a body is about to block. This report holds {scenes} \
-         ({} frames) against the truth.{of_first}</p>\n<div class=\"cards\">\n",
+        "<p class=\"lead\">LiDARs see people walk. Umbracast predicts where each person will be within the \
+         next 0.9 s, and which radio links between access points and people a body will block. This report \
+         scores {scenes} ({} frames) against the truth.{of_first}</p>\n<div class=\"cards\">\n",
         group.frames,
     );
     let mut card = |value: Option<f64>, digits: usize, unit: &str, what: &str, printed: String| {
@@ -151,12 +151,12 @@ fn opening(group: &Group, published: bool) -> String {
         let _ = writeln!(text, "<div class=\"card\"><b>{value}</b><span>{what}</span></div>");
     };
     if let Some(links) = group.link(None, Predictor::PersistenceOfTruth, first) {
-        plain(links.windows[2].f1.value, 3, "", "F1 at 300 ms of a guess: blocked stays blocked");
+        plain(links.windows[2].f1.value, 3, "", "F1 at 300 ms of persistence of truth (\"as now\")");
     }
     if let Some(links) = group.link(Some(mode.mode), Predictor::Run, first) {
-        plain(links.windows[2].onset_f1.value, 3, "", "onset F1: links in sight when predicted");
+        plain(links.windows[2].onset_f1.value, 3, "", "onset F1: links that are free when predicted");
     }
-    plain(mode.tracked_share.value.map(|share| share * 100.0), 1, " %", "of people are followed");
+    plain(mode.tracked_share.value.map(|share| share * 100.0), 1, " %", "of people have a track");
     text + "</div>\n" + &modes(group)
 }
 
@@ -164,7 +164,8 @@ fn opening(group: &Group, published: bool) -> String {
 fn modes(group: &Group) -> String {
     let told = |mode: Mode| match mode {
         Mode::Hdl => {
-            "detection and tracking as the code that the paper's authors adapted ships them, with the paper's forecast"
+            "detection and tracking of the published code that the paper's authors adapted, with the paper's \
+             forecast"
         }
         Mode::Paper => "the method as the paper describes it",
         Mode::Default => "this software's own method",
@@ -173,9 +174,9 @@ fn modes(group: &Group) -> String {
     for mode in group.modes.iter().map(|scores| scores.mode) {
         let _ = write!(text, "Mode <b>{}</b>: {}. ", mode.name(), told(mode));
     }
-    text + "A window counts as blocked when the link is cut at any step of it. F1 is the harmonic mean of precision and \
-            recall; onset F1 is the same over links that are in sight when the prediction is made, where saying \
-            &quot;as now&quot; earns nothing.</p>\n"
+    text + "A window counts as blocked if a body cuts the link at any of its steps. F1 is the harmonic mean of \
+             precision and recall. Onset F1 counts only links that are free when the prediction is made; the \
+             answer &quot;as now&quot; scores zero there.</p>\n"
 }
 
 /// The animation, small enough to be seen whole.
@@ -183,8 +184,9 @@ fn animated(svg: &str, context: &Context) -> String {
     let of = context.kept.map_or(String::new(), |kept| format!(": {}", escaped(kept.label)));
     let title = format!("A few seconds{of}");
     format!(
-        "<div><h2 id=\"animation\">{title}</h2>\n<figure>\n{svg}<figcaption>People where they truly are. Red is \
-         truth, amber is prediction. The same picture lies beside this page as animation.svg.</figcaption>\n\
+        "<div><h2 id=\"animation\">{title}</h2>\n<figure>\n{svg}<figcaption>People are at their true \
+         positions. Red is truth, amber is prediction. The file animation.svg beside this page has the same \
+         picture.</figcaption>\n\
          </figure></div>\n"
     )
 }

@@ -75,7 +75,7 @@ pub fn plan(kept: &Kept) -> Result<Option<Figure>, Error> {
     let time_s = kept.truth.people.iter().find(|p| p.frame == frame).map_or(0.0, |p| p.time_ns as f64 / 1e9);
     let title = format!("From above at {time_s:.1} s: {}", kept.label);
     let caption = format!(
-        "Every link of every person who is followed, coloured by what mode {} says of it at this instant.",
+        "All links of all tracks, coloured by the prediction of mode {} at this instant.",
         kept.mode.name()
     );
     let sizes =
@@ -152,8 +152,8 @@ pub fn link(kept: &Kept) -> Result<Option<Figure>, Error> {
     let access_point = kept.site.access_points.first().map_or("", |ap| &ap.name);
     let title = format!("One link over time: {access_point} to person {person}, {}", kept.label);
     let caption = format!(
-        "Mode {}. Shaded: another body truly blocks the link. A prediction (marks on top) is right when that follows \
-         within its window.",
+        "Mode {}. Shaded: another body blocks the link in truth. A prediction (marks on top) is right if that \
+         happens within its window.",
         kept.mode.name()
     );
     let sizes = Sizes { alone: (WIDTH, 360.0), page: (1100.0, 300.0), narrow: Some((400.0, 260.0)) };

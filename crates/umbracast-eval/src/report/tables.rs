@@ -91,14 +91,14 @@ pub fn headline(group: &Group, published: bool) -> Table {
             table.rows.extend(persistence(group, access_point, w, &start));
         }
     }
-    let mut note = "Bound once: what a device hears that is bound to its person's track at the first match and keeps it \
-                    through identity swaps, until the track dies; the other rows match anew in every frame. \
-                    Persistence of truth: as now, the true present. "
+    let mut note = "Bound once: each device is bound to the track that first matches its person and keeps it \
+             through identity swaps until the track dies. The other rows match people and tracks anew in every \
+             frame. Persistence of truth: the answer \"as now\" from the true present. "
         .to_owned();
     note += brackets(&table);
     if published {
         table.rows.extend(published_rows());
-        note += " The published F1 follows from its precision and recall.";
+        note += " The published F1 is computed from the published precision and recall.";
     }
     table.noted(note.trim_start())
 }
@@ -165,7 +165,7 @@ pub fn boxes(group: &Group, access_point: &str, windows: &[usize], published: bo
             row
         }));
     }
-    let same = "Everything before stage 3 is the mode's own and the same in all its rows.";
+    let same = "All rows of a mode share its stages 1 and 2.";
     let note = format!("{same} {}", brackets(&table));
     table.noted(note.trim_end())
 }
@@ -225,9 +225,10 @@ pub fn tracking(group: &Group) -> Table {
         table.rows.push(row);
     }
     table.noted(
-        "Everybody in the scene from the first frame, confirmed tracks, gate 0.5 m, HOTA similarity 1 - d / 1 m. \
-         Switches a scene. Position and velocity: root mean square of the 2-D error. Then recall by returns \
-         on the body. NEES: squared errors over the covariance that the tracks claim, 2 if they are honest.",
+        "Counted: everybody in the scene from the first frame, and confirmed tracks; gate 0.5 m, HOTA \
+         similarity 1 - d / 1 m. Switches are per scene. Position and velocity: root mean square of the 2-D \
+         error. Then recall by returns on the body. NEES: squared error over the tracks' covariance; 2 means \
+         that the covariance is right.",
     )
 }
 
@@ -256,8 +257,8 @@ pub fn displacement(group: &Group, published: bool) -> Table {
         table.rows.push(reference("published", printed));
     }
     table.noted(
-        "Scored: share of people at instants that count who are tracked and stay unarrived. NLL in nats and \
-         shares within the 50 and 90 % regions are means over the steps.",
+        "Scored: share of counted people and instants with a track whose person does not arrive within the \
+         forecast. NLL (in nats) and the shares within the 50 and 90 % regions are means over the steps.",
     )
 }
 
@@ -272,9 +273,9 @@ pub fn baselines(group: &Group, access_point: &str) -> Table {
         Predictor::BoundOnce,
     ];
     compared(group, access_point, &shown, format!("Baselines, access point {access_point}")).noted(
-        "Persistence: as now, the present being the truth's or the mode's own. Constant velocity: true positions \
-         carried on, cast by the mode's stage 3. Lead: median time from the start of the unbroken warning to the \
-         onset, and the share of onsets warned of.",
+        "Persistence: the answer \"as now\", from the true present or from the mode's own. Constant velocity: \
+         the true state carried on, then the mode's stage 3. Lead: median time from the start of the unbroken \
+         warning to the onset, and the share of onsets warned of.",
     )
 }
 
@@ -300,10 +301,10 @@ pub fn times(group: &Group) -> Table {
         }
     }
     table.noted(
-        "Of links in sight, the time until they are blocked; of blocked ones, until they are clear; of links in sight \
-         that come to be blocked, until they are clear again. Links: those with a chance of 10 % or more that it happens within 900 ms. Share of them between the 10 and the 90 % \
-         quantile (times are whole steps of 100 ms, so more than 80 %), and the error of the 50 % quantile where it \
-         happened.",
+        "Time until a free link is blocked, until a blocked link is clear, and until a free link that becomes \
+         blocked is clear again. Links: those with a predicted chance of at least 10 % that it happens within \
+         900 ms. Then the share of them between the 10 and the 90 % quantile (more than 80 %, because times \
+         are whole steps of 100 ms), and the error of the 50 % quantile where it happened.",
     )
 }
 
@@ -311,9 +312,9 @@ pub fn times(group: &Group) -> Table {
 pub fn budget(group: &Group, access_point: &str) -> Table {
     let shown = [Predictor::Run, Predictor::TrueState, Predictor::TrueFuture, Predictor::TrueBody];
     compared(group, access_point, &shown, format!("Error budget, access point {access_point}")).noted(
-        "One stage at a time replaced by the truth, the rest as in the mode: positions and velocities into \
-         forecast and cast, people whom the mode missed included; the true positions from now on into the cast; \
-         the true walking mesh at the forecast position (yes or no at the mean).",
+        "The truth replaces one stage at a time; the rest is the mode's own. Positions and velocities: the true state \
+         into forecast and cast, with the people whom the mode missed. Future: the true positions from now on into \
+         the cast. Body: the true walking mesh at the forecast position (yes or no at the mean).",
     )
 }
 
@@ -411,14 +412,14 @@ pub fn health(group: &Group) -> Table {
         row.extend(group.modes.iter().map(|mode| named(mode)[name].to_string()));
         table.rows.push(row);
     }
-    table.noted("Everything broken that a run met and skipped. All zero on clean input.")
+    table.noted("Broken input that the run skipped. All counts are zero on clean input.")
 }
 
 /// What of it was not zero; none where nothing was skipped.
 pub fn losses(group: &Group) -> Option<Table> {
     let mut table = health(group);
     table.rows.retain(|row| row[1..].iter().any(|count| count != "0"));
-    (!table.rows.is_empty()).then(|| table.noted("Everything broken that a run met and skipped."))
+    (!table.rows.is_empty()).then(|| table.noted("Broken input that the run skipped."))
 }
 
 fn with_scores(start: &[String], scores: &WindowScores) -> Vec<String> {
