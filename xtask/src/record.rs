@@ -10,6 +10,7 @@ mod house;
 mod live;
 mod living;
 mod locked;
+mod mutations;
 mod nodes;
 mod scores;
 
@@ -44,7 +45,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 38] = [
+const JOBS: [Job; 39] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -71,6 +72,7 @@ const JOBS: [Job; 38] = [
     job("deployed", "the files for containers and clusters, run here", Needs::Asking, nodes::deployed),
     job("faults", "a live run in which something fails", Needs::Nothing, live::faults),
     job("kills", "a recording run killed at twenty moments", Needs::Nothing, live::kills),
+    job("mutations", "damaged files of every format, given to the command", Needs::Nothing, mutations::mutations),
     job("same-bytes", "the same seed on one thread and on two", Needs::Nothing, house::same_bytes),
     job("resume", "an experiment killed and gone on with", Needs::Nothing, house::resume),
     job("explain", "why the paper's figures are what they are", Needs::Nothing, scores::explain),

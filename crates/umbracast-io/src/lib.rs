@@ -1,6 +1,7 @@
 //! Files, tables and messages: pcap, PCD, MCAP recordings, trajectories, motion captures, Parquet and CSV.
 
 mod lzf;
+mod seam;
 pub mod pcap;
 pub mod pcd;
 pub mod rows;

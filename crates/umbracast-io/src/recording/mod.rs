@@ -21,6 +21,7 @@ use umbracast::Error;
 use umbracast::lidar::Packet;
 
 use crate::messages;
+use crate::seam::guarded;
 
 #[cfg(feature = "db3")]
 mod db3;
@@ -33,6 +34,8 @@ pub use crate::results::Results;
 const CONFIG_TOPIC: &str = "/umbracast/config";
 /// How every SQLite file begins.
 const SQLITE_MAGIC: &[u8; 16] = b"SQLite format 3\0";
+/// A record is believed to be no longer than the file, or than this where it comes out of a compressed chunk.
+const RECORD_BYTES: u64 = 64 << 20;
 
 /// What a reader finds in a recording, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,7 +77,13 @@ impl RecordingReader {
         let is_sqlite = file.read_exact(&mut magic).is_ok() && magic == *SQLITE_MAGIC;
         file.rewind().map_err(fail)?;
         let source = match is_sqlite {
-            false => Source::Mcap(Box::new(mcap::io::MessageReader::new(BufReader::new(file)))),
+            false => {
+                let longest = file.metadata().map_err(fail)?.len().max(RECORD_BYTES);
+                let options =
+                    mcap::sans_io::LinearReaderOptions::default().with_record_length_limit(longest as usize);
+                let messages = mcap::io::MessageReader::new_with_options(BufReader::new(file), options);
+                Source::Mcap(Box::new(messages))
+            }
             #[cfg(feature = "db3")]
             true => Source::Db3(db3::Messages::open(path)?),
             #[cfg(not(feature = "db3"))]
@@ -95,13 +104,14 @@ impl RecordingReader {
     /// A file that is no recording at all.
     pub fn next_entry(&mut self) -> Result<Option<Entry>, Error> {
         let next = match &mut self.source {
-            Source::Mcap(messages) => match messages.next() {
-                None => Ok(None),
-                Some(Ok(message)) => {
+            Source::Mcap(messages) => match guarded(|| messages.next()) {
+                Ok(None) => Ok(None),
+                Ok(Some(Ok(message))) => {
                     let kind = message.channel.schema.as_ref().map_or("", |schema| &schema.name);
                     Ok(Some(understand(&message.channel.topic, kind, message.data)))
                 }
-                Some(Err(error)) => Err(("an MCAP recording", plain(&error))),
+                Ok(Some(Err(error))) => Err(("an MCAP recording", plain(&error))),
+                Err(panicked) => Err(("an MCAP recording", panicked)),
             },
             #[cfg(feature = "db3")]
             Source::Db3(messages) => match messages.next() {

@@ -18,6 +18,7 @@ use umbracast::Error;
 
 use super::cells::{Cell, Row};
 use super::values::Values;
+use crate::seam::guarded;
 
 /// An open Parquet file.
 pub struct ParquetFile {
@@ -79,6 +80,9 @@ impl ParquetFile {
     }
 }
 
+/// A row group that says it has more rows is not believed: ours have a scene's, about 10^5.
+const ROWS_MAX: usize = 1 << 24;
+
 /// What a Parquet file holds, whoever wrote it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TableSummary {
@@ -91,8 +95,10 @@ pub struct TableSummary {
 /// Reads the end of the file only.
 pub fn describe(path: &Path) -> Result<TableSummary, Error> {
     let file = File::open(path).map_err(|e| Error::new(e.to_string()))?;
-    let reader = SerializedFileReader::new(file)
-        .map_err(|e| Error::new(format!("expected a Parquet table, found {e}")))?;
+    let not_parquet =
+        |found: &dyn std::fmt::Display| Error::new(format!("expected a Parquet table, found {found}"));
+    let reader = guarded(|| SerializedFileReader::new(file)).map_err(|e| not_parquet(&e))?;
+    let reader = reader.map_err(|e| not_parquet(&e))?;
     let meta = reader.metadata().file_metadata();
     let columns = meta.schema_descr().columns();
     Ok(TableSummary {
@@ -243,35 +249,53 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
 /// Reads the table row group by row group.
 pub fn read<R: Row>(path: &Path, access_points: &[String], mut sink: impl FnMut(&[R])) -> Result<(), Error> {
     let file = File::open(path).map_err(|e| Error::new(format!("cannot be opened: {e}")))?;
-    let not_parquet = |e| Error::new(format!("expected a whole Parquet file, found: {e}"));
-    let reader = SerializedFileReader::new(file).map_err(not_parquet)?;
+    let reader = guarded(|| SerializedFileReader::new(file)).map_err(not_parquet)?.map_err(not_parquet)?;
     let mut rows = Vec::new();
     for i in 0..reader.num_row_groups() {
-        let group = reader.get_row_group(i).map_err(not_parquet)?;
-        let count = group.metadata().num_rows() as usize;
-        let mut columns = Vec::new();
-        let mut failed = None;
-        R::default().visit(&mut |name, cell| {
-            let column = read_column(group.as_ref(), &name.to_string(), count, &cell, access_points);
-            match column {
-                Ok(column) => columns.push(column.into_iter()),
-                Err(error) => failed = failed.take().or(Some(error.within(format!("column {name}")))),
+        guarded(|| read_group(&reader, i, access_points, &mut rows)).map_err(not_parquet)??;
+        sink(&rows);
+    }
+    Ok(())
+}
+
+fn not_parquet(found: impl std::fmt::Display) -> Error {
+    Error::new(format!("expected a whole Parquet file, found: {found}"))
+}
+
+/// One row group in place of `rows`.
+fn read_group<R: Row>(
+    reader: &SerializedFileReader<File>,
+    index: usize,
+    access_points: &[String],
+    rows: &mut Vec<R>,
+) -> Result<(), Error> {
+    let group = reader.get_row_group(index).map_err(not_parquet)?;
+    let told = group.metadata().num_rows();
+    let count = usize::try_from(told).ok().filter(|count| *count <= ROWS_MAX);
+    let count = count.ok_or_else(|| not_parquet(format!("{told} rows in a group")))?;
+    let mut columns = Vec::new();
+    let mut failed = None;
+    R::default().visit(&mut |name, cell| {
+        if failed.is_some() {
+            return;
+        }
+        match read_column(group.as_ref(), &name.to_string(), count, &cell, access_points) {
+            Ok(column) => columns.push(column.into_iter()),
+            Err(error) => failed = Some(error.within(format!("column {name}"))),
+        }
+    });
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    rows.clear();
+    rows.resize(count, R::default());
+    for row in rows {
+        let mut column = columns.iter_mut();
+        row.visit(&mut |_, cell| {
+            if let Some(value) = column.next().and_then(Iterator::next) {
+                value.put(cell);
             }
         });
-        if let Some(error) = failed {
-            return Err(error);
-        }
-        rows.clear();
-        rows.resize(count, R::default());
-        for row in &mut rows {
-            let mut column = columns.iter_mut();
-            row.visit(&mut |_, cell| {
-                if let Some(value) = column.next().and_then(Iterator::next) {
-                    value.put(cell);
-                }
-            });
-        }
-        sink(&rows);
     }
     Ok(())
 }
