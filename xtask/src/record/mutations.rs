@@ -105,31 +105,20 @@ fn formats(book: &Book) -> Result<Vec<Format>> {
     fs::write(at("capture.pcap"), capture()).map_err(|e| e.to_string())?;
     let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
     let format = |name, whole: PathBuf, line: &str, files| Format { name, whole, words: words(line), files };
-    let data = root().join("testdata");
     Ok(vec![
         format("mcap", at("cut.mcap"), "inspect {}", FILES),
-        format("mcap, run", data.join("recordings/clouds.mcap"), "run {} --out {out}", FILES_OF_SLOW),
+        format("mcap, run", at("cut.mcap"), "run {} --out {out}", FILES_OF_SLOW),
         format("parquet", at("run/links.parquet"), "inspect {}", FILES),
         format("tables", at("run/tracks.parquet"), "evaluate {out} --truth SIM", FILES_OF_SLOW),
         format("pcap", at("capture.pcap"), "inspect {}", FILES),
         format("pcd", at("cloud.pcd"), "inspect {}", FILES),
         format("toml", root().join("config/sites/glass.toml"), "config --check {}", FILES),
-        format("csv", at("walk.csv"), "simulate --trajectories {} --seconds 1 --out {out}", FILES_OF_SLOW),
-        format(
-            "ndjson",
-            at("walk.ndjson"),
-            "simulate --trajectories {} --seconds 1 --out {out}",
-            FILES_OF_SLOW,
-        ),
-        format(
-            "petrack",
-            at("walk.txt"),
-            "simulate --trajectories {} --seconds 1 --out {out}",
-            FILES_OF_SLOW,
-        ),
+        format("csv", at("walk.csv"), "simulate --trajectories {} --out {out}", FILES_OF_SLOW),
+        format("ndjson", at("walk.ndjson"), "simulate --trajectories {} --out {out}", FILES_OF_SLOW),
+        format("petrack", at("walk.txt"), "simulate --trajectories {} --out {out}", FILES_OF_SLOW),
         format(
             "weights",
-            root().join("models/residual.safetensors"),
+            root().join("models/paper_lstm.safetensors"),
             "run SIM --mode paper --weights {} --out {out}",
             FILES_OF_SLOW,
         ),
@@ -165,6 +154,12 @@ fn capture() -> Vec<u8> {
 fn damage(book: &Book, format: &Format, files: u64) -> Result<Tally> {
     let whole = fs::read(&format.whole).map_err(|e| format!("{}: {e}", format.whole.display()))?;
     let ending = format.whole.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
+    let folder = book.scratch("undamaged");
+    fs::create_dir_all(folder.join("out")).map_err(|e| e.to_string())?;
+    match read(book, format, &folder, &format.whole)? {
+        Some((Some(0 | 3), _)) => {}
+        other => return Err(format!("{}: expected the whole file to be read, found {other:?}", format.name)),
+    }
     let (tally, next) = (Tally::default(), AtomicU64::new(0));
     let threads = std::thread::available_parallelism().map_or(2, usize::from);
     std::thread::scope(|scope| {
