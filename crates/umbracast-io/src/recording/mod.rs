@@ -244,6 +244,32 @@ mod tests {
         assert!(entries.contains(&Entry::Packets("lidar_west".into(), packets.to_vec())));
     }
 
+    /// Every fourth damaged recording once ended the program: `capacity overflow`, or an allocation of exabytes.
+    #[test]
+    fn a_length_is_not_believed_before_the_file_s() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.mcap");
+        record(&path);
+        let whole = std::fs::read(&path).unwrap();
+        // Eight bytes of the magic, then a record each: an operation code and a length of eight bytes.
+        let mut at = 8;
+        let mut damaged = 0;
+        while at + 9 < whole.len() - 8 {
+            let length = u64::from_le_bytes(whole[at + 1..at + 9].try_into().unwrap());
+            for extreme in [4_412_750_543_122_679_220, u64::MAX, 1 << 62, 0xffff_ffff] {
+                let mut bytes = whole.clone();
+                bytes[at + 1..at + 9].copy_from_slice(&extreme.to_le_bytes());
+                std::fs::write(&path, &bytes).unwrap();
+                if let Ok((_, lost)) = read(&path) {
+                    assert!(lost, "record at {at}, length {extreme}");
+                }
+                damaged += 1;
+            }
+            at += 9 + length as usize;
+        }
+        assert!(damaged > 40, "{damaged}");
+    }
+
     #[test]
     fn a_file_cut_anywhere_gives_what_stands_before_the_cut() {
         let directory = tempfile::tempdir().unwrap();
