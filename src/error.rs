@@ -1,5 +1,5 @@
-//! The one error of set-up: opaque, with the full story in its message. The running pipeline never fails; it
-//! counts in [`crate::Health`].
+//! The one error type of set-up. It is opaque, and its message has all details. The running pipeline never fails; it
+//! counts what it cannot use in [`crate::Health`].
 
 use std::fmt;
 

@@ -1,7 +1,8 @@
-//! How people walk: what counts as walking, how long a stride is, where in it a person is, and how far the trunk sways.
+//! How people walk: what counts as walking, the length of a stride, the phase in it, and the sway of the trunk.
 //!
-//! Gait goes by speed over the height of the hips. Stride law, hip height and trunk sway: Boulic, Magnenat-Thalmann and
-//! Thalmann, "A global human walking model with real-time kinematic personification", The Visual Computer 6 (1990).
+//! The gait depends on speed over the height of the hips. Stride law, hip height and trunk sway: Boulic,
+//! Magnenat-Thalmann and Thalmann, "A global human walking model with real-time kinematic personification", The
+//! Visual Computer 6 (1990).
 
 use std::f64::consts::{PI, TAU};
 

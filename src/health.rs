@@ -1,4 +1,4 @@
-//! What the running pipeline met that it could not use: counted here, skipped, and recovered from.
+//! Counts of the input that the running pipeline could not use. It skips such input and recovers.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,13 +1,13 @@
-//! Umbracast sees people with LiDARs, foresees where each will be in the next second, and tells which radio
-//! links a human body is about to block, how likely, and when.
+//! Umbracast detects people with LiDARs, forecasts where each person will be within the next second, and says which
+//! radio links a human body will block, with what probability, and when.
 //!
 //! Data flows one way: packets, scan, frame, foreground, clusters, detections, tracks, forecasts, blockages.
-//! [`pipeline::Pipeline::step`] is that sentence as code. The modules below stand in the same order, and each
-//! uses only what stands above it.
+//! [`pipeline::Pipeline::step`] is that sentence as code. The modules below have the same order, and each uses only
+//! modules above it.
 //!
 //! These pages show what a user needs. Items that only the crates beside this one need (training, scores, the
-//! simulator) are public, hidden here, and may change with any version. The equations behind every stage stand in
-//! `docs/METHODS.md` of the repository.
+//! simulator) are public, hidden here, and may change with any version. `docs/METHODS.md` of the repository has the
+//! equations of every stage.
 //!
 //! ```
 //! use std::time::Duration;

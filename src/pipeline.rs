@@ -1,4 +1,4 @@
-//! The page: one line a stage.
+//! The whole system on one page, with one line for each stage.
 
 use crate::blockage::{Blockage, Caster};
 use crate::detect::{Background, Clocks, Cluster, Clusterer, Detection, Measurer, Point, Prior};

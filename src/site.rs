@@ -1,5 +1,5 @@
-//! Where everything stands: hall, sensors, access points, and where on a body the UE is. SI units, site frame,
-//! z up, floor at z = 0 where the hall says no other. Read from the `site` part of a configuration file; see
+//! The positions of everything: hall, sensors, access points, and the UE on a body. SI units, site frame, z up, floor
+//! at z = 0 unless the hall says otherwise. Read from the `site` part of a configuration file; see
 //! `config/default.toml`.
 
 mod hall;

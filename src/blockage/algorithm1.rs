@@ -1,4 +1,4 @@
-//! Algorithm 1 of the paper, corrected where it is printed wrong.
+//! Algorithm 1 of the paper, with its misprints corrected.
 //!
 //! Line 10 multiplies positions; the text means directions seen from the access point, so positions are taken
 //! from it first. Line 11 admits p when q is the nearer one; the text says that only people nearer to the access

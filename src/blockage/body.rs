@@ -1,5 +1,5 @@
-//! What a ray meets: an upright body of a few numbers, a stack of elliptic slices with two arms that swing. One
-//! box to the top of the head does far worse (the report's ladder): above the shoulders there is only a head.
+//! The model of a body that a ray meets: a stack of elliptic slices with two arms that swing, in a few numbers. A box
+//! to the top of the head scores far lower (the report's ladder), because above the shoulders there is only a head.
 //!
 //! All sizes are shares of the standing height ([`BodyModel`]); nothing here knows the simulator's meshes.
 

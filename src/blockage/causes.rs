@@ -1,5 +1,6 @@
-//! Links that are blocked by others, by the owner's own body, by the hall, and by any of them: in the same samples, for
-//! what blocks hangs together. Whom others hide in a sample is known already; the owner and the hall are asked here.
+//! Blockage of links by others, by the owner's own body, by the hall, and by any of them. All causes use the same
+//! samples, because they depend on one another. The blockage by others is already known for each sample; this module
+//! adds the owner and the hall.
 
 use super::Chance;
 use super::crossing::{Crossing, Part};

@@ -1,5 +1,6 @@
-//! The samples of a word in which a body comes near its ray, asked what [`super::body::blocks`] asks one ray, in loops over
-//! samples and in single precision: where a ray passes a body within 0.1 mm of touching it, the answer may be another.
+//! Tests the samples in which a body comes near its ray. It asks what [`super::body::blocks`] asks of one ray, in
+//! loops over samples and in single precision. If a ray passes within 0.1 mm of touching a body, the two answers may
+//! differ.
 
 use std::ops::Range;
 

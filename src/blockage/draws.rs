@@ -1,5 +1,5 @@
-//! The random numbers behind a person's samples, spread evenly: in every coordinate each sample has a share of the
-//! distribution to itself (Latin hypercube), so few samples do for many independent ones.
+//! The random numbers behind a person's samples, spread evenly: in every coordinate each sample has its own share of
+//! the distribution (Latin hypercube). A few such samples replace many independent ones.
 
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};

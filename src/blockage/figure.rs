@@ -1,4 +1,4 @@
-//! A body for the loops over samples: which of its parts stand between two heights, and how far they reach.
+//! A body for the loops over samples: its parts between two heights, and how far they reach.
 
 use super::body_model::{Arms, BodyModel, Slice};
 use super::lanes::larger;

@@ -1,4 +1,4 @@
-//! What the probability of a blockage is computed with where a mechanism may be left out or a fit turns it.
+//! Numbers of the blockage probability that a left-out mechanism or a fit may change.
 
 use super::body_model::BodyModel;
 use crate::config::{BlockageConfig, Mechanism};

@@ -1,4 +1,4 @@
-//! Which phases of a gait samples take.
+//! The gait phases of the samples.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,6 +1,6 @@
-//! The probability that a link is blocked, now and within each window: everybody's trajectory is sampled together
-//! from the forecast's joint distribution, with body sizes, headings and the phase of the gait, and rays are cast in
-//! every sample. Steps of a window, and links that share a blocker, hang together as they do in reality.
+//! The probability that a link is blocked, now and within each window: all trajectories are sampled together from the
+//! forecast's joint distribution, with body sizes, headings and the phase of the gait, and rays are cast in every
+//! sample. The steps of a window, and links with a common blocker, are therefore correlated as in reality.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

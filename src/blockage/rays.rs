@@ -1,5 +1,6 @@
-//! The rays of one link at one step, a sample each, and which samples of a body come near them: seen from above and with
-//! room to spare, so that only those are asked height by height ([`super::crossing`]) that may meet.
+//! The rays of one link at one step, one for each sample, and the samples of a body that come near them. The test is
+//! seen from above and has a margin. Only samples that may meet are then tested height by height
+//! ([`super::crossing`]).
 
 use std::ops::Range;
 

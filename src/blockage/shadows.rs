@@ -1,8 +1,8 @@
-//! Who can come between an access point and whom, before any sample is looked at.
+//! Finds which people can come between an access point and another person, before any sample is looked at.
 //!
-//! Seen from the access point everybody covers some sectors of a turn within the next second: as a body that hides, and
-//! as one whose link may be hidden. Only pairs that share a sector are compared, first over the whole second, then step
-//! by step. All of it errs on the side of asking the samples, so nothing is lost.
+//! Seen from the access point, each person covers some sectors of a turn within the next second: as a body that hides
+//! others, and as an owner whose link may be hidden. Only pairs that share a sector are compared, first over the
+//! whole second, then step by step. In doubt a pair is kept, so no blockage is lost.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,4 +1,4 @@
-//! Where a track is at each step of its forecast, and how it is turned.
+//! The position and heading of a track at each step of its forecast.
 
 use crate::STEP_S;
 use crate::forecast::Forecast;

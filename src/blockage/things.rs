@@ -1,5 +1,5 @@
-//! What of the hall itself stands between an access point and the samples of a UE: walls, pillars and furniture. That is
-//! plain geometry; what is not known is where the UE will be, which the samples say.
+//! Blockage by the hall itself: walls, pillars and furniture between an access point and the samples of a UE. This is
+//! plain geometry. Only the UE's position is uncertain, and the samples express it.
 
 use super::lanes::{WORD, larger, smaller, word_of};
 use super::rays::Rays;

@@ -1,8 +1,8 @@
-//! Samples of one person's next second: where each goes, and what stays through its steps.
+//! Samples of one person's next second: the path of each, and what stays constant through its steps.
 //!
-//! Everything lies in arrays by sample, in single precision and from the mean of its step, so that loops over samples run in
-//! vector registers. What only a body in somebody's way needs, its gait above all, is worked out when it is first asked for
-//! ([`Trajectories::walk`]).
+//! All data are arrays by sample, in single precision and relative to the mean of the step, so that loops over
+//! samples run in vector registers. Data that only a blocking body needs, above all its gait, are computed when they
+//! are first used ([`Trajectories::walk`]).
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Values of the right kind that cannot work.
+//! Refuses values of the right type that cannot work.
 
 use super::blockage::BlockageConfig;
 use super::detect::DetectConfig;

@@ -1,4 +1,4 @@
-//! Floor plans that cannot be.
+//! Refuses impossible floor plans.
 
 use crate::Error;
 use crate::geometry::DVec2;

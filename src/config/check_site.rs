@@ -1,4 +1,4 @@
-//! A site that cannot be: what stands outside the hall, angles and shares out of their range, unknown models.
+//! Refuses impossible sites: things outside the hall, angles and shares out of their range, unknown models.
 
 use super::check_hall::{HALL_MAX_M, above_0, check_hall, within};
 use crate::geometry::DVec2;

@@ -12,7 +12,7 @@ use super::mechanism::Mechanism;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ForecastConfig {
-    /// Who foresees.
+    /// The method of the forecast.
     pub method: ForecastMethod,
     /// How the LSTM goes on from one step to the next.
     pub rollout: Rollout,

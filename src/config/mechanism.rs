@@ -1,4 +1,4 @@
-//! What the default mode does beyond the plainest way, each to be left out alone: `umbracast ablate`.
+//! The mechanisms of the default mode. Each can be left out alone: `umbracast ablate`.
 
 use serde::{Deserialize, Serialize};
 

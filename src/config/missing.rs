@@ -1,4 +1,4 @@
-//! Where in a user's file a table lacks a field: serde names the field alone.
+//! Finds the place in a user's file where a table lacks a field. serde names the field only.
 
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};

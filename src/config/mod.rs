@@ -1,6 +1,6 @@
-//! Every setting of the runtime. The defaults live in `config/default.toml`, embedded here; `config/paper.toml` holds what
-//! the mode `paper` has otherwise, `config/hdl.toml` what `hdl` has other than that. A user's file is laid over the mode's
-//! values.
+//! Every setting of the runtime. The defaults are in `config/default.toml`, embedded here. `config/paper.toml` holds
+//! what differs in the mode `paper`, and `config/hdl.toml` what differs from that in `hdl`. A user's file replaces
+//! values of the mode.
 
 mod mechanism;
 mod detect;

@@ -1,4 +1,4 @@
-//! Lays TOML texts over each other, and says of a wrong key or value where it stands.
+//! Lays TOML texts over each other, and names the place of a wrong key or value.
 
 use serde::de::DeserializeOwned;
 use toml::Spanned;

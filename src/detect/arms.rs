@@ -1,4 +1,4 @@
-//! Arms that are stretched out are no people: nothing is below them, and between them is one head.
+//! Tells outstretched arms from people: nothing is below the arms, and one head is between them.
 
 use super::part::Part;
 use crate::geometry::{DVec2, DVec3};

@@ -1,8 +1,9 @@
-//! The model of the body axis: a small network from what was seen of a body to where its axis stands.
+//! The model of the body axis: a small network that computes the position of a body's axis from what the sensors saw
+//! of it.
 //!
-//! One hidden layer of `tanh`. It is asked twice, for the view and for its mirror image, so that mirrored people stand
-//! at mirrored places. It ships as `models/body_axis.toml`; data and scores are in the card beside it. It was
-//! fitted on simulated returns by `umbracast train axis`.
+//! One hidden layer of `tanh`. It runs twice, on the view and on its mirror image, so that mirrored people get
+//! mirrored positions. It ships as `models/body_axis.toml`; the card beside it has data and scores. It was fitted on
+//! simulated returns by `umbracast train axis`.
 
 use std::array::from_fn;
 

@@ -1,9 +1,10 @@
-//! Whether the sensors' clocks agree, by the people who walk before several of them; where not, times are put right.
+//! Checks whether the sensors' clocks agree, from people whom several sensors see, and corrects times if they do not.
 //!
-//! A sensor whose clock is ahead stamps everybody late: against what the others see he lies behind by the clock's error times
-//! his velocity. How far two sensors' views of one body lie apart has other causes too: each sees its own side, and poses err;
-//! but these do not turn with the way that somebody walks. Least squares tell the three apart once people have walked in
-//! different directions. Of the clocks' mean nothing can be told, so every sensor gives way by as much.
+//! A sensor whose clock is ahead gives people a late time stamp. Compared with the other sensors' view, a person then
+//! lies behind by the clock's error times the velocity. Two sensors' views of one body differ for other reasons too:
+//! each sees its own side, and poses have errors. But these do not turn with the walking direction. Least squares
+//! separate the three once people have walked in different directions. The mean of all clocks cannot be determined,
+//! so the correction leaves it unchanged.
 
 use super::{Cluster, Point, Prior};
 use crate::Site;

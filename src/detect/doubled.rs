@@ -1,4 +1,4 @@
-//! Do the sensors agree where people are?
+//! Checks whether the sensors agree on where people are.
 
 use super::{Cluster, Point};
 use crate::geometry::DVec2;

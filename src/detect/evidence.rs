@@ -1,5 +1,5 @@
 //! One person more, or one fewer? A cluster is split as long as its parts lie farther apart than the halves of one
-//! body, and parts nearer than two bodies can stand become one. Where people are expected moves both thresholds.
+//! body, and parts nearer than two bodies can stand become one. Both thresholds change where people are expected.
 
 use super::arms::{ALONE_M, ARM_M, have_one_head, is_arm};
 use super::means::{PASSES, means, one_more, people_if};

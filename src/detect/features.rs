@@ -1,8 +1,8 @@
-//! What was seen of one body, as numbers that tell where its axis stands.
+//! What the sensors saw of one body, as inputs of the model of the body axis.
 //!
-//! What is seen is the side toward the sensors, and legs and arms swing. So every point first moves away from its
-//! own sensor by a constant, and back along the person's way to the mean time of all points; the rest is left to
-//! [`super::axis`], which is told how the points lie, in a frame along the line of sight.
+//! Sensors see the near side of a body, and legs and arms swing. Every point therefore first moves away from its own
+//! sensor by a constant, and along the person's path to the mean time of all points. [`super::axis`] does the rest,
+//! from how the points lie in a frame along the line of sight.
 
 use super::Point;
 use crate::gait::WALKS_FROM_MPS;

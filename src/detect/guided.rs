@@ -1,7 +1,7 @@
-//! Which points belong to whom, where it is known who stands there.
+//! Assigns points to people whose expected positions are known.
 //!
-//! A body is wide in the trunk and long in the legs, so two people whose feet lie among each other come apart all
-//! the same. Without such knowledge nobody can tell four legs of two people from four people.
+//! A body is wide in the trunk and long in the legs, so two people come apart even if their feet are mixed. Without
+//! expected positions the four legs of two people look like four people.
 
 use super::Prior;
 use crate::gait::WALKS_FROM_MPS;

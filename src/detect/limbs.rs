@@ -1,9 +1,9 @@
-//! How arms and legs lie against each other, which tells where in the stride a walker is.
+//! How arms and legs lie relative to each other, which shows the phase of the stride.
 //!
 //! With the right foot ahead and the left one behind, legs lie along one diagonal seen from above; arms, which swing
-//! against them, along the other one. Half a stride later it is the other way round. So the product of how far a
-//! point lies ahead and how far to the left, mean of the arms less mean of the legs, goes with the cosine of the
-//! phase, once a stride, whichever side was seen.
+//! against them, along the other one. Half a stride later it is the other way round. The measurement is the product
+//! of a point's distance ahead and to the left, as the mean over the arms less the mean over the legs. It varies with
+//! the cosine of the phase, once in each stride, whichever side the sensors see.
 
 use super::{Point, Prior};
 use crate::gait::WALKS_FROM_MPS;

@@ -1,4 +1,4 @@
-//! k-means of a cluster in plan view: into how many parts, and what they are.
+//! k-means of a cluster in plan view, with its number of parts.
 
 use super::memory::{Memory, PEOPLE_OF_CLUSTER};
 use super::part::Part;

@@ -1,4 +1,4 @@
-//! Position and boxes of one person. All is measured from the floor that is stood on; only the boxes are told in the site
+//! Position and boxes of one person. Heights are above the floor below the person; only the boxes are in the site
 //! frame.
 
 use super::axis::{AxisModel, Network};

@@ -1,4 +1,4 @@
-//! What splitting and merging keep from frame to frame, so that a frame asks for no memory.
+//! Memory that splitting and merging keep from frame to frame, so that a frame allocates nothing.
 
 use super::guided::{self, find_owners};
 use super::part::Part;

@@ -1,5 +1,5 @@
-//! What the empty scene looks like to one sensor: for each pixel (a row of one beam, a bin of azimuth) the ranges
-//! that came back most often.
+//! The empty scene as one sensor sees it: the most frequent ranges of each pixel (a row of one beam, a bin of
+//! azimuth).
 
 /// A range is background when it came back in at least this share of the revolutions: leaves and edges come back at
 /// several ranges; a passer-by has a smaller share.

@@ -1,5 +1,5 @@
-//! Constant velocity on the filtered state: where a person would be who walks on as now, and how far off that
-//! may be.
+//! Constant velocity from the filtered state: where a person will be with unchanged velocity, and the spread of the
+//! error.
 
 use super::{Coupling, Forecast, Gaussian2};
 use crate::STEP_S;

@@ -1,4 +1,4 @@
-//! One forecast a track, by the method of the config.
+//! One forecast for each track, by the configured method.
 
 use std::collections::VecDeque;
 

@@ -1,5 +1,5 @@
-//! What the residual network reads: one track and the neighbours that it may have to avoid, in the track's own
-//! axes (along its heading, and across to the left). Everything is known at the frame; nothing comes later.
+//! The inputs of the residual network: one track and the neighbours that it may have to avoid, in the track's own
+//! axes (along its heading, and to the left). All inputs are known at the frame.
 
 use std::array::from_fn;
 

@@ -1,7 +1,7 @@
 //! The paper's LSTM: embedding 64, hidden 512, a bivariate Gaussian a step (Eq. (1) to (3)).
 //!
-//! One network, run for each person alone. It reads nine displacements of the observation window, in metres a
-//! frame, and then goes on for eight steps more, each fed with the displacement foreseen by the step before.
+//! One network, run for each person alone. It reads nine displacements of the observation window, in metres a frame,
+//! and then runs eight steps more, each with the displacement that the step before predicted.
 
 use std::fmt;
 use std::sync::Arc;

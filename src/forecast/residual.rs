@@ -1,10 +1,10 @@
-//! The filtered state carried on, and a small network that says how people depart from it: how they set off,
-//! slow down and make way, and how far they may yet be from where that leads.
+//! Constant velocity from the filtered state, and a small network for how people depart from it: how they set off,
+//! slow down and make way, and the spread that remains.
 //!
-//! Two hidden layers read a track and its most urgent neighbours ([`super::inputs`]). What they give is no
-//! position but three coefficients an axis for the way's departure from a constant velocity, t, t^2 and t^3, and
-//! four numbers an axis for the joint distribution of its errors ([`Coupling`]). So the means bend smoothly, and
-//! the spread of every step is the marginal of what stage 3 samples from.
+//! Two hidden layers read a track and its most urgent neighbours ([`super::inputs`]). Their output is not a position.
+//! Each axis has three coefficients for the departure from a constant velocity (t, t^2 and t^3) and four numbers for
+//! the joint distribution of the errors ([`Coupling`]). The means therefore bend smoothly, and the spread of each
+//! step is the marginal of the distribution that stage 3 samples from.
 
 use std::array::from_fn;
 use std::fmt;

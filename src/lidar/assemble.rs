@@ -1,4 +1,4 @@
-//! Packets of several sensors, cut into frames by time.
+//! Cuts the packets of several sensors into frames by time.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;

@@ -1,4 +1,4 @@
-//! One laser of a sensor: where it starts from and where it looks, seen from the turning head.
+//! One laser of a sensor: its start and direction in the frame of the turning head.
 
 use crate::geometry::DVec3;
 

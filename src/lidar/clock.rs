@@ -1,4 +1,4 @@
-//! From a sensor's own clock to the time of the frames.
+//! Converts a sensor's own clock to the time of the frames.
 
 use crate::STEP_NS;
 use crate::site::TimeSource;

@@ -9,12 +9,12 @@
 //! The packet's time is 5.632 us before the last firing. Firings follow each other after 50 us at any speed, lasers of a
 //! firing after 1.512 us, the first of them 0.368 us after the firing's begin.
 //!
-//! A beam's azimuth is its block's and its own offset from the angle file: so say the first manual of this model and the
-//! decoder that it is tested against. Later manuals add what the head turns while the lasers of a firing follow one
-//! another, 0.17 degrees to the last at 10 Hz: `turned_ns` would say so.
+//! A beam's azimuth is the sum of its block's azimuth and its own offset from the angle file. The first manual of
+//! this model says so, and so does the decoder that tests compare with. Later manuals add the turn of the head
+//! between the lasers of a firing, 0.17 degrees to the last one at 10 Hz; `turned_ns` would express it.
 //!
-//! Packets with two returns a firing hold each in a block of its own, one after the other, at the same azimuth. Of the
-//! two the more reflecting is given. Position packets (512 bytes) hold no ranges.
+//! Packets with two returns a firing hold each in a block of its own, one after the other, at the same azimuth. The
+//! decoder returns the one with the higher reflectivity. Position packets (512 bytes) hold no ranges.
 
 use std::sync::Arc;
 

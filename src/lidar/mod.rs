@@ -2,7 +2,7 @@
 //! all sensors together ([`Frame`]). Nothing after this module knows a sensor model.
 //!
 //! A family is one file (`velodyne`, `ouster`, `hesai`): bytes to columns and back. The table in `table` names the
-//! models; whoever adds a sensor writes a line there and, where its packets are new, a file.
+//! models. A new sensor takes a line there, and a file if its packets are new.
 
 mod beam;
 mod scan;

@@ -1,4 +1,4 @@
-//! What a sensor model is, and what a family of them has to give.
+//! What a sensor model is, and what each family of models must provide.
 
 use std::fmt::{self, Debug};
 use std::sync::Arc;

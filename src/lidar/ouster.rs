@@ -1,19 +1,20 @@
 //! Ouster OS0, OS1 and OS2. Layouts of packets and the way from a range to a point are those of the manufacturer's
 //! library (`ouster-sdk`, `parsing.cpp` and `xyzlut.cpp`) and firmware manual; all numbers little-endian.
 //!
-//! A payload is a header of 32 bytes, the columns, and a footer of 32 (profile LEGACY: the columns alone). A column is
-//! its time in nanoseconds (u64), its number in the revolution (u16), a status whose lowest bit says that it was
-//! measured, and one cell a beam from the highest down; a profile says what a cell holds ([`Profile`]). Legacy columns
-//! hold a frame number and an encoder count as well, and their status behind the cells. How long a packet is follows
-//! from the profile, the beams and the columns in a packet: all three stand in the sensor's own metadata.
+//! A payload is a header of 32 bytes, the columns, and a footer of 32 (profile LEGACY: the columns alone). A column
+//! is its time in nanoseconds (u64), its number in the revolution (u16), a status whose lowest bit says that it was
+//! measured, and one cell a beam from the highest down; a profile says what a cell holds ([`Profile`]). Legacy
+//! columns hold a frame number and an encoder count as well, and their status behind the cells. Profile, beams and
+//! columns determine the length of a packet; the sensor's own metadata has all three.
 //!
 //! All beams of a column fire at once. Column n of N looks along n / N of a turn, counted from behind the sensor; a
 //! beam looks to the right of it by its azimuth angle. The range is counted from the middle of the lidar through the
 //! beam's own origin, which the head carries around the middle (`lidar_origin_to_beam_origin_mm`), so that a point is
-//! not at the range along the beam but a little beside.
+//! not exactly at the range along the beam.
 //!
-//! Of the two returns of a dual profile the first is given, the strongest unless the sensor was told another order;
-//! the second where the first is none. What the sensor says of its motion (48 bytes) holds no ranges.
+//! Of the two returns of a dual profile the decoder returns the first, which is the strongest unless the sensor was
+//! told another order. If there is no first return, it returns the second. Packets about the sensor's motion (48
+//! bytes) hold no ranges.
 
 mod geometry;
 mod metadata;

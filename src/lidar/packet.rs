@@ -1,4 +1,4 @@
-//! A sensor's packet, and the codec: bytes to columns and back. The layouts stand in the families' files.
+//! A sensor's packet, and the codec: bytes to columns and back. The families' files have the layouts.
 
 use super::model::Refused;
 pub use super::velodyne::PAYLOAD_BYTES;

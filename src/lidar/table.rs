@@ -1,5 +1,5 @@
-//! The table of sensor models: their names, and what makes each of a site file's words. Angles and firing times stand in the
-//! family's file or in the sensor's own.
+//! The table of sensor models: their names, and the function that builds each from a site file. Angles and firing
+//! times are in the family's file or in the sensor's own.
 
 use super::model::{Setting, letters};
 use super::{Model, hesai, ouster, velodyne};

@@ -11,9 +11,9 @@
 //! A column's time is the packet's own, in the hour that brings it nearest to the time of reception. Between the
 //! azimuths that the packet gives the head turns at the packet's own rate.
 //!
-//! Packets with two returns a firing hold each column twice, the last return in the even block and the strongest,
-//! or the second strongest where the last one is the strongest, in the odd one. Of the two the more reflecting is
-//! given. Position packets (512 bytes, where a GPS receiver is plugged in) hold no ranges.
+//! Packets with two returns a firing hold each column twice, the last return in the even block and the strongest, or
+//! the second strongest where the last one is the strongest, in the odd one. The decoder returns the one with the
+//! higher reflectivity. Position packets (512 bytes, sent if a GPS receiver is connected) hold no ranges.
 
 use std::sync::Arc;
 

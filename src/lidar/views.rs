@@ -1,4 +1,4 @@
-//! Where the scans of a frame looked: all that is needed of them once their points are taken.
+//! Where the scans of a frame looked. Later stages need only this once they have the points.
 
 use std::f64::consts::TAU;
 

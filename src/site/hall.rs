@@ -1,5 +1,5 @@
-//! The floor plan of what is watched: a rectangle centred on the origin, or any simple polygon anywhere in the frame.
-//! Whoever asks where the floor ends, or how high it is, asks here.
+//! The floor plan of the hall: a rectangle centred on the origin, or any simple polygon anywhere in the frame. It
+//! answers where the floor ends and how high it is.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! What simulated light does on its way that a range along a line does not tell: panes, edges, dark cloth.
+//! Surfaces that disturb simulated light: panes, edges, dark cloth.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
-//! Which detection belongs to which track.
+//! Assigns detections to tracks.
 //!
-//! The assignment stays by hand: rows that may stay alone and pairs that are forbidden are part of the algorithm here,
-//! and the crates that assign square matrices of integers know neither.
+//! The assignment is written by hand. Its algorithm allows rows without a partner and forbidden pairs; crates for
+//! square matrices of integers have neither.
 
 use crate::detect::Detection;
 

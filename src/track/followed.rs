@@ -1,4 +1,4 @@
-//! What a tracker says of one person.
+//! What the tracker reports of one person.
 
 use std::collections::VecDeque;
 

@@ -1,9 +1,9 @@
-//! Constant-velocity Kalman filters over the floor, with the sway of a walking body beside.
+//! Constant-velocity Kalman filters over the floor, with the sway of a walking body.
 //!
 //! x: state (x, y, vx, vy, then how far the body sways to the left and ahead: see [`super::sway`]); P: its
 //! covariance; F: motion; Q: process noise; H: picks what is measured, the position with the sway; R: measurement
-//! noise; S: covariance of the innovation; K: gain. By hand: F and H are mostly zeros, which a matrix library would
-//! multiply by, and the paper's letters stay at their lines.
+//! noise; S: covariance of the innovation; K: gain. Written by hand: F and H are mostly zeros, which a matrix library
+//! would multiply, and the code keeps the paper's letters.
 #![allow(non_snake_case)]
 
 use super::gaussian::{Mat2, State, inverted, plus, quadratic};

@@ -1,8 +1,8 @@
-//! Where in the stride a walker is, from how arms and legs lie frame by frame.
+//! A walker's phase in the stride, from how arms and legs lie in each frame.
 //!
-//! [`LimbCovariance`] goes with the cosine of the phase, whose pace is known. So the phase is followed as an oscillation
-//! of size 1, cosine and quadrature. It is kept apart from the sway ([`super::sway`]): how a body sways at a phase
-//! differs from person to person, and the sway of another than its owner's shifts positions and bends velocities.
+//! [`LimbCovariance`] varies with the cosine of the phase, whose pace is known. The phase is therefore followed as an
+//! oscillation of size 1, with cosine and quadrature. It is kept apart from the sway ([`super::sway`]), because
+//! people sway differently at the same phase. A wrong sway would shift positions and bend velocities.
 
 use super::gaussian::Mat2;
 use super::remembered::{Remembered, Words};

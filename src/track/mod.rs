@@ -1,6 +1,6 @@
-//! Stage 1, second half: detections of frame after frame joined to tracks (paper, section IV-A).
+//! Stage 1, second half: joins the detections of successive frames to tracks (paper, section IV-A).
 //!
-//! `mixture` is our tracker, `paper` that of the paper's authors; the method chooses.
+//! `mixture` is our tracker and `paper` that of the paper's authors; the setting `method` chooses.
 
 mod remembered;
 mod gaussian;

@@ -1,5 +1,5 @@
-//! What the mixture tracker computes with where a mechanism may be left out or a test turns it; all else is a constant
-//! beside the code that uses it.
+//! Numbers of the mixture tracker that a left-out mechanism or a test may change. All others are constants beside the
+//! code that uses them.
 
 use crate::config::{Mechanism, TrackConfig};
 

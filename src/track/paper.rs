@@ -1,8 +1,8 @@
 //! The tracker of the paper's authors: a constant-velocity Kalman filter and the nearest neighbour, as
 //! hdl_people_tracking ships it (facts and values: koide3/hdl_people_tracking at 2d12516) or as the paper says.
 //!
-//! x and v: position and velocity of an axis; P: their covariance, the same for every axis, for noise is; Q: process
-//! noise (the base calls it R); R: measurement noise; S: variance of the innovation; K: gain.
+//! x and v: position and velocity of an axis; P: their covariance, the same for every axis because the noise is; Q:
+//! process noise (the base calls it R); R: measurement noise; S: variance of the innovation; K: gain.
 #![allow(non_snake_case)]
 
 use super::association::{FORBIDDEN, greedy, in_order, optimal};

@@ -1,4 +1,4 @@
-//! One person followed: filter, height, heading, boxes, and how sure it is that somebody is there.
+//! One tracked person: filter, height, heading, boxes, and the probability that somebody is there.
 
 use std::collections::VecDeque;
 

@@ -1,5 +1,5 @@
-//! What a tracker remembers, as words of 64 bits, so that another one goes on where it stood: one visit of what is
-//! remembered serves writing and reading.
+//! The state of a tracker as words of 64 bits, from which another tracker continues. One visitor serves both writing
+//! and reading.
 
 use crate::geometry::{DVec2, DVec3};
 

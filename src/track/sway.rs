@@ -1,10 +1,10 @@
-//! How the body sways while its owner walks straight on.
+//! The sway of a body whose owner walks straight on.
 //!
 //! Pelvis and trunk go from side to side once a stride (mediolaterally), and ahead and back once a step
-//! (anteroposteriorly), by a few centimetres. A detection is of the swaying body, the person's way is what it sways
-//! about: left out, the sway is an error that lasts over frames, and half a stride of it looks like a turn. It is
-//! followed as two oscillations whose size and phase are not known beforehand but whose pace is: people of a height at
-//! a speed all walk about alike.
+//! (anteroposteriorly), by a few centimetres. A detection is of the swaying body, but the person's path is the line
+//! about which it sways. Without a model of it, sway is an error that lasts over frames, and half a stride of it
+//! looks like a turn. Two oscillations follow it. Their size and phase are unknown at first, but their pace is known:
+//! people of one height and speed walk alike.
 
 use std::f64::consts::TAU;
 

@@ -1,5 +1,5 @@
-//! Can a person at a place be seen? From where the sensors hang, which beams a frame holds, and what stands
-//! between: pillars, furniture and other people.
+//! The probability that a person at a place can be seen. It follows from the sensors' poses, the beams in a frame,
+//! and what stands between: pillars, furniture and other people.
 
 use std::f64::consts::TAU;
 

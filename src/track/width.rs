@@ -1,7 +1,7 @@
-//! How wide and deep a body is beside a usual one of its height, from the extents of detections in free sight. What it
-//! gains is told by the ablation: wheelchairs, above all.
+//! The width and depth of a body relative to a usual one of its height, from the extents of detections in free sight.
+//! The ablation shows its gain, above all for wheelchairs.
 //!
-//! Beams and columns lie far apart on a body, so the extent of one frame tells next to nothing. The mean over some ten
+//! Beams and columns lie far apart on a body, so the extent of one frame says almost nothing. The mean over some ten
 //! seconds explains a sixth of the variance between people.
 //!
 //! Numbers: `umbracast train width`, simulated returns of 115 adults on tuning scenes.

@@ -1,4 +1,4 @@
-//! What differs between two Ousters: the profile of their packets, and where beams look.
+//! What differs between two Ousters: the profile of their packets and the directions of their beams.
 
 /// Beams of the largest sensor there is, twice.
 pub(super) const BEAMS_MAX: usize = 256;

@@ -1,6 +1,6 @@
-//! A sensor's metadata, as the sensor gives them: one JSON object. Firmware before 3.0 spells them at the top
+//! A sensor's metadata as the sensor writes them: one JSON object. Firmware before 3.0 has them at the top level
 //! (`beam_altitude_angles`, `data_format`, `lidar_mode`), later firmware in objects (`beam_intrinsics`,
-//! `lidar_data_format`, `config_params`); what both hold is read from either.
+//! `lidar_data_format`, `config_params`). This module reads either form.
 
 use serde_json::Value;
 
