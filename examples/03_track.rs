@@ -3,7 +3,7 @@
 //! `cargo run --release --example 03_track`
 //!
 //! Stage 1, second half. A track is one person with a number that stays, position and velocity with their covariance,
-//! heading and height. It is confirmed once it has been seen often enough to be believed.
+//! heading and height. It is confirmed after enough detections.
 
 mod simulated;
 

@@ -2,8 +2,9 @@
 //!
 //! `cargo run --release --example 05_own_hall`
 //!
-//! A file holds what differs from `config/default.toml`; lists such as the sensors are replaced as a whole. The command
-//! takes the same file: `umbracast coverage --site hall.toml` shows what such a sensor sees, before one is hung up.
+//! A file holds what differs from `config/default.toml`. It replaces lists such as the sensors as a whole. The
+//! command reads the same file: `umbracast coverage --site hall.toml` shows what such a sensor sees before you mount
+//! one.
 
 mod simulated;
 

@@ -1,4 +1,5 @@
-//! Once everybody is known, a step of the default mode asks for no memory: a frame's time does not hang on an allocator.
+//! Once everybody is known, a step of the default mode allocates no memory, so a frame's time does not depend on an
+//! allocator.
 
 use umbracast::geometry::DVec2;
 use umbracast::{Config, Pipeline};

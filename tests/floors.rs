@@ -1,4 +1,5 @@
-//! Floors that slope or have a step: people on them are seen, measured and warned of as on a level one.
+//! Floors that slope or have a step: people on them are detected and measured, and links predicted, as on a level
+//! floor.
 
 use umbracast::blockage::Blockage;
 use umbracast::config::{BlockageMethod, Config, Mode};

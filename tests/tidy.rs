@@ -1,5 +1,5 @@
-//! What the house promises about its own text: the order of the runtime's modules, what they may not use, and
-//! the size of files.
+//! Rules for the repository's own text: the order of the runtime's modules, what they may not use, and the size of
+//! files.
 
 use std::fs;
 use std::path::{Path, PathBuf};

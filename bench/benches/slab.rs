@@ -1,4 +1,5 @@
-//! The slab test beside parry's, on the same thousand segments from an access point to people and the boxes of others.
+//! The slab test compared with parry's, on the same thousand segments from an access point to people and the boxes of
+//! others.
 
 use std::hint::black_box;
 

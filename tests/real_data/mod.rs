@@ -1,5 +1,5 @@
-//! Real recordings lie outside the repository, where `UMBRACAST_DATA` points. A test that lacks them passes, and says so
-//! where one sees it.
+//! Real recordings are outside the repository, where `UMBRACAST_DATA` points. A test without them passes and says so
+//! on the terminal.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

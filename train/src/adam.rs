@@ -1,5 +1,5 @@
-//! The framework's Adam, of gradients clipped by their common length as PyTorch's `clip_grad_norm_` does; the
-//! framework's own clipping looks at each tensor alone.
+//! The framework's Adam, with gradients clipped by their common norm as PyTorch's `clip_grad_norm_` does. The
+//! framework's own clipping treats each tensor alone.
 
 use burn::optim::{AdamConfig, AdamState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::{Gradients, Tensor};

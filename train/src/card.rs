@@ -1,4 +1,4 @@
-//! What stands beside a weights file.
+//! The card beside a weights file.
 
 use umbracast::STEPS;
 use umbracast::forecast::lstm::{RHO_LIMIT, SIGMA_FLOOR_M, SIGMA_SCALE_M};

@@ -1,5 +1,5 @@
-//! The loss of a batch and its gradient: recorded by burn on any processor, or written out for the plain one, where
-//! that takes less work and every thread.
+//! The loss of a batch and its gradient: recorded by burn on any processor, or written out for the CPU, where that
+//! takes less work and uses all threads.
 //!
 //! Written out, the cell's input and hidden state stand side by side, so that a step is one product of matrices
 //! forwards and one backwards, and the cell's weights get their gradient from one product over all steps. The products

@@ -1,6 +1,5 @@
 //! Fits the paper's LSTM: windows are cut from ORCA ways, the network is rolled out on them, and Adam follows the
-//! gradient of the paper's loss. What comes out is a weights file that the runtime reads, and a card that says where
-//! it comes from.
+//! gradient of the paper's loss. The result is a weights file that the runtime reads, and a card with its origin.
 
 pub mod network;
 pub mod adam;

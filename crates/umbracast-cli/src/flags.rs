@@ -1,4 +1,4 @@
-//! Flags that change nothing beside the others given: told, not refused.
+//! Flags without effect beside the other flags. The command notes them and goes on.
 
 use std::path::PathBuf;
 

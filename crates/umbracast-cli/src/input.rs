@@ -1,4 +1,4 @@
-//! What `run` reads: recordings, PCD clouds, captures. Each gives frames, one after the other.
+//! The inputs of `run`: recordings, PCD clouds, captures. Each gives frames in order.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! Whose track is whose, as a table: the join of truth and tracks that every score is made with.
+//! The matches of people and tracks as a table; every score uses this join of truth and tracks.
 
 use std::collections::BTreeMap;
 

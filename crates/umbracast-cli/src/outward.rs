@@ -1,4 +1,5 @@
-//! Who is told beside the page: ROS 2 and MQTT, where `[network]` of the site file says so. A build without nodes has neither.
+//! Outputs besides the page: ROS 2 and MQTT, if `[network]` of the site file has them. A build without nodes has
+//! neither.
 
 use std::path::Path;
 

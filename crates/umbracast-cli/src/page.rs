@@ -1,4 +1,4 @@
-//! The page of `live` and `view`, where this program was built with it.
+//! The page of `live` and `view`, if the build has it.
 
 use std::sync::Arc;
 

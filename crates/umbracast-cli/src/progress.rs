@@ -1,4 +1,4 @@
-//! Progress on stderr: bars where somebody looks, lines for the log of a long run.
+//! Progress on stderr: bars on a terminal, lines in a log.
 
 use std::sync::Mutex;
 

@@ -1,4 +1,4 @@
-//! `run.json`: times and machine, which are not part of what equal runs have equal. The one place with a clock.
+//! `run.json`: times and machine, which differ between equal runs. Only this file of the command has a clock.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! From arguments to what the crates take: configuration, weights, threads, files.
+//! Turns arguments into what the crates need: configuration, weights, threads, files.
 
 use std::borrow::Cow;
 use std::fs;

@@ -1,5 +1,5 @@
-//! Signals: Ctrl-C and SIGTERM ask for a clean end, the second one ends at once; SIGHUP asks for the site file to be read
-//! again, where there is one.
+//! Signals: Ctrl-C and SIGTERM ask for a clean end, the second one ends at once; SIGHUP asks to read the site file
+//! again, if there is one.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

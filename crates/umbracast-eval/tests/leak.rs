@@ -1,4 +1,4 @@
-//! No future leaks into any answer.
+//! Tests that no answer uses the future.
 
 use umbracast::config::ForecastMethod;
 use umbracast::lidar::{Assembler, Frame};

@@ -1,9 +1,9 @@
-//! Motion capture in BVH text: where every joint is, frame by frame.
+//! Motion capture in BVH text: the position of every joint in each frame.
 //!
 //! Format: a tree of joints with offsets and channels, then one line of channel values a frame. Rotations apply in
 //! the order of their channels. Lengths are in the file's unit, y is up.
 //!
-//! By hand: where each joint is, which no parser of the format gives, is most of the work.
+//! Written by hand: the joints' positions are most of the work, and no parser of the format gives them.
 
 use std::path::Path;
 

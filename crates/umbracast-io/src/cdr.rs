@@ -1,7 +1,7 @@
 //! CDR as ROS 2 writes it (XCDR1, little-endian): values aligned to their size, counted from behind the four
 //! bytes of the encapsulation header.
 //!
-//! By hand: through serde (`cdr-encoding` 0.11) the packets' `uint8[1206]` goes byte by byte, 30 times slower to write.
+//! Written by hand: serde (`cdr-encoding` 0.11) writes the packets' `uint8[1206]` byte by byte, 30 times slower.
 
 /// Builds one message.
 #[derive(Debug)]

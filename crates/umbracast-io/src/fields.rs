@@ -1,5 +1,4 @@
-//! A message described once: its definition in the words of ROS 2, its CDR and the way back are made from the same
-//! visit of its fields.
+//! A message described once: one visit of its fields gives its ROS 2 definition, its CDR, and the reader.
 
 use crate::cdr::{Decoder, Encoder};
 use crate::messages::{HEADER_DEFINITIONS, Schema};

@@ -1,4 +1,4 @@
-//! What was met that could not be used, as a message.
+//! The counters of `Health` as a message.
 
 use umbracast::Health;
 

@@ -2,7 +2,7 @@
 //! plus one literal bytes; any other holds the length of a copy (3 bits, 7: one more byte follows) and the
 //! upper 5 bits of its distance, the lower 8 follow.
 //!
-//! By hand: a page of code that PCD alone needs, and a false length must not claim all memory.
+//! Written by hand: only PCD needs this page of code, and a false length must not claim all memory.
 
 const LITERALS_MAX: usize = 32;
 const COPY_MIN: usize = 3;

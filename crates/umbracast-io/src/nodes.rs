@@ -1,4 +1,4 @@
-//! What nodes say to each other, in full precision: a frame that goes over the wire gives the same results, to the byte.
+//! The messages between nodes, in full precision: a frame sent over the network gives the same results, to the byte.
 //! Rows of links and detections are those of [`crate::wire`].
 
 use std::collections::VecDeque;

@@ -1,4 +1,4 @@
-//! Lists of objects from others' perception, in place of stage 1 up to the detections.
+//! Lists of objects from another perception system, which replace stage 1 up to the detections.
 //!
 //! A list is JSON, in the frame of the site:
 //!
@@ -8,9 +8,9 @@
 //!                  "velocity_mps": [1.2, 0.1, 0.0], "heading_rad": 0.1, "sigma_m": 0.08 } ] }
 //! ```
 //!
-//! `position_m` is the point on the floor below the middle, `size_m` length, width and height. Velocity, heading and sigma (of
-//! x and of y) may be missing, and so may the third number of position and velocity. `id` and what else stands there is not
-//! read: who is who is decided by our tracker, which knows better how people walk and says how sure it is.
+//! `position_m` is the point on the floor below the middle, `size_m` length, width and height. Velocity, heading and
+//! sigma (of x and of y) may be missing, and so may the third number of position and velocity. `id` and other fields
+//! are not read: our tracker decides who is who.
 
 use serde::Deserialize;
 use umbracast::detect::Detection;

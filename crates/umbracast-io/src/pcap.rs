@@ -1,7 +1,8 @@
 //! UDP payloads from and to captures: classic pcap, either byte order, micro- or nanoseconds, Ethernet with or
 //! without VLAN tags, IPv4, whole or in fragments. Format: draft-ietf-opsawg-pcap, RFC 791.
 //!
-//! By hand: UDP over IPv4 alone is read, and a capture cut off or broken anywhere gives what is whole before it.
+//! Written by hand: it reads UDP over IPv4 only, and of a capture that is cut off or broken it returns everything
+//! before the fault.
 
 mod ip;
 mod fragments;

@@ -1,7 +1,7 @@
 //! Point clouds from and to PCD files: every version up to 0.7, every encoding, every field type, fields in any
 //! order. Format: pointclouds.org, "The PCD file format".
 //!
-//! By hand: any field of any type is read by its name, and errors say line, expected and found.
+//! Written by hand: it reads any field of any type by its name, and errors name line, expected and found.
 
 mod cloud;
 mod header;

@@ -1,6 +1,7 @@
 //! `sensor_msgs/PointCloud2`, of any layout: fields of any type in any order, either byte order, rows with or without
-//! a gap. Where points carry a time it is read: `t` (whole nanoseconds after the stamp, Ouster), `time` (seconds after the
-//! stamp, Velodyne), `timestamp` (seconds since 1970, Hesai and RoboSense), `offset_time` (nanoseconds, Livox).
+//! a gap. The reader uses the points' times if there are any: `t` (whole nanoseconds after the stamp, Ouster), `time`
+//! (seconds after the stamp, Velodyne), `timestamp` (seconds since 1970, Hesai and RoboSense), `offset_time`
+//! (nanoseconds, Livox).
 
 use umbracast::lidar::SensorPoint;
 

@@ -1,4 +1,4 @@
-//! What a run made of one frame, and the messages that say it: recorded and published alike.
+//! The results of one frame, and their messages for recordings and for the network.
 
 use umbracast::Site;
 use umbracast::detect::Point;

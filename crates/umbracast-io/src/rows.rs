@@ -1,4 +1,4 @@
-//! The rows of every table, once. A field is a column of the same name; name and unit say what it holds.
+//! The rows of all tables. A field is a column of the same name.
 #![allow(missing_docs, reason = "names carry the unit; what needs a word has one")]
 
 use std::f64::consts::PI;

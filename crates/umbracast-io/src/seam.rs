@@ -1,4 +1,4 @@
-//! The seam between a reader of another crate and damaged bytes: what panics behind it is an error before it.
+//! Calls the reader of another crate on bytes that may be damaged. If that reader panics, the caller gets an error.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};

@@ -1,6 +1,6 @@
 //! Files of recorded people: TrajNet++ ndjson, CSV, PeTrack text.
 //!
-//! The format is told by the content: lines that begin with `{`, a header with commas, or else numbers.
+//! The content determines the format: lines that begin with `{`, a header with commas, or else numbers.
 //!
 //! | format | rows | time |
 //! |---|---|---|

@@ -1,5 +1,5 @@
-//! What viewers draw: a frame's results as the messages that Foxglove, RViz and Rerun know. Everything is in the frame
-//! `site` and stamped with the frame's time.
+//! Messages for viewers: a frame's results as standard messages for Foxglove, RViz and Rerun. They are in the frame
+//! `site` and have the frame's time.
 //!
 //! | topic | type | holds |
 //! |---|---|---|

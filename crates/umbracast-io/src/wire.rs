@@ -1,5 +1,5 @@
-//! Rows on the wire: each row type as a ROS 2 message and as JSON, from the columns that its table has. What a table,
-//! a recording, a message and the page say of a track is written down once, in [`Row::visit`].
+//! Rows on the wire: each row type as a ROS 2 message and as JSON, from the columns that its table has.
+//! [`Row::visit`] alone describes what tables, recordings, messages and the page say of a track.
 //!
 //! A frame's rows are one message: `std_msgs/Header header`, `uint64 frame`, and the rows without their keys. A value
 //! that a table leaves empty is NaN, or 2 where it is yes or no; an access point goes by its name.

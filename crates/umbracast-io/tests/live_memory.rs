@@ -1,5 +1,5 @@
-//! What records for hours must not grow: an hour of a live recording, as fast as it can be written, with the memory of
-//! this program counted. Alone in its file, because the count is of everything.
+//! A recorder's memory must not grow over hours. The test writes an hour of a live recording as fast as it can and
+//! counts this program's memory. It is alone in its file, because the count includes everything.
 
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 use std::alloc::System;

@@ -1,4 +1,4 @@
-//! What nodes say to each other survives the wire to the last bit, and nothing else is taken for it.
+//! Messages between nodes survive the network to the last bit, and no other bytes are accepted.
 
 use umbracast::detect::{Point, Prior};
 use umbracast::forecast::Forecast;

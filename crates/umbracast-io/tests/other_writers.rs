@@ -1,5 +1,4 @@
-//! Files that other programs wrote (`testdata/recordings/make.py`), and what is said of them by a build that cannot read
-//! them.
+//! Files that other programs wrote (`testdata/recordings/make.py`), and the errors of a build that cannot read them.
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,5 @@
-//! What happens when something fails: simulated sensors send true packets over loopback to a live run, one thing goes
-//! wrong for some seconds, and a row of a table says what must happen, what did, and how long until all was well again.
+//! Tests faults: simulated sensors send packets over loopback to a live run, and one thing fails for some seconds. A
+//! row of a table says what must happen, what happened, and how long it took until all was well again.
 //!
 //! ```sh
 //! cargo run --release -p umbracast-live --example faults

@@ -1,4 +1,4 @@
-//! How long things take, as quantiles, in memory that does not grow.
+//! Quantiles of durations, in memory that does not grow.
 
 use std::time::Duration;
 

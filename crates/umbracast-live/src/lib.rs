@@ -6,9 +6,9 @@
 //!                            \-> recorder (raw packets)
 //! ```
 //!
-//! Every arrow is a [`queue::Queue`] of bounded length with a rule for when it is full: in front of the pipeline the
-//! newest frame wins, the recorder never delays anybody, and what is lost is counted. The stages are those of the
-//! runtime, called with the same frames as from a file: a recording gives the same results again, to the byte.
+//! Every arrow is a [`queue::Queue`] of bounded length with a rule for when it is full. Before the pipeline the
+//! newest frame replaces the oldest. The recorder delays no other thread. Losses are counted. The stages are those of
+//! the runtime, called with the same frames as from a file, so a recording gives the same results again, to the byte.
 
 pub mod clock;
 pub mod queue;

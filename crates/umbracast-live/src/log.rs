@@ -1,4 +1,4 @@
-//! What happens to a live run that whoever runs it should know: a line each, for people or one JSON object.
+//! The log of a live run: a line for each event, as text for people or as a JSON object.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, SystemTime};

@@ -1,4 +1,4 @@
-//! What leaves the pipeline of one frame: the rows that tables have, the points that are drawn, and how old it is.
+//! The published results of one frame: the rows of the tables, the points to draw, and the latency.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,4 +1,5 @@
-//! Sensors over UDP: a socket and a thread for each port, packets told apart by the address they come from.
+//! Receives sensors over UDP: a socket and a thread for each port. The sender's address tells sensors on one port
+//! apart.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;

@@ -1,4 +1,5 @@
-//! Packets out, at the times they carry: simulated sensors and recordings that look like real ones to whoever listens.
+//! Sends packets at the times they carry, for simulated sensors and recordings. The receiver sees them as real
+//! sensors.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};

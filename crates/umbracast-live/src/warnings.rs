@@ -1,5 +1,5 @@
-//! What changes of a link from frame to frame, for those who act on it: a warning begins, the link is blocked, it is
-//! clear again.
+//! The events of a link, for programs that act on them: a warning begins, the link is blocked, the link is clear
+//! again.
 
 use std::collections::BTreeMap;
 

@@ -4,10 +4,10 @@
 //! cargo run --release -p umbracast-node --example halls -- target/release/umbracast 30 halls.svg 1 2 4 8 16 32 64 96
 //! ```
 //!
-//! A minute of ten people before two HDL-32E is turned into what both front ends publish, once. Then it is replayed for so
-//! many halls at once, each shifted in time against the others, and for each hall a process of the command runs all stages
-//! behind the foreground. What they use is what they say of themselves (`umbracast fleet`); what the replay uses is not theirs
-//! and stands in a column of its own.
+//! A minute of ten people before two HDL-32E is turned into what both front ends publish, once. Then it is replayed
+//! for so many halls at once, each shifted in time against the others, and for each hall a process of the command
+//! runs all stages after the foreground. Its use of the host is what it reports (`umbracast fleet`). A column of its
+//! own shows what the replay uses.
 
 use std::collections::BTreeMap;
 use std::fs;

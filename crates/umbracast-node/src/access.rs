@@ -1,8 +1,8 @@
-//! Who may: what a user's work lets them read and write, as the rules that Zenoh enforces at a node's door.
+//! Rights: what a user's role may read and write, as rules that Zenoh enforces where other nodes connect.
 //!
-//! Rules hold where others come in: a node with `roles` in its `[network]` takes from every connection only what the work of
-//! its user, or of its certificate's name, allows, and gives it nothing else. Whoever has no work there gets nothing. Nodes
-//! that only call (`connect`) need none: they trust whom they call, by its certificate.
+//! A node with `roles` in its `[network]` enforces the rules on its connections: it accepts and sends only what the
+//! role of the user, or of the certificate's name, allows. A user without a role gets nothing. Nodes that only
+//! connect to others need no roles: they trust the other end by its certificate.
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};

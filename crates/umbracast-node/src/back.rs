@@ -1,4 +1,4 @@
-//! The thread of a [`Chain`]: hears what the row begins with, publishes what its stages make.
+//! The thread of a [`Chain`]: it receives the input of the first stage and publishes the results of all its stages.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

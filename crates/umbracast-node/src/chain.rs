@@ -1,5 +1,5 @@
-//! The stages behind the foreground, as many of them in a row as a process runs: the calls of
-//! [`umbracast::Pipeline::step`], with a wire where the row ends.
+//! The stages after the foreground, as many consecutive ones as a process runs: the calls of
+//! [`umbracast::Pipeline::step`], with network messages at the ends.
 
 use umbracast::blockage::Caster;
 use umbracast::detect::{self, Clocks, Clusterer, Measurer, Prior};

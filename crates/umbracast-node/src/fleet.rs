@@ -1,4 +1,4 @@
-//! What runs where: every hall on a network with its nodes, as they say of themselves.
+//! What runs where: every hall on a network with its nodes, as they report themselves.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

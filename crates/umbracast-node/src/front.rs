@@ -1,4 +1,4 @@
-//! The front end, beside the sensors: packets, or the clouds of a driver, to foreground, which is what leaves the host.
+//! The front end beside the sensors: it turns packets, or a driver's clouds, into foreground, and sends only that.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;

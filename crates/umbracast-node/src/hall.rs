@@ -1,4 +1,5 @@
-//! A node's door to its hall: what it publishes with which urgency, what it hears, who is there.
+//! A node's connection to its hall: what it publishes with which priority, what it receives, and which nodes are
+//! there.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,7 +1,7 @@
-//! Frames of several front ends meet by their time. Pure: who calls says what time it is.
+//! Joins the frames of several front ends by their time. Pure: the caller gives the time of day.
 //!
-//! A frame goes on when every sensor that is awaited has answered, or when it has waited long enough. A sensor that did
-//! not answer for a frame is not waited for, until something of it comes in time, or would have with waiting: as
+//! A frame goes on when all awaited sensors have answered, or when it has waited long enough. A sensor that missed a
+//! frame is no longer awaited. It is awaited again once it answers within the waiting time, as
 //! [`umbracast::lidar::Assembler`] does with packets.
 
 use std::collections::{BTreeMap, VecDeque};

@@ -1,4 +1,4 @@
-//! The keys of a hall: what is where on the network.
+//! The network keys of a hall.
 
 use umbracast::Error;
 

@@ -1,8 +1,8 @@
-//! Two trackers of one hall: one leads, the other stands by. Pure: who calls says what time it is.
+//! Two trackers of one hall: one leads, the other stands by. Pure: the caller gives the time of day.
 //!
-//! Both compute every frame. What leads publishes; what stands by keeps its results until it hears that the leader has
-//! done the frame, and publishes them itself when that takes too long: nothing is lost. Whoever has led for longer stays
-//! leader where two find that they both are.
+//! Both compute every frame. The leader publishes. The other one keeps its results until it hears that the leader has
+//! finished the frame. If that takes too long it publishes them itself, so nothing is lost. If both lead, the one
+//! that has led for longer stays leader.
 
 use std::collections::VecDeque;
 

@@ -1,7 +1,7 @@
-//! Warnings as JSON over MQTT, for those who have no Zenoh: sent to a broker that is there already.
+//! Warnings as JSON over MQTT for clients without Zenoh, sent to an existing broker.
 //!
-//! A client of our own and not Zenoh's bridge, as the bridge passes on bytes: warnings on Zenoh are CDR, and who listens
-//! to MQTT expects JSON. `rumqttc` is kept, small, and brings no runtime that Zenoh has not brought.
+//! It does not use Zenoh's bridge, because the bridge passes on bytes. Warnings on Zenoh are CDR, and MQTT listeners
+//! expect JSON. `rumqttc` is maintained and small, and needs no runtime that Zenoh does not need already.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

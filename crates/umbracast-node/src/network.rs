@@ -1,7 +1,7 @@
 //! Where nodes meet: the `[network]` table of the site file, and the Zenoh session that it opens.
 //!
 //! Without the table a node listens on loopback alone and looks for the others there. The table is no part of
-//! [`umbracast::Config`]: it stands in no recording and no output.
+//! [`umbracast::Config`], so no recording and no output contains it.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,4 @@
-//! One process of a hall: whichever stages it runs, from its start to its end.
+//! One process of a hall with its stages, from start to end.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,4 +1,4 @@
-//! Lists of another perception as frames, in place of front ends. Pure: who calls says what time it is.
+//! Lists of another perception system as frames, in place of front ends. Pure: the caller gives the time of day.
 
 use umbracast::lidar::{View, Views};
 use umbracast::{Health, STEP_NS, Site};

@@ -1,4 +1,4 @@
-//! What a hall tells those who speak other languages: topics of ROS 2, warnings over MQTT.
+//! What a hall sends to other systems: topics of ROS 2, warnings over MQTT.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

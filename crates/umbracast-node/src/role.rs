@@ -1,4 +1,4 @@
-//! What a node does, by name.
+//! The roles of nodes, by name.
 
 use serde::{Deserialize, Serialize};
 use umbracast::Error;

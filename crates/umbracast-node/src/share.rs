@@ -1,4 +1,4 @@
-//! What a node that comes asks for, and whoever has it answers: the site, the empty hall, the network's weights.
+//! What a new node asks for and other nodes answer: the site, the empty hall, the weights of the LSTM.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};

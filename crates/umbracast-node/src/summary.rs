@@ -1,4 +1,4 @@
-//! What a node counts, and what it takes of its host.
+//! What a node counts, and what it uses of its host.
 
 use umbracast::Health;
 use umbracast_live::latency::Latencies;

@@ -1,4 +1,4 @@
-//! Those who look on: frames put together again from what the stages publish, for the page and the recorder.
+//! Puts frames together again from what the stages publish, for the page and the recorder.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

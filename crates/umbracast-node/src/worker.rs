@@ -1,4 +1,4 @@
-//! A thread that takes what comes from a queue.
+//! A thread that processes a queue.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;

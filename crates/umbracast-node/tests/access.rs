@@ -1,4 +1,4 @@
-//! Who may: sessions of real users at a real door, over loopback.
+//! Rights: sessions of real users at a real router, over loopback.
 
 use std::fs;
 use std::net::TcpListener;

@@ -1,4 +1,4 @@
-//! What comes in place of sensors' packets: lists of another perception, and topics of ROS 2.
+//! Inputs in place of sensors' packets: lists of another perception system, and topics of ROS 2.
 
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;

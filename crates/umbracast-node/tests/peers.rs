@@ -1,5 +1,5 @@
-//! Clients that know nothing of this project, from PyPI, list our topics of ROS 2, read and decode them, and are read as a
-//! driver is (`peers.py`). Where they are not installed the test says that it skipped.
+//! Python clients that know nothing of this project list our ROS 2 topics, read and decode them, and publish as a
+//! driver does (`peers.py`). If they are not installed, the test says that it skipped.
 
 use std::io::Write;
 use std::net::TcpListener;

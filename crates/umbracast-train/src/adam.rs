@@ -1,4 +1,4 @@
-//! Adam (Kingma and Ba, 2015, Algorithm 1) by hand: a dozen lines, where the framework that has it brings five
+//! Adam (Kingma and Ba, 2015, Algorithm 1), written by hand: a dozen lines. The framework that has it needs five
 //! hundred packages.
 
 const BETA_1: f64 = 0.9;

@@ -1,8 +1,7 @@
-//! Fits the model of `umbracast::detect::axis`, from what the sensors saw of a body to where its axis stands, on
-//! simulated returns.
+//! Fits the model of `umbracast::detect::axis` on simulated returns.
 //!
-//! Training scenes have the seeds 50,000 and on, the scenes that the errors are told for 130,000 and on. Four layouts
-//! of two sensors; people on ORCA's ways, mixed crowds, pairs, and some of them speed-augmented.
+//! Training scenes have the seeds 50,000 and on, and the scenes for the errors on the card 130,000 and on. Four
+//! layouts of two sensors; people on ORCA's ways, mixed crowds, pairs, and some of them speed-augmented.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,6 +1,6 @@
-//! Fits the predictor's body on recorded tuning scenes: which few numbers, put at people's true places and headings
-//! with height and gait as the tracker knows them, make the truth about who is blocked most likely? One number at a
-//! time is moved as long as it helps.
+//! Fits the predictor's body on recorded tuning scenes: the few numbers with which the true blockages are most
+//! likely, at people's true positions and headings, with height and gait as the tracker knows them. The fit moves one
+//! number at a time as long as it helps.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

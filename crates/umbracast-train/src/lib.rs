@@ -1,10 +1,9 @@
-//! Fits what the program learned from data: each fit gives a file, or lines for a file, and a card that says where
-//! they come from.
+//! Fits what the program learns from data. Each fit gives a file, or lines for a file, and a card with their origin.
 //!
 //! Small networks have their gradients written out here: the body axis (stage 1), the default forecast's residual
-//! (stage 2). The predictor's body and the thresholds (stage 3) are searched for. The paper's LSTM takes a framework
-//! and is fitted in `train/`, a workspace of its own; what it learns from and how it is scored needs none and is
-//! here, so that every test run scores the weights that ship.
+//! (stage 2). The predictor's body and the thresholds (stage 3) are found by search. The paper's LSTM needs a
+//! framework and is fitted in `train/`, a workspace of its own. Its training data and its scores need no framework
+//! and are here, so that every test run scores the weights that ship.
 
 pub mod adam;
 pub mod weights;

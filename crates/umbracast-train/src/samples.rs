@@ -1,5 +1,5 @@
-//! What the pipeline saw and where people went: scenes are simulated, run through stage 1, and each track that is
-//! somebody's becomes a sample at each frame.
+//! Samples to learn from: scenes are simulated and run through stage 1, and each matched track gives a sample at each
+//! frame.
 
 use std::collections::BTreeMap;
 

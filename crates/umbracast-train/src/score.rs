@@ -1,4 +1,4 @@
-//! How far off the forecasts of a network are, run as the pipeline runs it.
+//! The errors of a network's forecasts, computed as in the pipeline.
 
 use umbracast::STEPS;
 use umbracast::forecast::Weights;

@@ -1,5 +1,5 @@
-//! Finds the probability from which on a link is called blocked: the one with the best F1 over all windows and access
-//! points on tuning scenes; beside it that of each window alone.
+//! Finds the probability at which a link is called blocked: the one with the best F1 over all windows and access
+//! points on tuning scenes. It also gives that of each window alone.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,4 +1,4 @@
-//! Networks to safetensors.
+//! Writes networks as safetensors.
 
 use std::borrow::Cow;
 use std::collections::HashMap;

@@ -1,5 +1,5 @@
-//! Fits the numbers of `umbracast::track::width` on simulated people: what the extents of detections in free sight tell
-//! of how wide a person's trunk is for the height.
+//! Fits the numbers of `umbracast::track::width` on simulated people: how the width of a person's trunk for its
+//! height follows from the extents of detections in free sight.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};

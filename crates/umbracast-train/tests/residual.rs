@@ -1,4 +1,4 @@
-//! The residual network learns what can be learned, and the runtime says what the trainer says.
+//! The residual network learns what can be learned, and runtime and trainer give the same values.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};

@@ -1,4 +1,4 @@
-//! The arguments. The same flag means the same everywhere.
+//! The arguments. A flag has the same meaning in all commands.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `calibrate`: where the sensors of a site hang, from people who walk, the floor and the walls.
+//! `calibrate`: finds the poses of a site's sensors from walking people, the floor and the walls.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! `check`: what is wrong with the sensors of a site, before the first person comes.
+//! `check`: reports the faults of a site's sensors before the first person comes.
 
 use std::time::Duration;
 

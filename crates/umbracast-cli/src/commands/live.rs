@@ -1,4 +1,4 @@
-//! `live`: sensors in, warnings out, until somebody asks for the end.
+//! `live`: runs sensors' packets through all stages until a signal comes.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! `node`: one process of a hall, until somebody asks for the end.
+//! `node`: runs one process of a hall until a signal comes.
 
 use std::path::Path;
 use std::sync::Arc;

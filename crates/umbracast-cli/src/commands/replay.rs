@@ -1,4 +1,4 @@
-//! `replay`: the packets of recordings over UDP, at the pace they came.
+//! `replay`: sends the packets of recordings over UDP at their original pace.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, mpsc};

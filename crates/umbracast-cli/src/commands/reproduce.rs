@@ -1,5 +1,5 @@
-//! `reproduce`: the paper's whole experiment, scene by scene. It can be stopped and gone on with, and spread over
-//! machines: what is done lies in one file a scene.
+//! `reproduce`: the paper's whole experiment, scene by scene. It can be stopped and resumed, and spread over
+//! machines: each finished scene is a file.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! `run`: recorded input through the pipeline; detections, tracks and links to tables, and to recordings where asked.
+//! `run`: runs recorded input through the pipeline and writes detections, tracks and links to tables, and on request
+//! to recordings.
 
 use std::collections::BTreeMap;
 use std::panic::resume_unwind;

@@ -1,4 +1,4 @@
-//! `simulate`: scenes to recordings, with their truth in tables, or as packets to whoever listens.
+//! `simulate`: writes scenes as recordings with their truth in tables, or sends them as packets.
 
 use std::path::{Path, PathBuf};
 

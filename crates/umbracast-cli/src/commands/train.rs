@@ -1,4 +1,4 @@
-//! `train`: fits what the program learned from data.
+//! `train`: fits what the program learns from data.
 
 use std::path::PathBuf;
 

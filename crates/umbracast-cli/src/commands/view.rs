@@ -1,4 +1,4 @@
-//! `view`: a recording through the pipeline at its own pace, to be watched in the browser.
+//! `view`: runs a recording through the pipeline at its own pace and shows it in the browser.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;

@@ -1,4 +1,4 @@
-//! Recordings of `sensor_msgs/PointCloud2`, for a site whose one sensor is known by its clouds: one cloud a frame.
+//! Recordings of `sensor_msgs/PointCloud2`, for a site with one sensor of model `points`: each cloud is a frame.
 
 use umbracast::lidar::{Cloud, Frame, Scan, sensor_model};
 use umbracast::{Error, Health, STEP_NS, Site};

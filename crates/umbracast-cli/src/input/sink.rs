@@ -1,4 +1,4 @@
-//! Where frames go, whatever they come from.
+//! Where frames of all inputs go.
 
 use umbracast::Error;
 use umbracast::lidar::{Assembler, Frame, Packet};

@@ -1,8 +1,7 @@
-//! What a site's sensors see of a standing person, place by place, and which links the hall itself blocks: the
-//! planner's question before anybody walks.
+//! What a site's sensors see of a standing person at each place, and which links the hall itself blocks. A planner
+//! needs this before anybody walks.
 //!
-//! The sensors are the simulator's own, so the figures are those that `people.returns` has in a scene, on the
-//! mean over noise.
+//! The sensors are the simulator's own, so the figures are the means over noise of `people.returns` in a scene.
 
 mod summary;
 mod picture;

@@ -1,5 +1,5 @@
-//! The survey as a floor plan (SVG). Few returns are orange, many are blue from light to dark, so that who tells
-//! neither red from green nor colours at all reads it too; blind places are hatched.
+//! The survey as a floor plan (SVG). Few returns are orange, many are blue from light to dark, and blind places are
+//! hatched, so that colour-blind readers can read it too.
 
 use std::fmt::Write as _;
 

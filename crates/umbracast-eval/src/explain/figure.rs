@@ -1,4 +1,4 @@
-//! One figure that tells the whole story without the text.
+//! One figure that shows the whole result without the text.
 
 use umbracast::{Error, STEPS};
 

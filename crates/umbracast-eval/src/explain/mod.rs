@@ -1,5 +1,5 @@
-//! Why the paper's figures are what they are: its stages 2 and 3 played on true trajectories to which an error of stage 1
-//! is added, and a search for the error, the box and the access point under which they print what was published.
+//! Why the paper's figures are what they are: its stages 2 and 3 on true trajectories with an added error of stage 1,
+//! and a search for the error, the box and the access point that give the published figures.
 
 pub mod replay;
 pub mod table_one;

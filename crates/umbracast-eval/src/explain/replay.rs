@@ -1,4 +1,4 @@
-//! A scene of the truth, given to the paper's stages 2 and 3 as if stage 1 had seen it with a chosen error.
+//! Runs the paper's stages 2 and 3 on the truth of a scene with a chosen error of stage 1.
 
 use std::collections::{BTreeMap, VecDeque};
 

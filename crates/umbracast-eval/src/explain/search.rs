@@ -1,4 +1,5 @@
-//! Which stage 1, which box and which scene make the paper's stages 2 and 3 print the published blockage figures.
+//! Searches for the stage 1, the box and the scene with which the paper's stages 2 and 3 give the published blockage
+//! figures.
 
 use rayon::prelude::*;
 use umbracast::config::{BoxKind, Rollout};

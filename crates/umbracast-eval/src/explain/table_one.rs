@@ -1,4 +1,4 @@
-//! Which error of the tracks makes the paper's LSTM err as Table I says.
+//! Searches for the error of the tracks with which the paper's LSTM has the errors of Table I.
 
 use rayon::prelude::*;
 use umbracast::config::Rollout;

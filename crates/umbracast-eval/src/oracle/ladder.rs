@@ -1,6 +1,6 @@
-//! The ladder of oracles: how far each kind of body, future and position could bring stage 3 if everything else
-//! were known. Its last rung but the noisy ones, an upright articulated body, is the ceiling: nobody can pass it
-//! without knowing the gait.
+//! The ladder of oracles: the score of stage 3 with each kind of body, future and position, if everything else were
+//! known. The upright body is its best body. A prediction scores above it only if it knows more of the body, such as
+//! the gait.
 //!
 //! Works on scenes, not on tables, because it needs the bodies. Who counts is the same as everywhere.
 

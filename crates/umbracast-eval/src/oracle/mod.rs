@@ -1,4 +1,4 @@
-//! Stage 3 of who knows a part of the truth: the baselines, the error budget, and the ladder of oracles.
+//! Stage 3 with parts of the truth: the baselines, the error budget, and the ladder of oracles.
 
 pub mod true_forecasts;
 pub mod replaced;

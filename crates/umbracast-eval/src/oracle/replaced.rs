@@ -1,5 +1,5 @@
-//! What oracles would cast and no run does, from the rows of truth and run: the constant-velocity baseline, and the error budget,
-//! in which each stage in turn is replaced by the truth and the rest stays as in the mode.
+//! Casts that only an oracle can make, from the rows of truth and run: the constant-velocity baseline, and the error
+//! budget, in which the truth replaces one stage at a time and the rest is the mode's own.
 
 use std::collections::{BTreeMap, VecDeque};
 

@@ -1,5 +1,5 @@
-//! The error budget's third row: the body replaced by the truth. Everybody whom the mode follows stands at his
-//! forecast position with his true walking mesh and his true heading; the rest is as in the mode.
+//! The error budget's third row: the body replaced by the truth. Each tracked person stands at the forecast position
+//! with the true walking mesh and heading; the rest is the mode's own.
 
 use std::collections::{BTreeMap, BTreeSet};
 

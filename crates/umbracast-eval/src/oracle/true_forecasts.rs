@@ -1,5 +1,5 @@
-//! Forecasts from everybody's true state, which the error budget asks for once a mode: rolling the LSTM out is the
-//! largest part of its time.
+//! Forecasts from everybody's true state, computed once for each mode of the error budget. Rolling out the LSTM takes
+//! most of its time.
 
 use umbracast::Error;
 use umbracast::config::{ForecastConfig, ForecastMethod};

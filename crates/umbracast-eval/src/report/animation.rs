@@ -1,5 +1,5 @@
-//! Some seconds of the kept scene as one animated SVG (SMIL), which plays wherever a picture is shown: people walk as
-//! they truly did, and every link is coloured by what is true of it now and by what was predicted of it.
+//! Some seconds of the kept scene as one animated SVG (SMIL), which plays wherever a picture is shown. People walk
+//! their true paths, and each link is coloured by its true state and by the prediction.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

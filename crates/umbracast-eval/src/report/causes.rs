@@ -1,4 +1,5 @@
-//! The table of what blocks: the owner's own body, the hall, and anything at all beside others, who have the other tables.
+//! The table of causes: blockage by the owner's own body, by the hall, and by any cause. The other tables have
+//! blockage by other people.
 
 use super::tables::Table;
 use crate::run::pooled::{Estimate, Group};

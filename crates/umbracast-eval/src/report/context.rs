@@ -1,4 +1,4 @@
-//! What a report is told beside the scores.
+//! What a report needs besides the scores.
 
 use umbracast::{Config, Mode, Site};
 

@@ -1,4 +1,4 @@
-//! Which figures there are, and what each shows.
+//! The report's figures.
 
 use umbracast::{Error, Mode, STEPS};
 

@@ -1,4 +1,4 @@
-//! The hall from above: what the plan and the animation both draw. Site frame, metres.
+//! The hall from above, as both the plan and the animation draw it. Site frame, metres.
 
 use umbracast::Site;
 

@@ -1,4 +1,4 @@
-//! The ladder of oracles: what is reached by who knows the future, with ever better bodies, then with ever larger errors.
+//! The ladder of oracles: scores with the known future, first with ever better bodies, then with ever larger errors.
 
 use super::tables::{Table, number, scenes, window};
 use crate::run::pooled::{Group, Scores};

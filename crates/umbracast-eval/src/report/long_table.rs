@@ -1,4 +1,4 @@
-//! Every score as one long CSV table: a row a figure, for whoever draws figures of their own.
+//! Every score as one long CSV table with one value in each row, for users who draw their own figures.
 
 use std::fmt::Write as _;
 

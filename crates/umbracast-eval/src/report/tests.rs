@@ -1,4 +1,4 @@
-//! What a report says and does not say.
+//! Tests of what a report contains.
 
 use super::*;
 use crate::run::pooled::pool;

@@ -1,7 +1,6 @@
 //! What each mechanism of the default mode is worth: the same scenes with all of them and with each left out alone.
 //!
-//! A variant's score is set beside the whole's on the same scenes, so the intervals are of the difference, by
-//! bootstrap over recordings.
+//! Both scores are of the same scenes, so the intervals are of their difference, by bootstrap over recordings.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! The whole chain in memory: a simulated scene's packets through the pipelines of one or several modes, scored
-//! and forgotten. Scenes run side by side; results stand in scene order and do not depend on the threads.
+//! The whole chain in memory: runs a simulated scene's packets through the pipelines of one or several modes, scores
+//! the results and drops them. Scenes run in parallel. Results are in scene order and do not depend on the threads.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! A long experiment in a folder of scene files: every scene that is done stays done, whatever happens to the
-//! rest. Scenes may be run here and there; together they give the same bytes as one run.
+//! A long experiment in a folder of scene files: a finished scene stays finished, whatever happens to the rest.
+//! Scenes may run on several machines; together they give the same bytes as one run.
 
 use std::fs;
 use std::io::Write;

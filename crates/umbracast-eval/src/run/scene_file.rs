@@ -1,4 +1,4 @@
-//! The sums of one scene as a file, so that a long experiment can stop and go on, or be spread over machines.
+//! The sums of one scene as a file, so that a long experiment can stop and resume, or run on several machines.
 //!
 //! A file is: 16 bytes that say what it is, 8 bytes of checksum (little endian, FNV-1a), then a [`Stamp`] and the
 //! sums as postcard writes them: floats keep every bit.

@@ -1,5 +1,6 @@
-//! Intervals by bootstrap over recordings: instances of one scene hang together, and so do scenes in which the same
-//! people walk the same trajectories in bodies drawn anew; recordings do not. A drawn crowd is a recording of its own.
+//! Intervals by bootstrap over recordings: instances of one scene are correlated, and so are scenes in which the same
+//! people walk the same trajectories with other bodies. Recordings are not. Each drawn crowd is a recording of its
+//! own.
 
 use rand::RngExt;
 use rand::SeedableRng;

@@ -1,4 +1,4 @@
-//! True and false, positive and negative, and the scores that follow from them.
+//! True and false positives and negatives, and the scores computed from them.
 
 use serde::{Deserialize, Serialize};
 use umbracast::geometry::DVec2;

@@ -1,11 +1,12 @@
-//! The track that speaks for a person's device when the two are bound once, instead of matched anew in every frame.
+//! The track of a person's device if the two are bound once instead of matched anew in every frame.
 //!
-//! [`crate::score::matching`] asks the truth in each frame which track is whose. In operation nobody can: a device registers,
-//! its place tells which track it walks with, and from then on it gets what is said of that track. So an identity
-//! swap costs warnings: it shows nowhere, and the device gets those of the person whom its track follows now. A
-//! track that has died does show, because nothing is said of it any more: the device registers anew, and is bound
-//! at its person's next match with a track that speaks for no other device. Until then, and while its track is not
-//! confirmed, it is warned of nothing. A track is free again when the person it was bound for has left the scene.
+//! [`crate::score::matching`] uses the truth in each frame to match people and tracks. In operation this is
+//! impossible: a device registers, its position selects a track, and from then on it gets that track's predictions.
+//! An identity swap therefore costs warnings. Nothing shows it, and the device gets the warnings of the person whom
+//! its track now follows. The death of a track does show, because its predictions end. The device then registers
+//! anew: it is bound at its person's next match with a track that no other device has. Until then, and while its
+//! track is not confirmed, it gets no warnings. A track is free again when the person it was bound for has left the
+//! scene.
 
 use std::collections::BTreeMap;
 

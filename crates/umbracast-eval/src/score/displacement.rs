@@ -1,4 +1,4 @@
-//! Stage 2: how far forecasts end from where people went, and whether their spread is honest.
+//! Stage 2: the distance between forecasts and true positions, and whether the stated spread is right.
 
 use serde::{Deserialize, Serialize};
 use umbracast::geometry::DVec2;

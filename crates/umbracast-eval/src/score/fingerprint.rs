@@ -1,4 +1,4 @@
-//! A number that tells things apart by their bytes.
+//! A hash of bytes.
 
 /// A fingerprint of these parts in their order (FNV-1a, 64 bit): tells things apart, protects nothing.
 pub fn fingerprint(parts: &[&[u8]]) -> u64 {

@@ -1,4 +1,5 @@
-//! Who counts (docs/CONVENTIONS.md): every case in which a prediction of a link is held against the truth.
+//! Blockage instances (docs/CONVENTIONS.md, who counts): each is one comparison of a link's prediction with the
+//! truth.
 
 use umbracast::STEPS;
 use umbracast::track::OBSERVED;

@@ -1,8 +1,8 @@
 //! People labelled by hand in the clouds of one sensor, as truth for stage 1.
 //!
 //! CSV with the columns `frame_file`, `label_index`, `x_m`, `y_m`, `z_m` (centre of the box, sensor frame), in any
-//! order and with any others. A frame is known by the number its file is named by, as `run` counts clouds.
-//! `label_index` is taken for the person: identities of such labels mean nothing.
+//! order and with any others. The number in a cloud's file name is the frame's number, as in `run`. `label_index`
+//! serves as the person's number; such labels have no identities over time.
 
 use umbracast::Error;
 use umbracast::geometry::{DVec3, Pose};

@@ -1,4 +1,4 @@
-//! Sums from which every score of stage 3 follows: added up over instances, and again over scenes.
+//! Sums from which every score of stage 3 is computed, over instances and then over scenes.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use umbracast::{STEP_NS, STEPS};

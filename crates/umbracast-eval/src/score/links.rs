@@ -1,5 +1,5 @@
-//! Stage 3: what each predictor says of every instance. A predictor is the run itself, one of the baselines
-//! that stand in every table, or a cast with one stage replaced by the truth.
+//! Stage 3: each predictor's answer for every instance. A predictor is the run itself, one of the baselines of every
+//! table, or a cast with one stage replaced by the truth.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Which track is whose, frame by frame (CLEAR: Bernardin and Stiefelhagen 2008).
+//! Matches tracks and people, frame by frame (CLEAR: Bernardin and Stiefelhagen 2008).
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
-//! What scores are computed from, and how: the rows of a scene, who counts, which track is whose, sums that can be
-//! pooled, and their intervals. Runs no pipeline and plays no scene.
+//! How scores are computed: the rows of a scene, who counts, matching, sums that can be pooled, and their intervals.
+//! This module runs no pipeline and no scene.
 
 pub mod fingerprint;
 pub mod scene;

@@ -1,4 +1,4 @@
-//! The rows of one scene, and the truth of it laid out for looking things up.
+//! The rows of one scene, with an index of its truth.
 
 use std::collections::BTreeMap;
 

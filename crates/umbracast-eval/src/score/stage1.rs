@@ -1,4 +1,4 @@
-//! Stage 1: are people found, where, and as the same person? Counts of one scene, added up over scenes.
+//! Stage 1: whether people are detected, where, and with one identity. Counts of one scene, added up over scenes.
 //!
 //! Everybody in the scene counts from frame 0, and confirmed tracks only (docs/CONVENTIONS.md).
 

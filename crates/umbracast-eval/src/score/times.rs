@@ -1,4 +1,4 @@
-//! Stage 3: when a link will be blocked, and when it will be clear again, held against what happened.
+//! Stage 3: predicted times until a link is blocked and until it is clear again, compared with the truth.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Datagrams that came in pieces: a sensor's packet of 8 or 25 kB does not fit into an Ethernet frame (RFC 791, 3.2).
+//! Datagrams in fragments: a sensor's packet of 8 or 25 kB does not fit into an Ethernet frame (RFC 791, 3.2).
 
 use super::ip::Ipv4;
 

@@ -1,5 +1,5 @@
-//! Recordings: MCAP with ROS 2 CDR messages. Raw sensor packets are the record; poses, truth and (where asked
-//! for) clouds stand beside them, so that ROS 2, Foxglove and Rerun open the file.
+//! Recordings: MCAP with ROS 2 CDR messages. A recording holds raw sensor packets with poses, truth and (on request)
+//! clouds, so that programs which read ROS 2 messages can open it.
 //!
 //! | topic | type |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Writes recordings. A topic is made when something is first written to it.
+//! Writes recordings. It creates a topic when the first message is written to it.
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -1,5 +1,5 @@
-//! The tables of a run as files: Parquet, and CSV beside it where asked for. One row type, one table; a column
-//! is a field, its unit in its name. Files are written in pieces of bounded size, so a run may go on for ever.
+//! The tables of a run as files: Parquet, and CSV beside it where asked for. Each row type is a table, and each field
+//! is a column with its unit in the name. Files are written in pieces of bounded size, so a run may last for ever.
 //!
 //! Columns are found by name, so a table that another program wrote, with columns in another order or with more
 //! of them, reads as well. Same rows, same bytes.

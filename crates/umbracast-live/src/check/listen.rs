@@ -1,4 +1,4 @@
-//! Whatever comes in on some ports for a while, with who sent it.
+//! Receives everything on some ports for a while, with its senders.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;

@@ -1,5 +1,5 @@
-//! What is wrong with the sensors of a site, said before the first person comes: who is silent, who sends something else,
-//! whose clock is apart, who looks elsewhere.
+//! Reports the faults of a site's sensors before the first person comes: a silent sensor, other packets, a clock that
+//! differs, another pose.
 
 mod listen;
 

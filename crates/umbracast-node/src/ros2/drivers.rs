@@ -1,4 +1,4 @@
-//! What drivers of sensors publish in ROS 2, read without ROS: packets and clouds.
+//! Reads what sensor drivers publish in ROS 2, without ROS: packets and clouds.
 
 use std::sync::Arc;
 

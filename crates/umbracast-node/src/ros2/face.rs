@@ -1,4 +1,4 @@
-//! A hall as ROS 2 sees it: the topics that a recording has, sent as frames come.
+//! A hall as ROS 2 sees it: the topics of a recording, sent with each frame.
 
 use umbracast::{Error, Site};
 use umbracast_io::messages::CLOUD;

@@ -11,9 +11,9 @@
 //! | hash of a type, `RIHS01`, from its definition | [`type_hash()`] |
 //! | payload: CDR, as in our recordings | `umbracast_io` |
 //!
-//! By hand, because it is so little: `hiroz` 0.2 does the same with nodes, services, actions and generated types of its own
-//! beside our definitions, and calls itself experimental; `ros2-client` 0.12 sends a hash of zeros for every type outside
-//! a small table, which `rmw_zenoh` need not accept.
+//! Written by hand, because it is little code: `hiroz` 0.2 does the same with nodes, services, actions and generated
+//! types of its own beside our definitions, and calls itself experimental; `ros2-client` 0.12 sends a hash of zeros
+//! for every type outside a small table, which `rmw_zenoh` need not accept.
 
 mod type_hash;
 pub mod names;

@@ -1,4 +1,4 @@
-//! What the sensors saw, in plan view, by the poses before and after.
+//! What the sensors saw, in plan view, with the poses before and after.
 
 use umbracast::geometry::DVec2;
 use umbracast::{Error, Site};
