@@ -87,7 +87,7 @@ pub fn recorded_scenes(
         // Below a centimetre nobody would see it.
         let room = match apart_m < 0.01 {
             true => String::new(),
-            false => format!(", moved apart by up to {apart_m:.2} m, for bodies do not fit into each other"),
+            false => format!(", moved apart by up to {apart_m:.2} m, so that bodies do not overlap"),
         };
         let told = format!(
             "{group}, seed {seed}: {} people, {:.1} s, {place}{room}",

@@ -73,7 +73,7 @@ impl Watch {
             if sent != *sends {
                 *sends = sent;
                 let event = match sent {
-                    true => Event::new(Level::Info, "sensor_back", "it sends again"),
+                    true => Event::new(Level::Info, "sensor_back", "the sensor sends again"),
                     false => Event::new(Level::Warn, "sensor_gone", "no packet for a second"),
                 };
                 events.push(Event { sensor: Some(self.sensors[s].clone()), ..event });
@@ -82,17 +82,17 @@ impl Watch {
         let before = &self.before;
         let counted = [
             ("frames_skipped", "frames skipped", now.frames_skipped, before.frames_skipped),
-            ("packets_lost", "packets given up", now.packets_lost, before.packets_lost),
+            ("packets_lost", "packets dropped", now.packets_lost, before.packets_lost),
             (
                 "dropped_by_system",
-                "packets given up by the system",
+                "packets dropped by the system",
                 now.dropped_by_system,
                 before.dropped_by_system,
             ),
-            ("strangers", "packets of no sensor's address", now.strangers, before.strangers),
+            ("strangers", "packets from addresses of no sensor", now.strangers, before.strangers),
             (
                 "not_understood",
-                "packets that are not understood",
+                "packets not understood",
                 now.health.packets_not_understood + now.health.packets_wrong_size,
                 before.health.packets_not_understood + before.health.packets_wrong_size,
             ),

@@ -76,7 +76,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
             return Err(Error::new("a thread of the pipeline ended; this is a bug"));
         }
     }
-    events.tell(Event::new(Level::Info, "end", "it ends"));
+    events.tell(Event::new(Level::Info, "end", "the run ends"));
     asked.store(true, Ordering::Relaxed);
     let sent = demo.and_then(|demo| demo.join().ok()).transpose()?;
     let summary = live.stop();
@@ -87,14 +87,14 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
 /// Reads the site file again and takes over what can be; whatever is wrong with it, the run goes on as it was.
 fn reload(args: &args::Live, config: &mut Config, live: &Live, page: &Page, outward: &Outward) -> Event {
     let stays =
-        |told: String| Event::new(Level::Warn, "reload_failed", format!("{told}; all stays as it was"));
+        |told: String| Event::new(Level::Warn, "reload_failed", format!("{told}; nothing was changed"));
     let new = match setup::config(args.mode, args.site.site.as_deref()) {
         Ok(new) => new,
         Err(error) => return stays(error.to_string()),
     };
     let apart = needs_restart(config, &new);
     if !apart.is_empty() {
-        return stays(format!("what differs needs a restart: {}", apart.join(", ")));
+        return stays(format!("these differences need a restart: {}", apart.join(", ")));
     }
     page.take_over(&new.site);
     outward.take_over(&new.site);
@@ -103,7 +103,7 @@ fn reload(args: &args::Live, config: &mut Config, live: &Live, page: &Page, outw
     Event::new(
         Level::Info,
         "reload",
-        "the site file was read again: access points, UE and stage 3 are as it says now",
+        "the site file was read again: access points, UE and stage 3 now follow it",
     )
 }
 

@@ -174,7 +174,7 @@ fn config(
             return Ok(Some(config));
         }
         if !told {
-            say::note(&format!("no --site: waiting until somebody of {} has it", hall.keys().hall()));
+            say::note(&format!("no --site: waiting for a node of {} that has the site", hall.keys().hall()));
             told = true;
         }
         std::thread::sleep(TICK);
@@ -221,7 +221,7 @@ fn empty(
     match share::ask_empty(hall, site, own) {
         Some(packets) => Ok((share::empty_frames(site, &packets)?, shared.with_empty(hall, site, &packets))),
         None => {
-            say::note("nobody here has the empty hall: the background is learned on the way");
+            say::note("no node has the empty hall: the background is learned while running");
             Ok((Vec::new(), shared))
         }
     }

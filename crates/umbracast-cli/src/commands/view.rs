@@ -64,7 +64,7 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
         }
     }
     if !common.quiet {
-        say::note("the end of the recording; Ctrl-C ends the page");
+        say::note("the recording has ended; Ctrl-C ends the page");
     }
     while !asked.load(Ordering::Relaxed) && !args.page.no_serve {
         std::thread::sleep(Duration::from_millis(50));
