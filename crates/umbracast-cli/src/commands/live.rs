@@ -231,9 +231,9 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
     );
     json.print(common, &text);
     let lost = [
-        (summary.dropped_by_system, "packets given up by the system"),
-        (summary.packets_lost, "packets given up"),
-        (summary.strangers, "packets of no sensor's address"),
+        (summary.dropped_by_system, "packets dropped by the system"),
+        (summary.packets_lost, "packets dropped"),
+        (summary.strangers, "packets from addresses of no sensor"),
         (summary.frames_skipped, "frames skipped"),
         (summary.recorded.lost, "packets and results not recorded"),
     ];

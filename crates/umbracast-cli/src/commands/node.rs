@@ -330,7 +330,7 @@ fn tell(summary: &Summary, stages: &[&str], watch: &Stopwatch, common: &Common) 
             ),
         );
     let lost = [
-        (summary.packets_lost, "packets given up"),
+        (summary.packets_lost, "packets dropped"),
         (summary.skipped, "messages given up"),
         (summary.incomplete, "frames incomplete"),
         (summary.recorded.lost, "packets and results not recorded"),
