@@ -41,7 +41,7 @@ fn a_site_file_made_by_eye_is_put_right() {
         assert_eq!(found["frame"], "walls");
     }
     let written = fs::read_to_string(&out).expect("the site file");
-    assert!(written.starts_with("# The default hall as somebody has it"), "{written}");
+    assert!(written.starts_with("# The default hall with poses estimated by eye"), "{written}");
     done(&["config", "--check", text(&out)]);
     let picture = fs::read_to_string(out.with_extension("svg")).expect("the picture");
     assert!(picture.starts_with("<svg") && picture.contains("lidar_west"));
