@@ -1,10 +1,9 @@
-//! Whether sensors still hang where the site file says, by the floor and the walls they see; where not, their pose is
-//! corrected.
+//! Checks from floor and walls whether sensors still hang where the site file says, and corrects their poses if not.
 //!
-//! Some times a second a part of each sensor's returns is laid on the floor, the ceiling and the walls of the hall by least
-//! squares, the site file's pose being what is expected. How far each surface stands from where the file has it is unknown
-//! too, so a wall tells how a sensor is turned, and of where it hangs only as much as walls are known. Nothing is changed for
-//! less than [`TURN_RAD`] and [`SHIFT_M`], nor where the hall is not the file's.
+//! A few times a second, least squares fit a part of each sensor's returns to the floor, the ceiling and the walls of
+//! the hall, with the site file's pose as prior. The offset of each surface from the file is unknown too. A wall
+//! therefore determines a sensor's rotation, and its position only as well as the wall's own is known. The pose stays
+//! as it is for differences below [`TURN_RAD`] and [`SHIFT_M`], and if the hall does not match the file.
 
 use std::borrow::Cow;
 

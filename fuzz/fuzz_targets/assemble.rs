@@ -1,4 +1,4 @@
-//! Any packets give frames in order of time.
+//! Any packets must give frames in order of time.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Any text as a sensor's own file gives a model whose packets fit into a datagram, or an error.
+//! Any text as a sensor's own file must give a model whose packets fit into a datagram, or an error.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

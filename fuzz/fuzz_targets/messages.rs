@@ -1,4 +1,4 @@
-//! Any bytes are a message that is written again as it was read, or none.
+//! Any bytes must be a message that is written again as it was read, or be refused.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

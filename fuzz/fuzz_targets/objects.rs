@@ -1,4 +1,4 @@
-//! Any bytes are a list of people who can be, or none.
+//! Any bytes must be a list of possible people, or be refused.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

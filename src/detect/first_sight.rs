@@ -1,5 +1,5 @@
-//! Who is there when the watch begins, of a hall that nobody has shown empty: what stands alone and has the shape of a
-//! person is not learned. If it never walks, the tracker calls it furniture after a while.
+//! People who are there in the first frame of a run without an empty scan. The background does not learn an object
+//! that stands alone and has the shape of a person. If it never walks, the tracker calls it furniture after a while.
 
 use super::cluster::PlanGrid;
 use crate::geometry::{Aabb, DVec2, DVec3};

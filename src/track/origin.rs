@@ -1,4 +1,4 @@
-//! Whether a track is somebody, or something that was put there.
+//! Tells whether a track is a person or an object that was put there.
 
 use super::followed::seconds;
 use super::remembered::{Remembered, Words};

@@ -1,4 +1,4 @@
-//! `cargo xtask NAME`: what is done to the house rather than by it. Nothing here is part of the program.
+//! `cargo xtask NAME`: the repository's own tasks. Nothing here is part of the program.
 
 mod tools;
 mod record;

@@ -1,5 +1,5 @@
-//! `same-tables`: whether a revision and the working tree write the same tables, byte for byte. Whoever moves code
-//! without changing what it does shows it with this.
+//! `same-tables`: whether a revision and the working tree write the same tables, byte for byte. It shows that moved
+//! code still does the same.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;

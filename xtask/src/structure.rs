@@ -1,5 +1,5 @@
 //! `structure`: the files of the workspace and what they use of one another, as a picture and in words. Both are made
-//! from the code, so that they cannot be out of date without a test that says so.
+//! from the code, and a test says if they are out of date.
 
 mod tokens;
 mod modules;

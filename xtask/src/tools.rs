@@ -1,4 +1,4 @@
-//! Where the repository lies, and other programs run from here.
+//! The repository's place, and running other programs.
 
 use std::ffi::OsString;
 use std::fs;

@@ -1,7 +1,7 @@
 //! Crowds, walking bodies, simulated LiDARs and ground truth.
 //!
-//! Uses the runtime's types (site, poses, sensor models, packets), never its algorithms: truth and prediction
-//! must not share a bug.
+//! The simulator uses the runtime's types (site, poses, sensor models, packets) and never its algorithms, because
+//! truth and prediction must not share a bug.
 
 pub mod random;
 pub mod crowd;

@@ -1,4 +1,4 @@
-//! Named random streams: what one part draws never changes what another part draws.
+//! Named random streams: the draws of one part never change those of another part.
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64;

@@ -1,4 +1,4 @@
-//! What every crowd keeps to.
+//! Rules that every crowd obeys.
 
 use umbracast_sim::crowd::{Crowd, Preset, Trajectory, circle_crossing, pairs};
 

@@ -1,4 +1,4 @@
-//! What ORCA keeps to beyond the golden files: walls, rooms, limited acceleration.
+//! Rules that ORCA obeys, beyond the golden files: walls, rooms, limited acceleration.
 
 use glam::Vec2;
 use umbracast_sim::crowd::orca::{Agent, Orca, Parameters};

@@ -1,4 +1,4 @@
-//! Sensors that hang elsewhere than the site file says: found again, and what that is worth.
+//! Sensors that hang elsewhere than the site file says: how well they are found again, and what that is worth.
 
 use std::ffi::OsString;
 use std::fs;

@@ -1,4 +1,4 @@
-//! What real halls do to light, all of it together and each part alone.
+//! Glass, mirrors, edges and dark cloth: all together and each part alone.
 
 use std::ffi::OsString;
 use std::fs;

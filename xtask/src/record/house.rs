@@ -1,4 +1,5 @@
-//! What the program promises beside its scores: speed, same bytes, going on after a stop, other machines, fresh clones.
+//! Records of what the program promises besides its scores: speed, same bytes, resuming after a stop, other machines,
+//! fresh clones.
 
 use std::ffi::OsString;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What a run that sensors send to promises: nothing lost, in time, memory flat, and whatever fails survived.
+//! What a live run promises: it loses nothing, keeps time and flat memory, and survives faults.
 
 use std::ffi::OsString;
 use std::path::Path;

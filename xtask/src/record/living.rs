@@ -1,4 +1,4 @@
-//! A hall that lives: furniture that is put in, people who stand, a watch that begins without an empty hall.
+//! A hall in use: furniture that is put in, people who stand, a run without an empty scan.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

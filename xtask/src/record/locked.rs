@@ -1,5 +1,5 @@
-//! A look at scenes and recordings by which nothing was chosen. It is taken at the end of a piece of work, never to
-//! choose, and every look is kept: what was seen once is known, and a look that is taken back would flatter.
+//! A look at scenes and recordings that chose nothing. It is taken at the end of a piece of work, never to choose.
+//! Every look is kept: removing a bad one would make the rest look too good.
 
 use super::book::Book;
 use super::crowds::{bodies, recorded};

@@ -1,4 +1,4 @@
-//! What the modes score, and the paper's experiment.
+//! The scores of the modes, and the paper's experiment.
 
 use std::ffi::OsString;
 use std::path::PathBuf;

@@ -1,6 +1,6 @@
-//! The picture: a panel for the packages and one for the rooms of each, boxes in the order of the data from above, an
-//! arrow from who uses to what is used. Arrows up, as they should be, run on the right; arrows down run on the left in
-//! red. A red box holds files that use one another in a circle.
+//! The picture: a panel for the packages and one for the modules of each, boxes from above in the order of the data,
+//! and an arrow from the user to the used. Arrows up, as they should be, run on the right; arrows down run on the
+//! left in red. A red box holds files that use one another in a circle.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

@@ -1,4 +1,4 @@
-//! Which file uses which: names followed to the files that define them, circles, and uses against the data's order.
+//! The uses between files: names followed to the files that define them, circles, and uses against the data's order.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

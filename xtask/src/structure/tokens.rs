@@ -1,5 +1,5 @@
-//! Just as much of Rust's grammar as tells which names a file uses: words, `::` and single signs, without comments,
-//! strings and what stands under `#[cfg(test)]`.
+//! The small part of Rust's grammar that shows which names a file uses: words, `::` and single signs, without
+//! comments, strings and code under `#[cfg(test)]`.
 
 /// The tokens of a source file.
 pub fn tokens(text: &str) -> Vec<String> {

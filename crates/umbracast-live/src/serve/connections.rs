@@ -1,8 +1,8 @@
-//! Who is connected: how many may be, how long they may be silent, and who goes when there are too many.
+//! Connections: how many are allowed, how long they may be silent, and which is closed when there are too many.
 //!
-//! A connection that has not yet asked for anything it may see can always be closed in favour of a newer one, the oldest
-//! first: a thousand that say nothing keep nobody out. One that was let in keeps its place. Whoever takes nothing of
-//! what is sent to it is dropped and never waited for.
+//! A connection that has not yet made a permitted request may be closed for a newer one, the oldest first. Silent
+//! connections therefore cannot lock others out. A connection with a permitted request keeps its place. A client that
+//! reads nothing is dropped and never waited for.
 
 use std::collections::BTreeMap;
 use std::io;

@@ -1,4 +1,4 @@
-//! Clients that want to be a burden, beside one that behaves.
+//! Hostile clients beside a good one.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};

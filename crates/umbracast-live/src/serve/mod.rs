@@ -1,4 +1,4 @@
-//! The page and the interface behind it, over HTTP: what the page gets, `curl` gets.
+//! The page and its interface over HTTP. `curl` can use the same interface.
 //!
 //! | path | gives |
 //! |---|---|
@@ -11,8 +11,8 @@
 //! | `/health` | 200 while frames come, 503 while they do not |
 //! | `/metrics` | for Prometheus |
 //!
-//! A thread of its own with one worker: a slow or hostile client takes time from other clients at most, never from the
-//! pipeline, which only leaves the newest frame here.
+//! The server has a thread of its own with one worker. A slow or hostile client can take time from other clients
+//! only, never from the pipeline, which only leaves the newest frame here.
 
 mod watched;
 mod tls;

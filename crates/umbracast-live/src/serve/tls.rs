@@ -1,4 +1,4 @@
-//! The page over TLS, where this program was built with it.
+//! The page over TLS, if the build has the feature.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What is shown.
+//! What the page shows.
 
 use std::sync::Arc;
 

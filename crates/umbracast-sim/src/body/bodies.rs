@@ -1,4 +1,4 @@
-//! Who in a scene has which kind of body.
+//! The kinds of bodies of the people in a scene.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Feet: where they are put, how they roll from heel to toes on their print, and how they swing to the next.
+//! Feet: their prints, how they roll from heel to toes, and how they swing to the next print.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,6 +1,7 @@
-//! Arms that talk: each hand swings about the shoulder, near and at full stretch, while its owner stands.
+//! The arms of a person who talks: each hand swings about the shoulder, near and at full stretch, while the person
+//! stands.
 //!
-//! Half to one movement a second, as speakers do in stressed speech; how far they reach is the worst case, not a mean.
+//! The hands make half to one movement a second, as in stressed speech. Their reach is the worst case, not a mean.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

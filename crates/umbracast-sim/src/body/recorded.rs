@@ -1,8 +1,8 @@
 //! A recorded gait: one stride of a motion capture, looped, drives pelvis, trunk, arms and legs.
 //!
-//! Joint positions are enough. Arms and trunk take the recorded angles; each ankle lies to its hip joint as
-//! recorded, in units of the leg's length, so that hips and knees bend as they did. The stride grows with the leg,
-//! the cadence with the speed. Feet slide by what the recorded ones do, and while the body starts and stops.
+//! Joint positions are enough. Arms and trunk take the recorded angles; each ankle lies to its hip joint as recorded,
+//! in units of the leg's length, so that hips and knees bend as they did. The stride grows with the leg, the cadence
+//! with the speed. Feet slide as far as the recorded ones do, and while the body starts and stops.
 
 use std::f64::consts::PI;
 

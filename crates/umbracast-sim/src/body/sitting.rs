@@ -1,7 +1,8 @@
-//! Who sits down where he stays: the hips sink to a seat, one foot after the other steps out before it, the hands come to lie
-//! on the thighs; and all of it back before he goes on.
+//! A person who sits down where they stay: the hips sink to a seat, one foot after the other steps out in front of
+//! it, and the hands come to lie on the thighs. Before the person goes on, all of it runs backwards.
 //!
-//! A seat of .45 m is a chair's (ISO 5970, size 6, has .46 m); how long it takes is of memory. The chair is the hall's.
+//! A seat of .45 m is a chair's (ISO 5970, size 6, has .46 m). The duration is from memory. The chair belongs to the
+//! hall.
 
 use umbracast::geometry::DVec3;
 

@@ -1,4 +1,4 @@
-//! Bones and how they stand: a rigid motion for each, and legs bent so that feet reach where they shall.
+//! Bones and their poses: a rigid motion for each, and legs bent so that the feet reach their places.
 
 use umbracast::geometry::{DMat3, DVec2, DVec3};
 

@@ -1,8 +1,8 @@
-//! What people have with them, and how that holds their hands: bags, a telephone, pockets, a wheelchair.
+//! What people carry or use, and where it puts their hands: bags, a telephone, pockets, a wheelchair.
 //!
-//! Sizes: bag .3 x .12 x .3 m, backpack .3 x .18 x .45 m (of memory); elbows with hands in the pockets bent by about
-//! 40 degrees (of memory); front pocket at (.10, .12) m and half the stature (derived). Wheelchair: figures of the
-//! ADA Standards, .66 m wide, 1.065 m long and .15 m of toes, seat at .485, armrests at .76, handles at .915.
+//! Sizes: bag .3 x .12 x .3 m, backpack .3 x .18 x .45 m (from memory); elbows with hands in the pockets bent by
+//! about 40 degrees (from memory); front pocket at (.10, .12) m and half the stature (derived). Wheelchair: figures
+//! of the ADA Standards, .66 m wide, 1.065 m long and .15 m of toes, seat at .485, armrests at .76, handles at .915.
 
 use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};

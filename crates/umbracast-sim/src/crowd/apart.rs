@@ -1,4 +1,4 @@
-//! Recorded people stand as near each other as heads can; bodies of ours need more room than some of theirs did.
+//! Moves recorded people apart. Their heads can be nearer to one another than our simulated bodies fit.
 
 use umbracast::geometry::DVec2;
 

@@ -1,8 +1,8 @@
-//! The floor of a hall that people can walk on, and ways round what stands on it.
+//! The floor of a hall that people can walk on, and paths around the things on it.
 //!
-//! Cells of a grid know how far the nearest wall, pillar or piece of furniture is; ways are the shortest over the cells
-//! that leave a body room, pulled straight. Coordinates are from the hall's middle, so that single precision is enough
-//! wherever the hall lies.
+//! Each cell of a grid has the distance to the nearest wall, pillar or piece of furniture. Paths are the shortest
+//! over the cells with room for a body, pulled straight. Coordinates are relative to the hall's middle, so single
+//! precision suffices wherever the hall lies.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,4 +1,4 @@
-//! What a drawn crowd walks on: the paper's circle where the hall holds it, else the hall's floor.
+//! Where a drawn crowd walks: the paper's circle if the hall has room for it, else the hall's floor.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! Crowds in a hall that the circle does not fit: people walk from place to place, or from entrance to entrance where the
-//! site names some, round walls, pillars and furniture; those of a mixed crowd may stop on the way, or queue where the
+//! Crowds in a hall without room for the circle. People walk from place to place, or between entrances if the site
+//! names some, around walls, pillars and furniture. People of a mixed crowd may stop on the way, or queue where the
 //! site has places for that.
 
 use glam::Vec2;

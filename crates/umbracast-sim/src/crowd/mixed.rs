@@ -1,8 +1,8 @@
-//! The `mixed` crowd: what ORCA with one speed leaves out. Everybody has a speed of his own, sets off when he
-//! likes, may stop on the way or turn to another goal, speeds up and slows down within limits; some walk in
-//! pairs and threes, side by side.
+//! The `mixed` crowd: what ORCA with one speed leaves out. Each person has an own speed and starting time, may stop
+//! on the way or turn to another goal, and speeds up and slows down within limits. Some walk in pairs and threes,
+//! side by side.
 //!
-//! A group avoids others as one larger agent; its members keep their places in a row across the way.
+//! A group avoids others as one larger agent. Its members keep their places in a row across the path.
 
 use glam::Vec2;
 use rand::{Rng, RngExt};

@@ -1,4 +1,4 @@
-//! Who walks where: ORCA crowds and replayed trajectories.
+//! People's paths: ORCA crowds and replayed trajectories.
 
 mod trajectory;
 mod preset;

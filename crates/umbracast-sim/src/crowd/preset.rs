@@ -1,4 +1,4 @@
-//! The crowds that have a name.
+//! The named crowds.
 
 use std::str::FromStr;
 

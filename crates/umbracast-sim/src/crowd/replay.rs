@@ -1,4 +1,4 @@
-//! Recorded people walk again: noisy positions at any rate become smooth ways in steps of 10 ms.
+//! Replays recorded people: noisy positions at any rate become smooth paths in steps of 10 ms.
 
 use umbracast::Error;
 use umbracast::geometry::DVec2;

@@ -1,7 +1,7 @@
-//! Speed augmentation, known ways walked otherwise: the whole crowd's clock runs fast, slows down, stands and sets
-//! off again, everybody sways with the stride and wanders a little off the way. Simulated people never run or brake
-//! as hurried people do, and recorded ones are few; of a crowd that keeps apart, whoever walks by the same clock
-//! keeps apart too.
+//! Speed augmentation: known paths with other timing. The whole crowd's clock runs fast, slows down, stops and starts
+//! again, and everybody sways with the stride and wanders a little off the path. Simulated people never run or brake
+//! as hurried people do, and recorded ones are few. People with one clock keep their distances, so they do not
+//! collide.
 
 use std::f64::consts::TAU;
 use std::ops::Range;

@@ -1,4 +1,4 @@
-//! Along a way round things: towards the farthest point of it that is in sight.
+//! Steers along a path around things: towards its farthest visible point.
 
 use glam::Vec2;
 

@@ -1,4 +1,4 @@
-//! People who cross a circle again and again, for as long as somebody wants to watch.
+//! People who cross a circle again and again, for any time.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Ways of people, sampled evenly.
+//! People's paths, sampled evenly.
 
 use umbracast::geometry::DVec2;
 

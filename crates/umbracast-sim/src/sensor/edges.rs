@@ -1,11 +1,11 @@
-//! Beams have a width: one that meets an edge sees two surfaces.
+//! Beams have a width, so a beam that meets an edge sees two surfaces.
 //!
-//! Where both are within a pulse's length of each other, their echoes run together and the range lies between them, by
-//! the power that comes back of each; else the sensor tells of the stronger. Both width and length are the site file's to
-//! say: 3 mrad and 6 ns, hence 0.9 m, are what we take a spinning sensor to have.
+//! If both are within a pulse's length of each other, their echoes merge and the range lies between them, weighted by
+//! the returned power of each. Otherwise the sensor reports the stronger one. The site file sets width and length. We
+//! assume 3 mrad and 6 ns (0.9 m) for a spinning sensor.
 //!
-//! Edges are looked for along a beam's sweep, where columns lie about a beam's width apart, and somewhere between two of
-//! them. Beams lie ten times as far above each other as they are thick.
+//! The search for edges runs along a beam's sweep, where columns lie about a beam's width apart, and between two
+//! columns. It ignores neighbours above and below, because beams lie ten times their width above each other.
 
 use rand::RngExt;
 use rand_pcg::Pcg64;

@@ -1,4 +1,4 @@
-//! The turning head of a sensor: which column fires when, and where it looks.
+//! The turning head of a sensor: the time and direction of each column.
 
 use std::ops::Range;
 

@@ -1,9 +1,9 @@
-//! Simulated LiDARs that give true sensor packets.
+//! Simulated LiDARs that give packets in the sensors' own format.
 //!
-//! The hall stands still and is traced once (`hall`); a frame looks it up and draws only the people into it
-//! (`raster`), each column at the instant it fires (`head`), and where panes reflect, once more as their reflections
-//! (`panes`). Then come edges, noise, drop-outs and limits, and the
-//! packet codec, so that a simulated sensor and a real one enter the pipeline by the same door.
+//! The hall does not move and is traced once (`hall`). A frame looks it up and draws only the people into it
+//! (`raster`), each column at the instant it fires (`head`), and their reflections in panes (`panes`). Then come
+//! edges, noise, drop-outs, limits and the packet codec. A simulated sensor and a real one therefore enter the
+//! pipeline in the same way.
 
 mod head;
 mod panes;

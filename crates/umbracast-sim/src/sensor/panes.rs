@@ -1,9 +1,9 @@
-//! Glass and mirrors: which beams go through, which show what stands before them, which meet the pane itself.
+//! Glass and mirrors: which beams pass through, which are reflected, and which return from the pane itself.
 //!
-//! A sensor tells of the strongest return (Koch, May, Nuechter 2017, "Detection and purging of specular reflective and
-//! transparent object influences in 3D range measurements": the object, what is behind it, or a reflected one). What
-//! comes back of a reflection has met the pane twice. How much a sheet reflects is Fresnel's formula for a refractive
-//! index of 1.5, unpolarised, both faces.
+//! A sensor reports the strongest return (Koch, May, Nuechter 2017, "Detection and purging of specular reflective and
+//! transparent object influences in 3D range measurements": the object, what is behind it, or a reflected one). A
+//! reflected return has met the pane twice. The share that a sheet reflects follows Fresnel's formula for a
+//! refractive index of 1.5, unpolarised, both faces.
 
 use umbracast::geometry::{DMat3, DVec3, Pose};
 use umbracast::site::{Pane, Surface};

@@ -1,4 +1,4 @@
-//! People drawn into a sensor's view: each triangle is projected onto the grid of columns and beams, and the few
+//! Draws people into a sensor's view: each triangle is projected onto the grid of columns and beams, and the few
 //! beams that may meet it are tested exactly.
 
 use std::ops::{Range, RangeInclusive};

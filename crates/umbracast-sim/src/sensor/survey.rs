@@ -1,7 +1,7 @@
-//! What sensors get from one body that stands alone in the hall, at one place after another, free of chance.
+//! The returns that sensors get from one body alone in the hall, at one place after another, without noise.
 //!
-//! The hall is looked at once. A body that stands elsewhere is the same body seen by a sensor that hangs
-//! elsewhere, so that one body serves all places and headings.
+//! The hall is traced once. A body at another place is the same body seen by a sensor at another place, so one body
+//! serves all places and headings.
 
 use umbracast::Site;
 use umbracast::geometry::{DVec2, Pose};

@@ -1,4 +1,4 @@
-//! Segments against what stands in the hall: round pillars and boxes, solved exactly.
+//! Segments against the round pillars and boxes of the hall, solved exactly.
 
 use umbracast::Site;
 use umbracast::geometry::{DVec2, DVec3};

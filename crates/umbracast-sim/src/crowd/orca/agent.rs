@@ -1,4 +1,4 @@
-//! One agent: how it avoids, where it is and where it would go.
+//! One agent: its avoidance, position and wished velocity.
 
 use glam::Vec2;
 

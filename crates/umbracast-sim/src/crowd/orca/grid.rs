@@ -1,4 +1,4 @@
-//! Who is near whom: a uniform grid over the agents, rebuilt every step.
+//! Neighbours of agents: a uniform grid, rebuilt every step.
 
 use glam::Vec2;
 
