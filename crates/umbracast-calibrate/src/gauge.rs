@@ -1,4 +1,4 @@
-//! The frame as a whole: people and floor leave all sensors together free to move in plan view, walls do not.
+//! The frame as a whole: people and floor leave all sensors together free to move in plan view. Walls fix them.
 
 use nalgebra::{Matrix3, Vector3};
 use umbracast::geometry::{DVec2, DVec3};

@@ -1,4 +1,4 @@
-//! The upright surfaces of a site in plan view, and which of them a point is of.
+//! The upright surfaces of a site in plan view, and the surface that a point belongs to.
 
 use umbracast::Site;
 use umbracast::geometry::{DVec2, DVec3};

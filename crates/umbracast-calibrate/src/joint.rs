@@ -1,9 +1,10 @@
-//! All sensors at once: people seen by several, walls seen by one, each with its weight.
+//! Fits all sensors at once: people seen by several, walls seen by one, each with its weight.
 //!
-//! Unknown are each sensor's yaw, place and clock, and how far each surface of the hall stands from where the site file has
-//! it. How far sightings lie toward their sensor, which is what detection leaves of the one-sided view, is not fitted: two
-//! sensors that face one another see the same of it and of their distance, and what little tells them apart is less than
-//! how the bias changes with range. It is taken for zero, and what that may do stands in the standard deviations.
+//! The unknowns are each sensor's yaw, place and clock, and the offset of each surface of the hall from the site
+//! file. Each sensor sees the near side of a body, and a small bias toward the sensor remains after detection. It is
+//! not fitted. Two sensors that face one another cannot tell it from an error of their distance: the difference
+//! between both is smaller than the change of the bias with range. The fit takes the bias as zero, and the standard
+//! deviations include its possible effect.
 
 use nalgebra::DMatrix;
 use umbracast::geometry::{DVec2, DVec3};

@@ -1,8 +1,8 @@
-//! Which turn and shift between two sensors makes their people the same: no guess is needed.
+//! Finds the turn and shift between two sensors that makes their people the same, without a first guess.
 //!
-//! Every piece of a way that one sensor saw is laid onto every piece that another one saw at the same time. Who walks
-//! straight on at an even pace can be laid onto many others, so each trial is judged by everybody: how many people that
-//! one sensor sees stand where the other one sees somebody, at every instant.
+//! It lays each piece of a path that one sensor saw onto each piece that another one saw at the same time. A straight
+//! path at an even pace fits onto many others. Each trial is therefore judged by all people: at every instant, how
+//! many people of one sensor stand where the other one sees somebody.
 
 use std::collections::BTreeSet;
 

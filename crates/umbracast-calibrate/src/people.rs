@@ -1,4 +1,4 @@
-//! The people that one sensor sees, in its own level frame: the runtime's own stages, for each sensor alone.
+//! The people that one sensor sees, in its own level frame. The runtime's stages run for each sensor alone.
 
 use std::collections::BTreeMap;
 
