@@ -61,9 +61,9 @@ fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
     }
     let file = sensor.calibration_file.as_deref().map(|file| format!(" ({file})")).unwrap_or_default();
     match sensor_model(&sensor.model) {
-        Some("points") if sensor.calibration.is_some() || sensor.calibration_file.is_some() => {
-            Err(Error::new(format!("{}: expected none, for clouds are points already", key("calibration"))))
-        }
+        Some("points") if sensor.calibration.is_some() || sensor.calibration_file.is_some() => Err(
+            Error::new(format!("{}: expected none, because clouds are points already", key("calibration"))),
+        ),
         Some("points") => Ok(()),
         _ => Model::of_sensor(sensor)
             .map(|_| ())
@@ -274,7 +274,7 @@ mod tests {
             ),
             (
                 |s| s.sensors[0].calibration = Some("{}".into()),
-                "site.sensors.lidar_east: calibration: expected none, for every hdl-32e is built alike",
+                "site.sensors.lidar_east: calibration: expected none, because all hdl-32e have the same beams",
             ),
             (
                 |s| {

@@ -82,7 +82,9 @@ fn model(
 ) -> Result<Model, Error> {
     if setting.calibration.is_some() {
         let name = setting.name;
-        return Err(Error::new(format!("calibration: expected none, for every {name} is built alike")));
+        return Err(Error::new(format!(
+            "calibration: expected none, because all {name} have the same beams"
+        )));
     }
     Ok(Model { name: setting.name, beams, column_period_ns, turn: None, format: Arc::new(velodyne) })
 }

@@ -148,7 +148,7 @@ pub fn recorded_site(inputs: &[Input]) -> Result<Option<Site>, Error> {
     let silent = inputs.iter().find(|input| !matches!(input, Input::Recording(_)));
     if let (Some(site), Some(silent)) = (&first, silent) {
         let story = format!(
-            "expected --site, or recordings alone: a recording among the inputs names its site, {:?}, these name none",
+            "expected --site, or only recordings as inputs: a recording names its site, {:?}, and this input names none",
             site.name
         );
         return Err(Error::new(story).within(silent));

@@ -82,7 +82,7 @@ impl Front {
         let of_clouds = sensors.iter().find(|sensor| takes_clouds(sensor)).cloned();
         if let Some(sensor) = of_clouds.as_ref().filter(|_| own.len() > 1) {
             return Err(Error::new(format!(
-                "sensor {:?} is known by its clouds: expected a front end of its own, found one of {} sensors",
+                "sensor {:?} gives clouds: expected a front end of its own, found one of {} sensors",
                 sensor.name,
                 own.len()
             )));

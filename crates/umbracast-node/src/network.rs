@@ -154,14 +154,13 @@ impl Network {
         let guarded = self.users_file.is_some() || self.tls.as_ref().is_some_and(|tls| tls.both);
         if !self.roles.is_empty() && !guarded {
             return Err(Error::new(
-                "network.roles: expected a users_file, or tls with both = true, beside it: without them nobody says who \
-                 they are",
+                "network.roles: expected a users_file, or tls with both = true, beside it, which tell users apart",
             ));
         }
         let unknown = self.connect.iter().find(|endpoint| !endpoint.starts_with("tls/"));
         if let Some(endpoint) = unknown.filter(|_| !self.roles.is_empty()) {
             return Err(Error::new(format!(
-                "network.connect: expected tls/ endpoints beside roles, as their certificates say who answers, found \
+                "network.connect: expected tls/ endpoints beside roles, because only a certificate shows who answers, found \
                  {endpoint:?}"
             )));
         }
@@ -274,9 +273,7 @@ impl Network {
         let meeting = format!("tcp/{MEETING_POINT}");
         let called = if self.connect.is_empty() { &meeting } else { &self.connect.join(", ") };
         zenoh::open(config).wait().map_err(|_| {
-            Error::new(format!(
-                "network.connect: nobody at {called} answers, or lets in whoever has these credentials"
-            ))
+            Error::new(format!("network.connect: no answer from {called}, or it refuses these credentials"))
         })
     }
 

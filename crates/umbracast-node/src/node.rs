@@ -247,7 +247,7 @@ impl Node {
             let Source::Ros2(domain, topics) = source else {
                 let name = &first.name;
                 return Err(Error::new(format!(
-                    "sensor {name:?} is known by its clouds: expected a topic of them, found none"
+                    "sensor {name:?} gives clouds: expected a topic of them, found none"
                 )));
             };
             let clouds = Arc::new(Queue::new(CLOUDS_WAITING, WhenFull::DropOldest));

@@ -121,7 +121,7 @@ fn elsewhere(args: &TrainLstm) -> Error {
     let arguments =
         if args.arguments.is_empty() { "--out weights".to_owned() } else { args.arguments.join(" ") };
     Error::new(format!(
-        "the paper's LSTM is fitted by a program of its own, for its framework takes minutes to build; in the \
-         sources: cargo run --release --manifest-path train/Cargo.toml -- {arguments}"
+        "a program of its own fits the paper's LSTM, because its framework takes minutes to build; from the \
+         sources run: cargo run --release --manifest-path train/Cargo.toml -- {arguments}"
     ))
 }

@@ -152,7 +152,7 @@ fn best_loop(frame_s: f64, figures: &[Figure]) -> Result<(usize, usize), Error> 
     if fastest == 0.0 {
         let length_s = frame_s * figures.len() as f64;
         return Err(Error::new(format!(
-            "expected somebody who walks for {} s or longer, found {length_s} s without a step",
+            "expected a walk of {} s or longer, found {length_s} s without a step",
             STRIDE_S[0]
         )));
     }
