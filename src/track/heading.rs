@@ -7,7 +7,7 @@ use super::remembered::{Remembered, Words};
 use super::visibility::BodyView;
 use crate::detect::Detection;
 use crate::gait::WALKS_FROM_MPS;
-use crate::geometry::{DVec2, Obb};
+use crate::geometry::Obb;
 
 /// Variance of a heading that may be any: even over a turn.
 const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
@@ -20,10 +20,6 @@ const STANDING_TURN_RAD2PS: f64 = 0.5;
 /// 4 to 8 degrees from 0.3 on, no more than chance below.
 const SHOULDERS_FROM: f64 = 0.3;
 const SHOULDERS_RAD2: f64 = 0.17 * 0.17;
-/// Who never walked faces the room rather than its wall: with this chance where its middle lies straight across the shoulders, an
-/// even one where it lies along them or as near as this. An assumption: of 145 simulated people who stand before they walk 143 do.
-const FACES_ROOM: f64 = 0.8;
-const MIDDLE_M: f64 = 2.0;
 /// Where others hide more of a body, or so few returns are, its shoulders are not looked for.
 const SHOULDERS_FREE: f64 = 0.9;
 const SHOULDERS_POINTS: u32 = 12;
@@ -63,21 +59,6 @@ impl Heading {
             self.variance_rad2 += STANDING_TURN_RAD2PS * step_s;
         }
         self.variance_rad2 = self.variance_rad2.min(ANY_HEADING_RAD2);
-    }
-
-    /// Whether one way is as likely as the other.
-    pub(super) fn is_either(&self) -> bool {
-        self.behind == EITHER
-    }
-
-    /// Of two ways that are alike the one that looks into the room, whose middle lies there, is likelier.
-    pub(super) fn face_room(&mut self, to_middle_m: DVec2) {
-        let reach_m = to_middle_m.length().max(MIDDLE_M);
-        let ahead = DVec2::from_angle(self.mean_rad).dot(to_middle_m) / reach_m;
-        if ahead < 0.0 {
-            self.mean_rad = turned(self.mean_rad + PI);
-        }
-        self.behind = EITHER - (FACES_ROOM - EITHER) * ahead.abs();
     }
 
     /// Learns from the shoulders of who stands, where they can be seen.
@@ -153,23 +134,12 @@ mod tests {
     }
 
     #[test]
-    fn who_never_walked_faces_one_way_or_the_other_across_the_shoulders() {
+    fn who_never_walked_faces_either_way_across_the_shoulders_wherever_the_hall_s_middle_is() {
         let mut heading = Heading::ANY;
         stand(&mut heading, 0.3, 0.0, 10);
         let off_rad = (heading.mean_rad - 0.3 - FRAC_PI_2).rem_euclid(PI);
         assert!(off_rad.min(PI - off_rad) < 1e-9, "{heading:?}");
         assert!(heading.behind == EITHER && heading.sigma_rad() < 0.2, "{heading:?}");
-        for to_middle_m in
-            [DVec2::from_angle(0.3 + FRAC_PI_2) * 9.0, DVec2::from_angle(0.3 - FRAC_PI_2) * 9.0]
-        {
-            let mut heading = heading;
-            heading.face_room(to_middle_m);
-            assert!(DVec2::from_angle(heading.mean_rad).dot(to_middle_m) > 8.9, "{heading:?}");
-            assert!((heading.behind - 0.2).abs() < 1e-9, "{heading:?}");
-        }
-        let mut beside = heading;
-        beside.face_room(DVec2::from_angle(0.3) * 9.0);
-        assert!((beside.behind - 0.5).abs() < 1e-9, "{beside:?}");
     }
 
     #[test]

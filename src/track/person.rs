@@ -262,9 +262,6 @@ impl Person {
         let state = self.filter.state();
         let (position_m, velocity_mps) = (state.position_m(), state.velocity_mps());
         self.heading.follow(&state, step_s);
-        if self.heading.is_either() {
-            self.heading.face_room(hall.middle_m() - position_m);
-        }
         self.observed.push(time_ns, position_m, velocity_mps);
         observed.clone_from(&self.observed.0);
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));

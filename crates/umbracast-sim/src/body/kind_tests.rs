@@ -20,7 +20,7 @@ fn walker(kind: Kind, seed: u64) -> Walker {
         300..400 => DVec2::ZERO,
         _ => DVec2::new(0.0, 1.0),
     };
-    Walker::of_kind(way(600, velocity), seed, kind)
+    Walker::of_kind(way(600, velocity), seed, kind).looking_ahead()
 }
 
 /// With this velocity in each of so many steps.

@@ -93,7 +93,7 @@ fn a_foot_is_always_on_the_floor_and_what_touches_it_does_not_slide() {
 
 #[test]
 fn a_stopped_person_rests_on_both_feet_beside_each_other() {
-    let walker = Walker::new(walks().remove(3).1, 13);
+    let walker = Walker::new(walks().remove(3).1, 13).looking_ahead();
     let mesh = meshes(&walker).pop().unwrap();
     let middle = |foot: usize| Aabb::around(part(foot).map(|v| mesh[v])).center_m();
     let apart = middle(FEET[0]) - middle(FEET[1]);
@@ -103,7 +103,7 @@ fn a_stopped_person_rests_on_both_feet_beside_each_other() {
 
 #[test]
 fn arms_swing_against_the_legs() {
-    let walker = Walker::new(walks().remove(1).1, 14);
+    let walker = Walker::new(walks().remove(1).1, 14).looking_ahead();
     let mut sum = [0.0; 2];
     for (i, mesh) in meshes(&walker).iter().enumerate() {
         let axis = walker.state_at(i as i64 * STEP_NS).unwrap().position_m.x;
@@ -133,7 +133,7 @@ fn heading_follows_the_way_is_held_standing_and_turns_no_faster_than_a_body() {
         t if t < 4.0 => DVec2::ZERO,
         _ => DVec2::new(-1.0, 0.0),
     });
-    let walker = Walker::new(turning, 16);
+    let walker = Walker::new(turning, 16).looking_ahead();
     let heading = |time_s: f64| walker.state_at((time_s * 1e9) as i64).unwrap().heading_rad;
     assert!((heading(1.0) - PI / 2.0).abs() < 1e-6);
     assert!((heading(3.0) - PI / 2.0).abs() < 1e-6);
@@ -183,7 +183,7 @@ fn a_walking_body_keeps_below_its_standing_height_and_near_it() {
 
 #[test]
 fn a_moved_mesh_is_the_walking_one_elsewhere() {
-    let walker = Walker::new(walks().remove(1).1, 18);
+    let walker = Walker::new(walks().remove(1).1, 18).looking_ahead();
     let (mut here, mut there) = (Vec::new(), Vec::new());
     walker.mesh_at(1_000_000_000, &mut here);
     walker.mesh_moved(1_000_000_000, DVec2::new(3.0, -2.0), PI / 2.0, &mut there);

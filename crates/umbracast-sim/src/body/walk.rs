@@ -6,11 +6,10 @@
 //! published gait alone slides by 0.2 to 0.4 m a step). Before and after its samples the trajectory is
 //! continued evenly, so that a person who starts at walking speed has walked before.
 
-use std::f64::consts::{PI, TAU};
-
 use umbracast::geometry::DVec2;
 
 use super::build::Build;
+use super::facing;
 use super::feet::{self, Footprint};
 use super::gait::{self, STRIDE};
 use super::skeleton::{FootPose, PelvisPose};
@@ -24,8 +23,6 @@ const PAD: usize = 300;
 const STANDING_MPS: f64 = 0.1;
 /// Velocity is smoothed by a Gaussian of this width: a crowd model may turn at once, a body may not.
 const SMOOTHING_S: f64 = 0.15;
-/// A body turns no faster than 200 degrees a second.
-const TURN_RATE_RADPS: f64 = 3.5;
 /// Feet that are not under a standing body step there at this many strides a second.
 const SETTLE_HZ: f64 = 0.9;
 /// A foot this near to its place under a standing body may stay.
@@ -58,11 +55,12 @@ pub struct Walk {
 }
 
 impl Walk {
-    /// Plans the walk of a body; `first_phase` in [0, 1) tells people apart who start together.
-    pub fn plan(trajectory: &Trajectory, build: &Build, first_phase: f64) -> Self {
+    /// Plans the walk of a body; `first_phase` in [0, 1) tells people apart who start together, and `seed` draws where they
+    /// face. Without one they face along their way, and hold that while they stand.
+    pub fn plan(trajectory: &Trajectory, build: &Build, first_phase: f64, seed: Option<u64>) -> Self {
         let positions = padded(trajectory);
         let velocities = smoothed(&positions);
-        let headings = headings(&velocities);
+        let headings = facing::headings(&velocities, STEP_S, STANDING_MPS, seed);
         let mut walk = Self {
             start_ns: trajectory.start_ns - PAD as i64 * STEP_NS,
             instants: velocities
@@ -288,22 +286,6 @@ fn smoothed(positions: &[DVec2]) -> Vec<DVec2> {
             let pair = |k: usize| velocities[i.saturating_sub(k)] + velocities[(i + k).min(last)];
             let sum = velocities[i] * weights[0] + (1..=half).map(|k| pair(k) * weights[k]).sum::<DVec2>();
             sum / total
-        })
-        .collect()
-}
-
-/// Headings along the velocity, held while standing, turning no faster than a body does.
-fn headings(velocities: &[DVec2]) -> Vec<f64> {
-    let walks = |v: &&DVec2| v.length() >= STANDING_MPS;
-    let mut heading = velocities.iter().find(walks).map_or(0.0, |v| v.to_angle());
-    velocities
-        .iter()
-        .map(|v| {
-            if v.length() >= STANDING_MPS {
-                let turn = (v.to_angle() - heading + PI).rem_euclid(TAU) - PI;
-                heading += turn.clamp(-TURN_RATE_RADPS * STEP_S, TURN_RATE_RADPS * STEP_S);
-            }
-            heading
         })
         .collect()
 }

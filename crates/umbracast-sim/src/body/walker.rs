@@ -46,6 +46,7 @@ pub struct Walker {
     pub build: Build,
     shape: Shape,
     pub(super) walk: Walk,
+    first_phase: f64,
     holds: Holds,
     /// In place of what the hands hold.
     gestures: Option<Gestures>,
@@ -75,7 +76,9 @@ impl Walker {
         };
         let things = things::of(kind, &build, seed);
         let first_phase: f64 = stream(seed, "phase", 0).random();
-        let walk = Walk::plan(&trajectory, &build, first_phase);
+        // Feet of who sits stay where they are.
+        let faces = (kind != Kind::Sitting).then_some(seed);
+        let walk = Walk::plan(&trajectory, &build, first_phase, faces);
         let still = gait::upper_body(0.0, 0.0);
         let (hips_m, feet) = match things.seat_m {
             Some(seat_m) => (seat_m, things::feet_on_rests(&build, DVec2::ZERO, 0.0)),
@@ -92,6 +95,7 @@ impl Walker {
             gestures: (kind == Kind::Gesturing).then(|| Gestures::draw(seed)),
             sitting: (kind == Kind::Sitting).then(|| Sitting::plan(&walk)),
             walk,
+            first_phase,
             seat_m: things.seat_m,
             gait: None,
             upright,
@@ -104,6 +108,13 @@ impl Walker {
     pub fn with_gait(mut self, gait: Arc<Gait>) -> Self {
         self.walk.keep_pace(gait.stride_m(&self.build));
         self.gait = Some(gait);
+        self
+    }
+
+    /// The same body, facing along its way and holding that while it stands.
+    #[must_use]
+    pub fn looking_ahead(mut self) -> Self {
+        self.walk = Walk::plan(&self.trajectory, &self.build, self.first_phase, None);
         self
     }
 

@@ -79,7 +79,7 @@ mod tests {
             arrived_ns: None,
             height_m: Some(1.75),
         };
-        Walker::new(way, u64::from(person))
+        Walker::new(way, u64::from(person)).looking_ahead()
     }
 
     fn site() -> Site {
