@@ -57,6 +57,7 @@ const JOBS: [Job; 39] = [
     job("forecasts", "the residual beside a constant velocity", Needs::Data, crowds::forecasts),
     job("calibrate", "sensors that hang elsewhere than the file says, found again", Needs::Nothing, calibrate::calibrate),
     job("following", "a sensor screwed on askew, one that slips", Needs::Nothing, calibrate::following),
+    job("rooms", "floors of random rooms, found or told, with every sensor model", Needs::Nothing, calibrate::rooms),
     job("clocks", "sensors' clocks apart, found while people walk", Needs::Nothing, calibrate::clocks),
     job("tripods", "from two sensors on tripods to warnings, command by command", Needs::Nothing, calibrate::tripods),
     job("logictronix", "real people before a real VLP-16", Needs::Data, crowds::logictronix),

@@ -33,6 +33,8 @@ pub struct Calibration {
     pub weak: Vec<Weak>,
     /// What was found and what was not, for a reader.
     pub told: Vec<String>,
+    /// What may be wrong, and wants a look before the poses are used.
+    pub doubts: Vec<String>,
     /// What each sensor has seen, in its level frame.
     #[serde(skip)]
     pub seen: Vec<Seen>,
@@ -117,7 +119,7 @@ pub fn fit(
     levels: &[(Option<Level>, Level)],
     mut seen: Vec<Seen>,
 ) -> Result<Calibration, Error> {
-    let mut told = Vec::new();
+    let (mut told, mut doubts) = (Vec::new(), Vec::new());
     let (start, links) = linked(site, &mut seen, &mut told);
     let no_solution = || Error::new("calibrate: expected a fit with a solution, found none");
     let by_people = joint::solve(&seen, &start, outline).ok_or_else(no_solution)?;
@@ -152,7 +154,14 @@ pub fn fit(
             ..at_place
         };
         if floor.is_none() {
-            told.push(format!("{}: no floor was seen; height, pitch and roll stay as given", sensor.name));
+            doubts.push(format!("{}: no floor was seen; height, pitch and roll stay as given", sensor.name));
+        }
+        if level.far_from_file {
+            doubts.push(format!(
+                "{}: the floor lies {:.2} m below the sensor, and the site file says {:.2} m; nothing that may be a floor was \
+                 seen at that height; one of the two is wrong",
+                sensor.name, level.height_m, sensor.position_m[2]
+            ));
         }
         if in_plan(0).is_none() {
             told.push(format!("{}: yaw, x and y stay as given: neither people nor walls tell", sensor.name));
@@ -161,7 +170,15 @@ pub fn fit(
     };
     let sensors = site.sensors.iter().enumerate().map(found).collect();
     let weak = weak(site, &seen, &links, &solution.covariance);
-    Ok(Calibration { sensors, joint_sightings: solution.joint, apart_m: solution.apart_m, weak, told, seen })
+    Ok(Calibration {
+        sensors,
+        joint_sightings: solution.joint,
+        apart_m: solution.apart_m,
+        weak,
+        told,
+        doubts,
+        seen,
+    })
 }
 
 /// Groups the sensors by the people they share, and lays every group together, the first where the site file has it.

@@ -1,4 +1,4 @@
-//! Where a sensor sees the floor: the largest nearly level plane below it, and how the sensor is turned against it.
+//! Where a sensor sees the floor: the nearly level plane below it that may be walked on, and how the sensor is turned against it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,7 +21,17 @@ const CELL_FEWEST: usize = 3;
 /// A square that lies off by more than this times the usual is a step, a mat, the foot of a wall.
 const OFF_MAX: f64 = 3.0;
 /// A floor has so many of the returns at least; a sensor that looks along the hall sees more walls than floor.
-const FEWEST: usize = 300;
+const FEWEST: usize = 100;
+/// Below a floor nothing is seen, and people walk on it: what lies on a plane is of a wall where so much is seen in the same
+/// square below the plane, or as high above it as a body is.
+const BELOW_M: f64 = 0.2;
+const BODY_M: std::ops::Range<f64> = 0.3..1.5;
+/// A floor that is left has such squares, so many at least.
+const SQUARES_FEWEST: usize = 8;
+/// The site file errs by no more than that in height, metres: a floor within it is looked for first.
+const FILE_M: f64 = 0.9;
+/// No sensor lies nearer to its floor, metres; a ring of returns on the walls lies in a plane through the sensor.
+const LOWEST_M: f64 = 0.2;
 
 /// The plane z = slope_x x + slope_y y + z_m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +52,8 @@ pub struct Level {
     pub roll_rad: f64,
     /// One standard deviation of height (metres), pitch and roll (radians).
     pub sigma: [f64; 3],
+    /// True where no floor is at about the height that the site file has, and another plane was taken.
+    pub far_from_file: bool,
 }
 
 impl Level {
@@ -62,8 +74,12 @@ pub fn level(points_m: &[DVec3], guess: &Pose) -> Option<Level> {
     for _ in 0..3 {
         let moved: Vec<DVec3> = points_m.iter().map(|&point| level_from_sensor.point(point)).collect();
         let sensor_m = level_from_sensor.translation_m;
-        let floor = find(&moved, sensor_m)?;
-        let (floor, sigma) = even(&floor, &moved)?;
+        let ground = Ground::new(&moved);
+        let near_file = |height_m: f64| (height_m - guess.translation_m.z).abs() < FILE_M;
+        let at_file = ground.floor(sensor_m, near_file);
+        let far_from_file = at_file.is_none();
+        let floor = at_file.or_else(|| ground.floor(sensor_m, |_| true))?;
+        let (floor, sigma) = even(&floor, &ground.borne_m(&floor))?;
         let up = DVec3::new(-floor.slope_x, -floor.slope_y, 1.0).normalize();
         let up = level_from_sensor.rotation.transpose() * up;
         let found = Level {
@@ -71,6 +87,7 @@ pub fn level(points_m: &[DVec3], guess: &Pose) -> Option<Level> {
             pitch_rad: (-up.x).clamp(-1.0, 1.0).asin(),
             roll_rad: up.y.atan2(up.z),
             sigma,
+            far_from_file,
         };
         level_from_sensor = found.level_from_sensor();
         level = Some(found);
@@ -83,8 +100,7 @@ pub fn level(points_m: &[DVec3], guess: &Pose) -> Option<Level> {
 fn even(floor: &Floor, points_m: &[DVec3]) -> Option<(Floor, [f64; 3])> {
     let mut cells: BTreeMap<(i64, i64), (DVec3, usize)> = BTreeMap::new();
     for point in points_m.iter().filter(|point| floor.height_of_m(**point).abs() < NEAR_M) {
-        let key = |m: f64| (m / CELL_M).floor() as i64;
-        let (sum_m, count) = cells.entry((key(point.x), key(point.y))).or_default();
+        let (sum_m, count) = cells.entry(square(*point)).or_default();
         *sum_m += *point;
         *count += 1;
     }
@@ -116,35 +132,109 @@ impl Floor {
         (self.slope_x * cos + self.slope_y * sin).atan().to_degrees()
     }
 
+    /// How high it lies below or above a point.
+    fn z_m(&self, point_m: DVec3) -> f64 {
+        self.slope_x * point_m.x + self.slope_y * point_m.y + self.z_m
+    }
+
     /// How far a point is from it, positive above.
     pub fn height_of_m(&self, point_m: DVec3) -> f64 {
-        let above_m = point_m.z - (self.slope_x * point_m.x + self.slope_y * point_m.y + self.z_m);
+        let above_m = point_m.z - self.z_m(point_m);
         above_m / (1.0 + self.slope_x.powi(2) + self.slope_y.powi(2)).sqrt()
     }
 }
 
 /// The floor among returns in the site's frame, as the sensor's pose puts them there; `None` where too few lie on any
-/// nearly level plane below `sensor_m`. The same returns give the same floor.
+/// nearly level plane below `sensor_m` that may carry people. The same returns give the same floor.
 pub fn find(points_m: &[DVec3], sensor_m: DVec3) -> Option<Floor> {
-    let mut cubes = BTreeSet::new();
-    let mut spread = points_m.to_vec();
-    spread.retain(|point| cubes.insert((*point / CUBE_M).floor().to_array().map(|edge| edge as i64)));
-    let every = spread.len().div_ceil(TRIED_ON).max(1);
-    let tried: Vec<DVec3> = spread.iter().step_by(every).copied().collect();
-    let on = |floor: &Floor, points: &[DVec3]| -> usize {
-        points.iter().filter(|point| floor.height_of_m(**point).abs() < NEAR_M).count()
-    };
-    let best = (0..TRIES)
-        .filter_map(|k| plane([draw(&tried, 3 * k)?, draw(&tried, 3 * k + 1)?, draw(&tried, 3 * k + 2)?]))
-        .filter(|floor| floor.tilt_deg() < STEEPEST_DEG && floor.height_of_m(sensor_m) > 0.0)
-        .max_by_key(|floor| on(floor, &tried))?;
-    let floor = fitted(&fitted(&best, points_m)?, points_m)?;
-    (on(&floor, points_m) >= FEWEST).then_some(floor)
+    Ground::new(points_m).floor(sensor_m, |_| true)
+}
+
+/// Returns, and how high others lie in the same square of the plan.
+struct Ground {
+    /// Each with its square.
+    points_m: Vec<(DVec3, usize)>,
+    /// Of each square all heights, lowest first.
+    heights_m: Vec<Vec<f64>>,
+}
+
+impl Ground {
+    fn new(points_m: &[DVec3]) -> Self {
+        let mut squares = BTreeMap::new();
+        let mut heights_m: Vec<Vec<f64>> = Vec::new();
+        let of = |point: &DVec3| {
+            let next = squares.len();
+            let square = *squares.entry(square(*point)).or_insert(next);
+            if square == heights_m.len() {
+                heights_m.push(Vec::new());
+            }
+            heights_m[square].push(point.z);
+            (*point, square)
+        };
+        let points_m = points_m.iter().map(of).collect();
+        heights_m.iter_mut().for_each(|of| of.sort_unstable_by(f64::total_cmp));
+        Self { points_m, heights_m }
+    }
+
+    /// True where a return is of the plane and its square may be walked on. A ring of returns on walls lies in a plane too,
+    /// but its squares have returns of other beams below and above.
+    fn bears(&self, floor: &Floor, (point_m, square): &(DVec3, usize)) -> bool {
+        if floor.height_of_m(*point_m).abs() >= NEAR_M {
+            return false;
+        }
+        let below = |z_m: f64| self.heights_m[*square].partition_point(|of_m| *of_m < z_m);
+        let z_m = floor.z_m(*point_m);
+        let [lower, feet, head] = [z_m - BELOW_M, z_m + BODY_M.start, z_m + BODY_M.end].map(below);
+        let on = feet - lower;
+        10 * lower <= on && 2 * (head - feet) <= on
+    }
+
+    fn borne_m(&self, floor: &Floor) -> Vec<DVec3> {
+        self.points_m.iter().filter(|point| self.bears(floor, point)).map(|(point_m, _)| *point_m).collect()
+    }
+
+    /// The plane that bears most, among those above which the sensor hangs as high as `may_be` says, metres.
+    fn floor(&self, sensor_m: DVec3, may_be: impl Fn(f64) -> bool) -> Option<Floor> {
+        let is_floor = |floor: &Floor| {
+            let height_m = floor.height_of_m(sensor_m);
+            height_m > LOWEST_M && may_be(height_m) && floor.tilt_deg() < STEEPEST_DEG
+        };
+        let mut cubes = BTreeSet::new();
+        let mut spread = self.points_m.clone();
+        spread.retain(|(point_m, _)| {
+            cubes.insert((*point_m / CUBE_M).floor().to_array().map(|edge| edge as i64))
+        });
+        let every = spread.len().div_ceil(TRIED_ON).max(1);
+        let tried: Vec<(DVec3, usize)> = spread.iter().step_by(every).copied().collect();
+        // What is the floor's is the lowest of its square: a sensor that sees little of it draws few planes from walls.
+        let is_lowest =
+            |(point_m, square): &&(DVec3, usize)| point_m.z - self.heights_m[*square][0] < BELOW_M;
+        let lowest: Vec<(DVec3, usize)> = tried.iter().filter(is_lowest).copied().collect();
+        let planes = (0..TRIES)
+            .filter_map(|k| {
+                let [a, b, c] = [3 * k, 3 * k + 1, 3 * k + 2].map(|k| draw(&lowest, k));
+                plane([a?.0, b?.0, c?.0])
+            })
+            .filter(is_floor);
+        let best =
+            planes.max_by_key(|floor| tried.iter().filter(|point| self.bears(floor, point)).count())?;
+        let floor = plane_through(&self.borne_m(&best))?.0;
+        let borne_m = self.borne_m(&floor);
+        let floor = plane_through(&borne_m)?.0;
+        let squares: BTreeSet<_> = borne_m.iter().map(|point_m| square(*point_m)).collect();
+        (borne_m.len() >= FEWEST && squares.len() >= SQUARES_FEWEST && is_floor(&floor)).then_some(floor)
+    }
+}
+
+/// The square of the plan that a point lies in.
+fn square(point_m: DVec3) -> (i64, i64) {
+    let key = |m: f64| (m / CELL_M).floor() as i64;
+    (key(point_m.x), key(point_m.y))
 }
 
 /// Any of the points, as if at random: a hash that mixes well (the end of MurmurHash3), for with a plain one the three
 /// of a plane always lie equally far apart, and never all on the floor ahead of a sensor on a wall.
-fn draw(points: &[DVec3], k: u32) -> Option<DVec3> {
+fn draw<T: Copy>(points: &[T], k: u32) -> Option<T> {
     let mut hash = k.wrapping_add(1);
     for (shift, factor) in [(16, 0x85eb_ca6b_u32), (13, 0xc2b2_ae35)] {
         hash = (hash ^ (hash >> shift)).wrapping_mul(factor);
@@ -161,12 +251,6 @@ fn plane([a, b, c]: [DVec3; 3]) -> Option<Floor> {
     }
     let (slope_x, slope_y) = (-normal.x / normal.z, -normal.y / normal.z);
     Some(Floor { slope_x, slope_y, z_m: a.z - slope_x * a.x - slope_y * a.y })
-}
-
-/// By least squares through the points near to it.
-fn fitted(floor: &Floor, points_m: &[DVec3]) -> Option<Floor> {
-    let near = points_m.iter().filter(|point| floor.height_of_m(**point).abs() < NEAR_M);
-    Some(plane_through(&near.copied().collect::<Vec<_>>())?.0)
 }
 
 /// By least squares; with the inverse of the normal matrix of slopes and height.

@@ -147,6 +147,7 @@ fn as_given(sensor: &umbracast::site::Sensor) -> Level {
         pitch_rad: sensor.rotation_deg.pitch.to_radians(),
         roll_rad: sensor.rotation_deg.roll.to_radians(),
         sigma: [f64::NAN; 3],
+        far_from_file: false,
     }
 }
 

@@ -133,7 +133,15 @@ mod tests {
     }
 
     fn calibration(sensors: Vec<Found>) -> Calibration {
-        Calibration { sensors, joint_sightings: 0, apart_m: 0.0, weak: vec![], told: vec![], seen: vec![] }
+        Calibration {
+            sensors,
+            joint_sightings: 0,
+            apart_m: 0.0,
+            weak: vec![],
+            told: vec![],
+            doubts: vec![],
+            seen: vec![],
+        }
     }
 
     #[test]

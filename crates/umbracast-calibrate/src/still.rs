@@ -58,11 +58,13 @@ impl Still {
         }
     }
 
-    /// One point a direction, in the sensor's frame: that of the middle range, so that who passes by is none.
+    /// One point a direction, in the sensor's frame: that of the middle range, so that who passes by is none. Of two in the
+    /// middle every other direction takes the nearer: the farther of both would lay the floor too low.
     pub fn points_m(mut self) -> Vec<DVec3> {
         self.returns.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let same = self.returns.chunk_by(|a, b| a.0 == b.0);
-        same.map(|one| DVec3::from(one[one.len() / 2].2.map(f64::from))).collect()
+        let middle = |one: &[(u32, f32, [f32; 3])]| (one.len() - (one[0].0 & 1) as usize) / 2;
+        same.map(|one| DVec3::from(one[middle(one)].2.map(f64::from))).collect()
     }
 }
 
@@ -71,6 +73,29 @@ mod tests {
     use super::*;
     use umbracast::geometry::Pose;
     use umbracast::lidar::SensorPoint;
+
+    /// Two revolutions, one range a centimetre above and one below: the mean over directions is the range.
+    #[test]
+    fn the_middle_of_an_even_count_is_not_the_farther() {
+        let mut still = Still::default();
+        for range_m in [7.99_f64, 8.01] {
+            let at = |k: i32| SensorPoint {
+                position_m: [
+                    range_m * (0.0035 * f64::from(k)).cos(),
+                    range_m * (0.0035 * f64::from(k)).sin(),
+                    0.01,
+                ]
+                .map(|m| m as f32),
+                time_ns: 0,
+                reflectivity: 1.0,
+            };
+            let cloud = Cloud::Unorganised((0..400).map(at).collect());
+            still.take(&Scan { sensor: 0, site_from_sensor: Pose::IDENTITY, cloud });
+        }
+        let points = still.points_m();
+        let mean_m = points.iter().map(|point| point.length()).sum::<f64>() / points.len() as f64;
+        assert!((mean_m - 8.0).abs() < 0.002, "{mean_m}");
+    }
 
     #[test]
     fn who_passes_by_does_not_lie_still() {

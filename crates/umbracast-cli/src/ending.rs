@@ -7,6 +7,8 @@ pub enum Ending {
     Done,
     /// What was looked at is wrong, as was said.
     Wrong,
+    /// What was found may be wrong; says what.
+    Doubtful(String),
     /// Something was lost or skipped; says what.
     DataLost(String),
 }

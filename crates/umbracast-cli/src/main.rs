@@ -55,6 +55,10 @@ fn main() -> ExitCode {
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Wrong) => ExitCode::FAILURE,
+        Ok(Ending::Doubtful(what)) => {
+            eprintln!("umbracast: done, but look at this before you use the result: {what}");
+            ExitCode::from(3)
+        }
         Ok(Ending::DataLost(what)) => {
             eprintln!("umbracast: done, but data was lost: {what}");
             ExitCode::from(3)

@@ -8,6 +8,7 @@ use super::keep;
 use crate::tools::{Result, argument, root};
 
 const EXAMPLE: &str = "cargo run --release --quiet --package umbracast-calibrate --example hung -- 200000 20";
+const ROOMS: &str = "cargo run --release --quiet --package umbracast-calibrate --example rooms -- 200000 400";
 const BY_EYE: &str = "config/sites/hand-mounted.toml";
 
 /// Errors over 20 scenes of each kind; then F1 with the true poses, with those of a file that is off, and with those that
@@ -45,6 +46,14 @@ pub fn calibrate(book: &mut Book) -> Result<()> {
         book.score(name, [argument(&out), "--truth".into(), argument(&scenes)])?;
     }
     book.compare()
+}
+
+/// Floors of random rooms and corridors, with every sensor model: right, wrong, and wrong without a word.
+pub fn rooms(book: &mut Book) -> Result<()> {
+    book.command(ROOMS);
+    let said = book.bash(&root(), ROOMS)?;
+    book.line(&said);
+    Ok(())
 }
 
 /// The commands of docs/TRIPODS.md, one after the other, by somebody without sensors.

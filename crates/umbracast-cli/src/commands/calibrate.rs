@@ -41,10 +41,15 @@ pub fn run(args: &Calibrate, common: &Common) -> Result<Ending, Error> {
         .with("apart_m", found.apart_m)
         .with("weak", &found.weak)
         .with("told", &found.told)
+        .with("doubts", &found.doubts)
         .with("health", health)
         .with("lost", &lost)
         .print(common, &told(&found, args, &picture));
-    Ok(if lost.is_empty() { Ending::Done } else { Ending::DataLost(lost.join("; ")) })
+    Ok(match (found.doubts.is_empty(), lost.is_empty()) {
+        (true, true) => Ending::Done,
+        (true, false) => Ending::DataLost(lost.join("; ")),
+        (false, _) => Ending::Doubtful(found.doubts.into_iter().chain(lost).collect::<Vec<_>>().join("; ")),
+    })
 }
 
 fn found(
