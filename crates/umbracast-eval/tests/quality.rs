@@ -12,6 +12,9 @@ use umbracast_sim::crowd::{Preset, circle_crossing};
 const WINDOW: usize = 3;
 const ACCESS_POINT: &str = "side";
 
+/// Scenes of each crowd: with one, a loss of several hundredths would not show.
+const SCENES: usize = 4;
+
 /// What a crowd must reach.
 struct Bounds {
     preset: Preset,
@@ -23,25 +26,26 @@ struct Bounds {
     ece: f64,
 }
 
-// Measured: F1 0.950, 0.951 and 0.720, onset F1 0.900, 0.895 and 0.605, MOTA 0.993, 0.993 and 0.903, ECE 0.015, 0.035 and
-// 0.123. Pairs 0.5 m apart below sensors at 6 m are hard, and their scores move more.
+// Measured: F1 0.950, 0.958 and 0.826, onset F1 0.881, 0.909 and 0.673, MOTA 0.993, 0.993 and 0.947, ECE 0.011, 0.019 and
+// 0.047. The same program gives the same figures to the digit, so the room below them is for changes of late digits alone: a
+// hundredth of F1, twice that of onsets, which are fewer.
 const BOUNDS: [Bounds; 3] = [
-    Bounds { preset: Preset::Orca03, site: "", f1: 0.93, onset_f1: 0.87, mota: 0.985, ece: 0.025 },
-    Bounds { preset: Preset::Mixed, site: "", f1: 0.93, onset_f1: 0.86, mota: 0.985, ece: 0.045 },
+    Bounds { preset: Preset::Orca03, site: "", f1: 0.94, onset_f1: 0.86, mota: 0.989, ece: 0.016 },
+    Bounds { preset: Preset::Mixed, site: "", f1: 0.948, onset_f1: 0.889, mota: 0.989, ece: 0.024 },
     Bounds {
         preset: Preset::Pairs,
         site: include_str!("../../../config/sites/height-6.toml"),
-        f1: 0.68,
-        onset_f1: 0.55,
-        mota: 0.87,
-        ece: 0.145,
+        f1: 0.815,
+        onset_f1: 0.652,
+        mota: 0.94,
+        ece: 0.052,
     },
 ];
 
 #[test]
 fn no_crowd_scores_below_its_bounds() {
     let mut fallen = Vec::new();
-    for (seed, bounds) in (100_000..).zip(&BOUNDS) {
+    for (seed, bounds) in (100_000..).step_by(SCENES).zip(&BOUNDS) {
         let group = scores(bounds, seed);
         let links = group.link(Some(Mode::Default), Predictor::Run, ACCESS_POINT).unwrap();
         let window = &links.windows[WINDOW - 1];
@@ -62,19 +66,22 @@ fn no_crowd_scores_below_its_bounds() {
     assert!(fallen.is_empty(), "{fallen:#?}");
 }
 
-/// Ten people cross a small circle, so that they meet after a few seconds; the scene ends when most have crossed.
-fn scores(bounds: &Bounds, seed: u64) -> Group {
-    let mut crowd = circle_crossing(bounds.preset, 10, 7.0, seed);
-    crowd.duration_ns = crowd.duration_ns.min(14_000_000_000);
-    let spec = Spec {
-        configs: vec![Config::with_overlay(Mode::Default, bounds.site, "site").unwrap()],
-        weights: None,
-        scenes: vec![SceneSpec {
+/// Ten people cross a small circle, so that they meet after a few seconds; a scene ends when most have crossed.
+fn scores(bounds: &Bounds, first_seed: u64) -> Group {
+    let scene = |seed: u64| {
+        let mut crowd = circle_crossing(bounds.preset, 10, 7.0, seed);
+        crowd.duration_ns = crowd.duration_ns.min(14_000_000_000);
+        SceneSpec {
             group: bounds.preset.name().to_owned(),
             seed,
             people: People::Replayed(crowd),
             bodies: Bodies::default(),
-        }],
+        }
+    };
+    let spec = Spec {
+        configs: vec![Config::with_overlay(Mode::Default, bounds.site, "site").unwrap()],
+        weights: None,
+        scenes: (first_seed..).take(SCENES).map(scene).collect(),
         keep: None,
         ladder: false,
     };
