@@ -1,6 +1,7 @@
 //! `cargo xtask NAME`: the repository's own tasks. Nothing here is part of the program.
 
 mod tools;
+mod answers;
 mod record;
 mod quote;
 mod same_tables;
@@ -11,8 +12,11 @@ use std::process::ExitCode;
 const USAGE: &str = "\
 cargo xtask record NAME...    make these files of record/ anew; `all` makes all but `locked`
     --dirty                       from a tree with changes; the record says so
+    --again                       with `all`: also those that are of the present program already
 cargo xtask record            list the names
 cargo xtask quote             cut every block of figures in README.md and docs/ anew from its record
+cargo xtask answers           whether the program answers what record/answers.txt keeps of it
+    --write                       keep what it answers now: records of before are then of an earlier program
 cargo xtask same-tables REV   whether a git revision and the working tree write the same tables, byte for byte
 cargo xtask structure         files and imports as a picture, docs/structure.svg, and in words
     --check                       write nothing; fail where the picture is stale or files of src/ use one another in a circle";
@@ -23,6 +27,8 @@ fn main() -> ExitCode {
     let result = match words.as_slice() {
         ["record", names @ ..] => record::run(names),
         ["quote"] => quote::run(),
+        ["answers"] => record::answers(false),
+        ["answers", "--write"] => record::answers(true),
         ["same-tables", revision] => same_tables::run(revision),
         ["structure"] => structure::run(false),
         ["structure", "--check"] => structure::run(true),

@@ -8,23 +8,30 @@
 //!
 //! Each line of the comment is one rule: first what a line of the record begins with, then, between bars, what further
 //! lines up to the next empty one begin with. A star stands for anything. Only a comment that has rules is followed.
+//!
+//! A block whose record has another digest of the program's answers than `record/answers.txt` ([`crate::answers`]), or none, is
+//! marked as of an earlier program.
 
 use std::fs;
 
+use crate::answers;
 use crate::tools::{Result, files_below, root};
 
 /// What a comment of a quoted block begins with.
 const MARK: &str = "<!-- from ";
 const FENCE: &str = "```";
+/// Stands above a block whose figures the present program may not give.
+const EARLIER: &str = "*These figures are of an earlier program.*";
 
 /// Rewrites README.md and the pages of docs/. Fails, once all that can be is written, where a rule finds nothing.
 pub fn run() -> Result<()> {
     let mut missing = Vec::new();
+    let present = present_digest()?;
     for page in [vec![root().join("README.md")], files_below(&root().join("docs"), ".md")].concat() {
         let name = page.strip_prefix(root()).unwrap_or(&page).display().to_string();
         let text = fs::read_to_string(&page).map_err(|e| format!("{name}: {e}"))?;
         let told = |what: String| missing.push(format!("{name}: {what}"));
-        let renewed = renewed(&text, |record| fs::read_to_string(root().join(record)).ok(), told);
+        let renewed = renewed(&text, &present, |record| fs::read_to_string(root().join(record)).ok(), told);
         if renewed != text {
             fs::write(&page, renewed).map_err(|e| format!("{name}: {e}"))?;
             println!("{name}");
@@ -33,8 +40,25 @@ pub fn run() -> Result<()> {
     if missing.is_empty() { Ok(()) } else { Err(format!("quote:\n{}", missing.join("\n"))) }
 }
 
+/// That of the answers that are kept.
+pub fn present_digest() -> Result<String> {
+    let kept =
+        fs::read_to_string(root().join(answers::FILE)).map_err(|e| format!("{}: {e}", answers::FILE))?;
+    Ok(answers::digest(&kept))
+}
+
+/// Whether a record was made by a program that gave these answers.
+pub fn is_of(record: &str, digest: &str) -> bool {
+    record.lines().any(|line| line == format!("# answers {digest}"))
+}
+
 /// The page with every block cut anew. A block whose record is not there, or of which nothing is found, stays.
-fn renewed(page: &str, record: impl Fn(&str) -> Option<String>, mut missing: impl FnMut(String)) -> String {
+fn renewed(
+    page: &str,
+    present: &str,
+    record: impl Fn(&str) -> Option<String>,
+    mut missing: impl FnMut(String),
+) -> String {
     let mut parts = page.split(MARK);
     let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
@@ -43,6 +67,10 @@ fn renewed(page: &str, record: impl Fn(&str) -> Option<String>, mut missing: imp
         let mut lines = comment.lines().map(str::trim).filter(|line| !line.is_empty());
         let name = lines.next().unwrap_or_default();
         let rules: Vec<&str> = lines.collect();
+        let part = &match record(name) {
+            Some(record) => marked(part, !is_of(&record, present)),
+            None => part.to_owned(),
+        };
         let place = opened(part);
         let (Some((from, to)), false) = (place, rules.is_empty()) else {
             text += part;
@@ -64,6 +92,17 @@ fn renewed(page: &str, record: impl Fn(&str) -> Option<String>, mut missing: imp
         }
     }
     text
+}
+
+/// With or without the mark, which stands between a comment and the block right below it.
+fn marked(part: &str, earlier: bool) -> String {
+    let Some((comment, rest)) = part.split_once("-->") else { return part.to_owned() };
+    let Some((between, _)) = rest.split_once(FENCE) else { return part.to_owned() };
+    if !between.replace(EARLIER, "").trim().is_empty() {
+        return part.to_owned();
+    }
+    let mark = if earlier { format!("\n\n{EARLIER}\n\n") } else { "\n".to_owned() };
+    format!("{comment}-->{mark}{}", &rest[between.len()..])
 }
 
 /// From where to where the inside of the first block lies, its line ends included.
@@ -122,13 +161,54 @@ mod tests {
     fn a_block_is_cut_anew_and_the_rest_stays() {
         let page = "Before.\n<!-- from record/a.txt\n$ umbracast | mode | ours\nDetection | *\n-->\n\
                     ```text\nours   .50\n```\nAfter.\n<!-- from record/b.txt -->\n```text\nx\n```\n";
-        let new =
-            renewed(page, |name| (name == "record/a.txt").then(|| RECORD.to_owned()), |m| panic!("{m}"));
+        let record = |name: &str| (name == "record/a.txt").then(|| format!("# answers 12ab\n{RECORD}"));
+        let new = renewed(page, "12ab", record, |m| panic!("{m}"));
         let block =
             "```text\n$ umbracast evaluate\nmode   F1\nours   .94\n\nDetection\nours   .99\n```\nAfter.";
         assert!(new.contains(block), "{new}");
         assert!(new.starts_with("Before.\n<!-- from record/a.txt\n$ umbracast | mode"), "{new}");
         assert!(new.ends_with("<!-- from record/b.txt -->\n```text\nx\n```\n"), "{new}");
+    }
+
+    #[test]
+    fn a_block_of_an_earlier_program_is_marked_until_its_record_is_made_anew() {
+        let page =
+            "<!-- from record/a.txt\n$ umbracast | mode | ours\n-->\n```text\nours   .50\n```\nAfter.\n";
+        let of = |digest: &'static str| move |_: &str| Some(format!("# answers {digest}\n{RECORD}"));
+        let stale = renewed(page, "12ab", of("99ff"), |m| panic!("{m}"));
+        assert_eq!(stale.matches("an earlier program").count(), 1, "{stale}");
+        assert!(stale.contains("```text\n$ umbracast evaluate\nmode   F1\nours   .94\n```"), "{stale}");
+        assert_eq!(renewed(&stale, "12ab", of("99ff"), |m| panic!("{m}")), stale);
+        let fresh = renewed(&stale, "12ab", of("12ab"), |m| panic!("{m}"));
+        assert!(!fresh.contains("an earlier program") && fresh.contains("-->\n```text\n"), "{fresh}");
+        let without = renewed(page, "12ab", |_| Some(RECORD.to_owned()), |m| panic!("{m}"));
+        assert!(without.contains("an earlier program"), "{without}");
+    }
+
+    /// The figures that a stranger sees first are of the present program, and every other block says if it is not.
+    #[test]
+    fn readme_and_the_first_results_quote_the_present_program() {
+        let present = present_digest().unwrap();
+        let record = |name: &str| fs::read_to_string(root().join(name)).ok();
+        for page in [vec![root().join("README.md")], files_below(&root().join("docs"), ".md")].concat() {
+            let text = fs::read_to_string(&page).unwrap();
+            assert_eq!(
+                renewed(&text, &present, record, |_| {}),
+                text,
+                "{}: run `cargo xtask quote`",
+                page.display()
+            );
+            let first_only = page.ends_with("docs/RESULTS.md");
+            if !page.ends_with("README.md") && !first_only {
+                continue;
+            }
+            let quotes = text.split(MARK).skip(1).take(if first_only { 1 } else { usize::MAX });
+            for quote in quotes {
+                let name = quote.lines().next().unwrap_or_default().trim_end_matches("-->").trim();
+                let of_present = record(name).is_some_and(|record| is_of(&record, &present));
+                assert!(of_present, "{}: {name} is of an earlier program", page.display());
+            }
+        }
     }
 
     #[test]

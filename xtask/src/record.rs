@@ -16,6 +16,8 @@ mod scores;
 
 use std::fs;
 
+use crate::answers;
+use crate::quote;
 use crate::tools::{Result, Scratch, built, data, output, root, target};
 use book::{Bench, Book};
 
@@ -95,8 +97,8 @@ const ALIASES: [(&str, &str); 3] =
 /// Makes the named files.
 pub fn run(words: &[&str]) -> Result<()> {
     let (flags, names): (Vec<&str>, Vec<&str>) = words.iter().partition(|word| word.starts_with("--"));
-    if let Some(unknown) = flags.iter().find(|flag| **flag != "--dirty") {
-        return Err(format!("record: expected --dirty, found {unknown}"));
+    if let Some(unknown) = flags.iter().find(|flag| !["--dirty", "--again"].contains(flag)) {
+        return Err(format!("record: expected --dirty or --again, found {unknown}"));
     }
     if names.is_empty() {
         for job in &JOBS {
@@ -107,7 +109,24 @@ pub fn run(words: &[&str]) -> Result<()> {
     let jobs = named(&names)?;
     let commit = commit(flags.contains(&"--dirty"))?;
     let umbracast = built(&root(), &target())?;
+    let digest = quote::present_digest()?;
+    let moved = moved(&umbracast)?;
+    if !moved.is_empty() {
+        return Err(format!(
+            "record: answers moved: `cargo xtask answers --write` first\n{}",
+            moved.join("\n")
+        ));
+    }
     for job in jobs {
+        // What was stopped goes on where it was.
+        let made = fs::read_to_string(root().join("record").join(format!("{}.txt", job.name)));
+        if names.contains(&"all")
+            && !flags.contains(&"--again")
+            && made.is_ok_and(|made| quote::is_of(&made, &digest))
+        {
+            println!("{}: of the present program", job.name);
+            continue;
+        }
         let missing = match job.needs {
             Needs::Data => data().is_none().then_some("UMBRACAST_DATA"),
             Needs::Program(program) => output(&root(), "which", &[program]).is_err().then_some(program),
@@ -118,13 +137,37 @@ pub fn run(words: &[&str]) -> Result<()> {
             Some(missing) => return Err(format!("{}: expected {missing}, found none", job.name)),
             None => {
                 let bench = Bench { umbracast: umbracast.clone(), scratch: Scratch::new(job.name)? };
-                let mut book = Book::new(job.name, &commit, bench);
+                let mut book = Book::new(job.name, &commit, &digest, bench);
                 (job.make)(&mut book).map_err(|error| format!("{}: {error}", job.name))?;
                 println!("{}", book.close()?);
             }
         }
     }
     Ok(())
+}
+
+/// Whether the program answers as `record/answers.txt` says; `write` keeps what it answers now.
+pub fn answers(write: bool) -> Result<()> {
+    let umbracast = built(&root(), &target())?;
+    let moved = moved(&umbracast)?;
+    match (moved.is_empty(), write) {
+        (true, _) => println!("{} answers {}", answers::FILE, quote::present_digest()?),
+        (false, false) => return Err(format!("answers moved:\n{}", moved.join("\n"))),
+        (false, true) => {
+            let data = data()
+                .ok_or("expected UMBRACAST_DATA, for half of the questions are asked of it, found none")?;
+            let found = answers::ask(&umbracast, &root(), Some(&data))?;
+            fs::write(root().join(answers::FILE), &found).map_err(|e| format!("{}: {e}", answers::FILE))?;
+            println!("{} answers {}", answers::FILE, answers::digest(&found));
+        }
+    }
+    Ok(())
+}
+
+/// Where the program's answers are not those that are kept.
+fn moved(umbracast: &std::path::Path) -> Result<Vec<String>> {
+    let kept = fs::read_to_string(root().join(answers::FILE)).unwrap_or_default();
+    Ok(answers::differences(&kept, &answers::ask(umbracast, &root(), data().as_deref())?))
 }
 
 fn named(names: &[&str]) -> Result<Vec<&'static Job>> {

@@ -19,6 +19,7 @@ pub struct Bench {
 pub struct Book {
     name: &'static str,
     commit: String,
+    answers: String,
     text: String,
     bench: Bench,
     /// Folders of the scores that [`Book::compare`] lays side by side.
@@ -29,8 +30,9 @@ pub struct Book {
 
 impl Book {
     /// Empty.
-    pub fn new(name: &'static str, commit: &str, bench: Bench) -> Self {
-        Self { name, commit: commit.to_owned(), text: String::new(), bench, scored: Vec::new(), adds: false }
+    pub fn new(name: &'static str, commit: &str, answers: &str, bench: Bench) -> Self {
+        let (commit, answers) = (commit.to_owned(), answers.to_owned());
+        Self { name, commit, answers, text: String::new(), bench, scored: Vec::new(), adds: false }
     }
 
     /// A path below the scratch folder.
@@ -49,7 +51,7 @@ impl Book {
         if path.exists() { Ok(path.into()) } else { Err(format!("{}: not there", path.display())) }
     }
 
-    /// The line of a command. The first is followed by the commit.
+    /// The line of a command. The first is followed by the commit and by the digest of the program's answers.
     pub fn command(&mut self, line: &str) {
         if !self.text.is_empty() {
             self.text.push('\n');
@@ -58,6 +60,7 @@ impl Book {
         self.line(&format!("$ {line}"));
         if first {
             self.line(&format!("# commit {}", self.commit));
+            self.line(&format!("# answers {}", self.answers));
         }
     }
 
