@@ -46,6 +46,7 @@ pub mod detect;
 pub mod track;
 pub mod forecast;
 pub mod blockage;
+pub mod radio;
 pub mod pipeline;
 
 pub use config::{Config, Mode};
