@@ -47,6 +47,7 @@ pub mod track;
 pub mod forecast;
 pub mod blockage;
 pub mod radio;
+pub mod decide;
 pub mod pipeline;
 
 pub use config::{Config, Mode};

@@ -1,10 +1,12 @@
 //! The whole system on one page, with one line for each stage.
 
 use crate::blockage::{Blockage, Caster};
+use crate::decide::{Decider, Decision};
 use crate::detect::{Background, Clocks, Cluster, Clusterer, Detection, Measurer, Point, Prior};
 use crate::forecast::{Forecast, Forecaster, Weights};
 use crate::lidar::Views;
 use crate::mounting::Mountings;
+use crate::radio::{Fader, Loss};
 use crate::track::{Track, Tracker};
 use crate::{Config, Error, Frame, Health};
 
@@ -41,6 +43,10 @@ pub struct Outcome {
     pub forecasts: Vec<Forecast>,
     /// One an access point and confirmed track.
     pub blockages: Vec<Blockage>,
+    /// One an access point with a radio and confirmed track, in the same order; none where the method draws no samples.
+    pub losses: Vec<Loss>,
+    /// One a confirmed track, where the site says what changes cost.
+    pub decisions: Vec<Decision>,
     /// What was skipped since the start.
     pub health: Health,
     last_ns: Option<i64>,
@@ -92,6 +98,8 @@ pub struct Pipeline {
     tracker: Tracker,
     forecaster: Forecaster,
     caster: Caster,
+    fader: Fader,
+    decider: Decider,
     outcome: Outcome,
 }
 
@@ -119,6 +127,8 @@ impl Pipeline {
             tracker: Tracker::new(&config.track, &config.site),
             forecaster: Forecaster::new(&config.forecast, weights)?,
             caster: Caster::new(&config.blockage, &config.site),
+            fader: Fader::new(&config.site),
+            decider: Decider::new(&config.site),
             outcome: Outcome::default(),
         })
     }
@@ -171,6 +181,8 @@ impl Pipeline {
         self.tracker.update(&self.views, &o.detections, &mut o.tracks);
         self.forecaster.forecast(&o.tracks, &mut o.forecasts);
         self.caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
+        self.fader.fade(&self.caster, &mut o.losses);
+        self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
         o.health.clocks_corrected = self.clocks.corrected();
         o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());
         o
@@ -206,5 +218,7 @@ impl Pipeline {
     /// ```
     pub fn take_over_links(&mut self, config: &Config) {
         self.caster = Caster::new(&config.blockage, &config.site);
+        self.fader = Fader::new(&config.site);
+        self.decider = Decider::new(&config.site);
     }
 }

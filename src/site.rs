@@ -3,7 +3,9 @@
 //! `config/default.toml`.
 
 mod hall;
+mod handover;
 mod optics;
+mod radio;
 
 use std::collections::BTreeMap;
 
@@ -14,7 +16,9 @@ use crate::geometry::Pose;
 
 pub use hall::{Floor, Hall};
 pub(crate) use hall::{doubled_area_m2, from_segment_m};
+pub use handover::{Costs, Handover, Procedure};
 pub use optics::{DarkCloth, MixedReturns, Pane, Surface};
+pub use radio::{LossModel, Radio};
 
 /// The place that is watched.
 ///
@@ -39,6 +43,9 @@ pub struct Site {
     pub access_points: Vec<AccessPoint>,
     /// Where on a body the UE is.
     pub ue: Ue,
+    /// What changing to another access point costs; without it nothing is decided.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub handover: Option<Handover>,
     /// What only a simulator reads.
     pub simulation: Simulation,
 }
@@ -326,7 +333,7 @@ pub struct Rotation {
 /// An access point.
 ///
 /// ```
-/// let side = umbracast::site::AccessPoint { name: "side".to_owned(), position_m: [14.0, 0.0, 2.0] };
+/// let side = umbracast::site::AccessPoint { name: "side".to_owned(), position_m: [14.0, 0.0, 2.0], radio: None };
 /// assert_eq!(side.position().z, 2.0);
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -336,6 +343,9 @@ pub struct AccessPoint {
     pub name: String,
     /// Its antenna, metres.
     pub position_m: [f64; 3],
+    /// What it sends; without it no dB are told of its links.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radio: Option<Radio>,
 }
 
 /// Where the UE is, from the body axis.

@@ -5,6 +5,7 @@ use super::algorithm1::{self, PersonBox};
 use super::numbers::Numbers;
 use super::probability::Sampler;
 use super::steps::{heading_at, position_at};
+use super::trajectories::Trajectories;
 use crate::config::{BlockageConfig, BlockageMethod, BoxKind};
 use crate::forecast::Forecast;
 use crate::geometry::{DVec2, DVec3};
@@ -112,6 +113,12 @@ impl Caster {
     /// ```
     pub fn took_fewer_samples(&self) -> bool {
         self.method == BlockageMethod::Probability && self.sampler.takes_fewer(&self.numbers)
+    }
+
+    /// The samples of the last cast, in order of confirmed tracks, and how many of each count; `None` where the method draws
+    /// none.
+    pub(crate) fn drawn(&self) -> Option<(&[Trajectories], usize)> {
+        (self.method == BlockageMethod::Probability).then(|| self.sampler.drawn())
     }
 
     /// The paper's way: boxes at the means, yes or no.

@@ -38,14 +38,19 @@ impl Draws {
 
 /// What each of so many samples has of a distribution.
 #[derive(Debug, Clone)]
-pub(super) struct Quantiles {
+pub(crate) struct Quantiles {
     even: Vec<f32>,
     normal: Vec<f32>,
 }
 
 impl Quantiles {
-    pub(super) fn new(samples: usize) -> Self {
+    pub(crate) fn new(samples: usize) -> Self {
         Self { even: even(samples), normal: normal(samples) }
+    }
+
+    /// A coordinate of its own for whatever `key` names: standard normal.
+    pub(crate) fn normal(&self, key: u64) -> Vec<f32> {
+        shuffled(&self.normal, 0.0, &mut Pcg64Mcg::seed_from_u64(key))
     }
 }
 

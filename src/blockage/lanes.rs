@@ -3,17 +3,17 @@
 use crate::elementary::cos_sin_f32;
 
 /// Samples of a word: a bit each.
-pub(super) const WORD: usize = 32;
+pub(crate) const WORD: usize = 32;
 
 // `f32::min` and `max` ask for NaN as well, which no lane holds: these are one instruction.
 
 #[inline(always)]
-pub(super) fn smaller(a: f32, b: f32) -> f32 {
+pub(crate) fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-pub(super) fn larger(a: f32, b: f32) -> f32 {
+pub(crate) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
@@ -55,7 +55,7 @@ pub(super) fn word_of_mut(values: &mut [f32], word: usize) -> &mut [f32; WORD] {
 
 /// Cosines and sines of angles of a few turns. The first array holds the angles before, in radians.
 #[inline(always)]
-pub(super) fn cos_sin([cos, sin]: &mut [Vec<f32>; 2]) {
+pub(crate) fn cos_sin([cos, sin]: &mut [Vec<f32>; 2]) {
     sin.resize(cos.len(), 0.0);
     for (cos, sin) in cos.iter_mut().zip(sin) {
         (*cos, *sin) = cos_sin_f32(*cos);

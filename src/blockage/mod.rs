@@ -6,15 +6,15 @@ pub mod body_model;
 pub mod body;
 #[doc(hidden)] // For the corpus of rays; `Caster` chooses by the config.
 pub mod algorithm1;
-mod lanes;
-mod draws;
+pub(crate) mod lanes;
+pub(crate) mod draws;
 mod phases;
 mod steps;
 #[doc(hidden)] // What tests and ablations turn.
 pub mod numbers;
-mod spread;
+pub(crate) mod spread;
 mod figure;
-mod trajectories;
+pub(crate) mod trajectories;
 mod shadows;
 mod rays;
 mod crossing;

@@ -189,6 +189,11 @@ impl Sampler {
         self.affordable = (tests / self.meetings.len().max(1)).max(SAMPLES_MIN) / WORD * WORD;
     }
 
+    /// Everybody's samples of the frame that was drawn, and how many of each count.
+    pub(crate) fn drawn(&self) -> (&[Trajectories], usize) {
+        (&self.people[..self.present], self.samples)
+    }
+
     /// Whether the frame before had more meetings than could be asked with all samples.
     pub fn takes_fewer(&self, numbers: &Numbers) -> bool {
         self.samples < numbers.samples
@@ -319,6 +324,21 @@ impl Sampler {
             crossing.ask(figure, Part::Arms, rays, meeting, other, words, &link.arms, blocked);
         }
     }
+}
+
+/// What samples say of a link of which is known when each is lost. `lost(step)` are its bits, in words; the link counts as lost
+/// now from `threshold` on.
+pub(crate) fn chances_of<'a>(lost: impl Fn(usize) -> &'a [u32], samples: usize, threshold: f64) -> Chances {
+    let (mut link, mut counts, words) = (Link::default(), Counts::default(), 0..samples.div_ceil(WORD));
+    link.begin(samples);
+    for step in 0..MOMENTS {
+        link.blocked.copy_from_slice(lost(step));
+        link.count(step, samples, words.clone(), &mut counts);
+        if step == 0 {
+            counts.blocked_now = counts.now as f64 / samples as f64 >= threshold;
+        }
+    }
+    counts.chances(samples)
 }
 
 impl Link {

@@ -139,7 +139,7 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
     let mut site = config.site.clone();
     site.pillars = vec![Pillar { position_m: [3.0, 0.5], radius_m: 0.4 }];
     site.furniture.clear();
-    site.access_points.push(AccessPoint { name: "low".into(), position_m: [-3.0, -6.0, 0.6] });
+    site.access_points.push(AccessPoint { name: "low".into(), position_m: [-3.0, -6.0, 0.6], radio: None });
     for (ap, ap_m) in site.access_points.iter_mut().zip(aps_m) {
         ap.position_m = ap_m.to_array();
     }

@@ -6,10 +6,10 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Most of x, x + y, y, y - x and of their opposites over samples of a plane.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Spread {
+pub(crate) struct Spread {
     most_m: [f64; 8],
     /// No sample is farther away.
-    pub(super) radius_m: f64,
+    pub(crate) radius_m: f64,
 }
 
 /// More than single precision takes from a distance of metres.

@@ -22,46 +22,46 @@ use crate::track::Track;
 use crate::{STEP_S, STEPS};
 
 /// Now and every step.
-pub(super) const MOMENTS: usize = STEPS + 1;
+pub(crate) const MOMENTS: usize = STEPS + 1;
 
 /// Everybody in it is within `radius_m` of `center_m`.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Disc {
-    pub(super) center_m: DVec2,
-    pub(super) radius_m: f64,
+pub(crate) struct Disc {
+    pub(crate) center_m: DVec2,
+    pub(crate) radius_m: f64,
 }
 
 /// Samples of one person, in whole words. What belongs to step s and sample k stands at `s * samples + k`; step 0 is now.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Trajectories {
-    pub(super) samples: usize,
+pub(crate) struct Trajectories {
+    pub(crate) samples: usize,
     /// How many of them were asked for.
     asked: usize,
-    pub(super) track: u64,
+    pub(crate) track: u64,
     /// By step: the mean, round which the samples lie.
-    pub(super) mean_m: [DVec2; MOMENTS],
+    pub(crate) mean_m: [DVec2; MOMENTS],
     /// By step: how far.
-    pub(super) spread: [Spread; MOMENTS],
+    pub(crate) spread: [Spread; MOMENTS],
     /// By step: the heading's unit vector, to be turned by the sample's turn.
-    ahead: [DVec2; MOMENTS],
+    pub(crate) ahead: [DVec2; MOMENTS],
     /// By step and sample: from the step's mean.
-    pub(super) off_m: [Vec<f32>; 2],
+    pub(crate) off_m: [Vec<f32>; 2],
     /// By step: how high the floor is at the mean, on which all samples stand; then the least and the most of them.
-    pub(super) floor_m: [f64; MOMENTS],
-    pub(super) floors_m: [f64; 2],
+    pub(crate) floor_m: [f64; MOMENTS],
+    pub(crate) floors_m: [f64; 2],
     /// The samples of all steps.
-    pub(super) second: Disc,
+    pub(crate) second: Disc,
     /// The least and the most of all samples.
-    pub(super) heights_m: [f64; 2],
+    pub(crate) heights_m: [f64; 2],
     /// One over both.
     pub(super) per_height: [f64; 2],
     /// No part of a sample's body is farther from its position; the same of what each plan holds.
     pub(super) reach_m: f64,
     pub(super) reach_of_m: Vec<f64>,
     /// By sample.
-    pub(super) height_m: Vec<f32>,
-    pub(super) width_scale: Vec<f32>,
-    turn_rad: Vec<f32>,
+    pub(crate) height_m: Vec<f32>,
+    pub(crate) width_scale: Vec<f32>,
+    pub(crate) turn_rad: Vec<f32>,
     /// Of what the turn is more than the velocity's, one standard deviation; the same for the owner's own UE.
     turn_sigma_rad: [f32; 2],
     speed_mps: Vec<f32>,

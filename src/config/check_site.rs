@@ -129,7 +129,14 @@ fn optics(site: &Site) -> Result<(), Error> {
 }
 
 fn access_point(ap: &AccessPoint, site: &Site) -> Result<(), Error> {
-    hung(&format!("site.access_points.{}.position_m", ap.name), ap.position_m, site)
+    let key = |key: &str| format!("site.access_points.{}.{key}", ap.name);
+    hung(&key("position_m"), ap.position_m, site)?;
+    let Some(radio) = &ap.radio else { return Ok(()) };
+    within(&key("radio.carrier_ghz"), radio.carrier_ghz, 0.5, 1000.0)?;
+    within(&key("radio.margin_db"), radio.margin_db, 0.0, 60.0)?;
+    within(&key("radio.bandwidth_mhz"), radio.bandwidth_mhz, 0.001, 1e5)?;
+    within(&key("radio.transmit_dbm"), radio.transmit_dbm, -100.0, 100.0)?;
+    within(&key("radio.noise_figure_db"), radio.noise_figure_db, 0.0, 60.0)
 }
 
 fn pillar(index: usize, pillar: &Pillar, site: &Site) -> Result<(), Error> {

@@ -52,9 +52,11 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 16] = [
+const OPTIONAL: [(&str, &str, &str); 18] = [
+    ("site", "handover", "a table"),
     ("site.hall", "outline_m", "an array"),
     ("site.hall", "floors", "an array"),
+    ("site.access_points", "radio", "a table"),
     ("site.sensors", "address", "a string"),
     ("site.sensors", "calibration", "a string"),
     ("site.sensors", "calibration_file", "a string"),

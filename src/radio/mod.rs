@@ -1,7 +1,13 @@
-//! What a body costs a radio path, in dB.
+//! What bodies cost radio links, in dB: now, and at each step of the forecast.
 
 pub mod fresnel;
 mod passage;
 pub mod models;
+mod table;
+mod body;
+mod outages;
+mod links;
 
+pub use links::{Fader, Loss};
+pub use outages::Outages;
 pub use passage::{Passage, Rectangle};

@@ -221,6 +221,7 @@ fn surroundings() -> Surroundings {
             false => format!("in the middle, {height:.1} m high"),
         },
         position_m: [radius, 0.0, height],
+        radio: None,
     };
     site.access_points = PLACES_M.map(place).to_vec();
     Surroundings { site, widths: WIDTHS.to_vec() }

@@ -121,7 +121,7 @@ fn long_tables_are_folded_and_the_scene_stands_first() {
 #[test]
 fn the_animation_shows_every_access_point_and_turns_amber_then_red() {
     let mut config = Config::for_mode(Mode::Default);
-    let roof = umbracast::site::AccessPoint { name: "roof".into(), position_m: [2.0, 3.0, 5.0] };
+    let roof = umbracast::site::AccessPoint { name: "roof".into(), position_m: [2.0, 3.0, 5.0], radio: None };
     config.site.access_points.push(roof);
     let (directory, page) = written(&config, &["orca-03"]);
     let svg = std::fs::read_to_string(directory.path().join("animation.svg")).unwrap();

@@ -1,0 +1,379 @@
+//! The loss of every link in dB, now and at each step, from the samples that say blocked: everybody's bodies on their sampled
+//! ways, each costing the path what the access point's model says.
+
+use std::collections::BTreeMap;
+
+use super::body::{Across, Wave};
+use super::outages::Outages;
+use super::table::Table;
+use crate::blockage::Caster;
+use crate::blockage::draws::Quantiles;
+use crate::blockage::lanes::{WORD, cos_sin};
+use crate::blockage::probability::chances_of;
+use crate::blockage::trajectories::{Disc, MOMENTS, Trajectories};
+use crate::elementary::ln;
+use crate::geometry::{DVec2, DVec3};
+use crate::site::Ue;
+use crate::{STEPS, Site};
+
+/// The loss of one link, access point to person, through bodies that stand in its way: others', and the owner's where the UE is
+/// off the body's axis.
+///
+/// ```
+/// use umbracast::radio::Loss;
+///
+/// /// The most that a link may lose within the next steps, with nine chances in ten that it is less.
+/// fn most_db(loss: &Loss) -> f64 {
+///     loss.steps_db.iter().map(|[_, _, most]| *most).fold(0.0, f64::max)
+/// }
+/// let clear = Loss::clear(0, 7);
+/// assert_eq!(most_db(&clear), 0.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loss {
+    /// Which access point of the site.
+    pub access_point: usize,
+    /// The person.
+    pub track: u64,
+    /// 10, 50 and 90 % quantiles of the loss at the frame's instant, dB.
+    pub now_db: [f64; 3],
+    /// The same at each step.
+    pub steps_db: [[f64; 3]; STEPS],
+    /// The probability that the loss is the access point's margin or more, at the frame's instant.
+    pub p_out_now: f64,
+    /// Index w - 1: the same at any of steps 1..=w; never falls with w.
+    pub p_out: [f64; STEPS],
+    /// 10, 50 and 90 % quantiles of the time until a link that is not out now will be, seconds; as `Blockage::onset_s`.
+    pub onset_s: [Option<f64>; 3],
+    /// The same of the time until it is not out any more; as `Blockage::duration_s`.
+    pub duration_s: [Option<f64>; 3],
+}
+
+impl Loss {
+    /// A link that nobody comes near.
+    pub fn clear(access_point: usize, track: u64) -> Self {
+        Self {
+            access_point,
+            track,
+            now_db: [0.0; 3],
+            steps_db: [[0.0; 3]; STEPS],
+            p_out_now: 0.0,
+            p_out: [0.0; STEPS],
+            onset_s: [None; 3],
+            duration_s: [None; 3],
+        }
+    }
+}
+
+/// Which shares of the samples lose less than the three quantiles.
+const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
+/// A link counts as out now from this probability on.
+const LIKELY: f64 = 0.5;
+/// Most losses of one sample through one body that a frame works out: about 2 ms on one core. Where more would have to be, fewer
+/// samples are taken.
+const LOSSES_MAX: usize = 1 << 16;
+/// dB from a natural logarithm of a power.
+const DB: f64 = 10.0 / std::f64::consts::LN_10;
+
+/// The stage.
+#[derive(Debug, Clone)]
+pub struct Fader {
+    /// By access point; `None` without a radio.
+    radios: Vec<Option<Antenna>>,
+    ue: Ue,
+    table: Table,
+    quantiles: Option<(usize, Quantiles)>,
+    /// By access point and track: by how much each sample's fades are deeper than the model's, standard normal.
+    spreads: BTreeMap<(usize, u64), Vec<f32>>,
+    meetings: Vec<Meeting>,
+    /// By link, access points first: one past its last meeting.
+    ends: Vec<usize>,
+    /// By person: cosine and sine of the turn of each sample's trunk from the heading. Empty until it is asked for.
+    turns: Vec<[Vec<f32>; 2]>,
+    powers: Vec<f32>,
+    losses_db: Vec<f32>,
+    sorted_db: Vec<f32>,
+    outages: Outages,
+}
+
+#[derive(Debug, Clone)]
+struct Antenna {
+    place_m: DVec3,
+    wave: Wave,
+    margin_db: f64,
+    spreads: bool,
+}
+
+/// A body that may cost a link something at a step.
+#[derive(Debug, Clone, Copy)]
+struct Meeting {
+    body: usize,
+    step: usize,
+}
+
+impl Fader {
+    /// Needs the site's access points, their radios and where the UE is.
+    pub fn new(site: &Site) -> Self {
+        let [least_m, most_m] = site.hall.bounds_m();
+        let longest_m = least_m.distance(most_m).hypot(site.hall.height_m);
+        let antenna = |ap: &crate::site::AccessPoint| {
+            ap.radio.map(|radio| Antenna {
+                place_m: ap.position(),
+                wave: Wave::new(&radio, longest_m),
+                margin_db: radio.margin_db,
+                spreads: radio.fade_spread,
+            })
+        };
+        Self {
+            radios: site.access_points.iter().map(antenna).collect(),
+            ue: site.ue,
+            table: Table::new(),
+            quantiles: None,
+            spreads: BTreeMap::new(),
+            meetings: Vec::new(),
+            ends: Vec::new(),
+            turns: Vec::new(),
+            powers: Vec::new(),
+            losses_db: Vec::new(),
+            sorted_db: Vec::new(),
+            outages: Outages::default(),
+        }
+    }
+
+    /// One loss for each access point with a radio and each person of the last cast, access points first. None where the cast
+    /// drew no samples (`blockage.method`).
+    pub fn fade(&mut self, caster: &Caster, losses: &mut Vec<Loss>) {
+        losses.clear();
+        self.outages.begin(0, 0, 0);
+        let Some((people, drawn)) = caster.drawn() else { return };
+        if self.radios.iter().all(Option::is_none) || people.is_empty() {
+            return;
+        }
+        self.meet(people);
+        let affordable = LOSSES_MAX / self.meetings.len().max(1) / WORD * WORD;
+        let samples = drawn.min(affordable.max(WORD));
+        self.outages.begin(self.radios.len(), people.len(), samples);
+        self.spreads.retain(|&(_, track), _| people.iter().any(|person| person.track == track));
+        if self.turns.len() < people.len() {
+            self.turns.resize(people.len(), Default::default());
+        }
+        self.turns.iter_mut().for_each(|[cos, _]| cos.clear());
+        let mut begin = 0;
+        let mut link = 0;
+        for access_point in 0..self.radios.len() {
+            if self.radios[access_point].is_none() {
+                continue;
+            }
+            for person in 0..people.len() {
+                let end = self.ends[link];
+                losses.push(self.of_link(access_point, person, people, begin..end, samples));
+                (begin, link) = (end, link + 1);
+            }
+        }
+    }
+
+    /// The samples of the last frame: in which each link is out, and when.
+    pub fn outages(&self) -> &Outages {
+        &self.outages
+    }
+
+    /// Finds the bodies that may cost a link something, erring on the side of asking the samples.
+    fn meet(&mut self, people: &[Trajectories]) {
+        self.meetings.clear();
+        self.ends.clear();
+        let reach_m = self.ue.forward_m.hypot(self.ue.left_m);
+        for antenna in self.radios.iter().flatten() {
+            for (owner, q) in people.iter().enumerate() {
+                let lowest_m = self.ue.height_share * q.heights_m[0] + q.floors_m[0];
+                let near = |aim: Disc, p: &Trajectories, body: Disc| {
+                    let aim = Disc { radius_m: aim.radius_m + reach_m, ..aim };
+                    antenna.meets(aim, lowest_m, body, p.floors_m[1] + p.heights_m[1])
+                };
+                for (body, p) in people.iter().enumerate() {
+                    let own = body == owner;
+                    if (own && reach_m == 0.0) || !near(q.second, p, p.second) {
+                        continue;
+                    }
+                    for step in 0..MOMENTS {
+                        let at = |of: &Trajectories| Disc {
+                            center_m: of.mean_m[step],
+                            radius_m: of.spread[step].radius_m,
+                        };
+                        if own || near(at(q), p, at(p)) {
+                            self.meetings.push(Meeting { body, step });
+                        }
+                    }
+                }
+                self.ends.push(self.meetings.len());
+            }
+        }
+    }
+
+    fn of_link(
+        &mut self,
+        access_point: usize,
+        owner: usize,
+        people: &[Trajectories],
+        meetings: std::ops::Range<usize>,
+        samples: usize,
+    ) -> Loss {
+        let track = people[owner].track;
+        let mut loss = Loss::clear(access_point, track);
+        if meetings.is_empty() {
+            return loss;
+        }
+        self.powers.clear();
+        self.powers.resize(MOMENTS * samples, 1.0);
+        for meeting in meetings {
+            let Meeting { body, step } = self.meetings[meeting];
+            self.turn(people, body);
+            self.turn(people, owner);
+            self.pass(access_point, owner, people, self.meetings[meeting], samples);
+            debug_assert!(step < MOMENTS && body < people.len());
+        }
+        let Some(antenna) = &self.radios[access_point] else { return loss };
+        if antenna.spreads && !self.spreads.contains_key(&(access_point, track)) {
+            let count = people[owner].samples;
+            let known = self.quantiles.take().filter(|(of, _)| *of == count);
+            let (_, quantiles) =
+                self.quantiles.insert(known.unwrap_or_else(|| (count, Quantiles::new(count))));
+            let key = track.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (access_point as u64 + 1) << 32;
+            self.spreads.insert((access_point, track), quantiles.normal(key));
+        }
+        let spread = self.spreads.get(&(access_point, track)).filter(|_| antenna.spreads);
+        self.losses_db.clear();
+        self.losses_db.extend(self.powers.iter().enumerate().map(|(at, &power)| {
+            if power == 1.0 {
+                return 0.0;
+            }
+            let model_db = -DB * ln(f64::from(power));
+            let deeper = spread.map_or(0.0, |spread| f64::from(spread[at % samples]));
+            (model_db + deeper * spread_db(model_db)) as f32
+        }));
+        for step in 0..MOMENTS {
+            let of_step = &self.losses_db[step * samples..(step + 1) * samples];
+            self.outages.note(access_point, owner, step, of_step, antenna.margin_db as f32);
+            let quantiles_db = quantiles_db(of_step, &mut self.sorted_db);
+            match step.checked_sub(1) {
+                None => loss.now_db = quantiles_db,
+                Some(step) => loss.steps_db[step] = quantiles_db,
+            }
+        }
+        let chances = chances_of(|step| self.outages.of(access_point, owner, step), samples, LIKELY);
+        (loss.p_out_now, loss.p_out) = (chances.p_now, chances.p);
+        (loss.onset_s, loss.duration_s) = (chances.onset_s, chances.duration_s);
+        loss
+    }
+
+    /// Works out how a person's samples turn, once a frame.
+    fn turn(&mut self, people: &[Trajectories], person: usize) {
+        let turn = &mut self.turns[person];
+        if turn[0].is_empty() {
+            turn[0].extend_from_slice(&people[person].turn_rad);
+            cos_sin(turn);
+        }
+    }
+
+    /// Takes from a link's powers what a body costs at a step.
+    fn pass(
+        &mut self,
+        access_point: usize,
+        owner: usize,
+        people: &[Trajectories],
+        meeting: Meeting,
+        samples: usize,
+    ) {
+        let Some(antenna) = &self.radios[access_point] else { return };
+        let Meeting { body, step } = meeting;
+        let (q, p, ap_m) = (&people[owner], &people[body], antenna.place_m);
+        let place = |of: &Trajectories, k: usize| {
+            let base = of.mean_m[step] - ap_m.truncate();
+            let at = step * of.samples + k;
+            [base.x as f32 + of.off_m[0][at], base.y as f32 + of.off_m[1][at]]
+        };
+        let ahead = |of: usize, k: usize| {
+            let [x, y] = people[of].ahead[step].to_array().map(|part| part as f32);
+            let [cos, sin] = [self.turns[of][0][k], self.turns[of][1][k]];
+            [x * cos - y * sin, x * sin + y * cos]
+        };
+        let (forward_m, left_m) = (self.ue.forward_m as f32, self.ue.left_m as f32);
+        let (share, ap_z) = (self.ue.height_share as f32, ap_m.z as f32);
+        let floors_m = [q.floor_m[step] as f32, p.floor_m[step] as f32];
+        for k in 0..samples {
+            let mut end_m = place(q, k);
+            if forward_m != 0.0 || left_m != 0.0 {
+                let [x, y] = ahead(owner, k);
+                end_m = [end_m[0] + forward_m * x - left_m * y, end_m[1] + forward_m * y + left_m * x];
+            }
+            let end_z = share * q.height_m[k] + floors_m[0];
+            let length_m = (end_m[0] * end_m[0] + end_m[1] * end_m[1]).sqrt().max(1e-3);
+            let to = [end_m[0] / length_m, end_m[1] / length_m];
+            let foot_m = place(p, k);
+            let from_tx_m = to[0] * foot_m[0] + to[1] * foot_m[1];
+            let slope = (ap_z - end_z) / length_m;
+            let facing = ahead(body, k);
+            let across = Across {
+                from_tx_m,
+                to_rx_m: length_m - from_tx_m,
+                aside_m: to[1] * foot_m[0] - to[0] * foot_m[1],
+                path_m: ap_z - slope * from_tx_m - floors_m[1],
+                slope,
+                turned: [to[0] * facing[1] - to[1] * facing[0], to[0] * facing[0] + to[1] * facing[1]],
+                height_m: p.height_m[k],
+                width_scale: p.width_scale[k],
+            };
+            self.powers[step * samples + k] *= antenna.wave.passing(&self.table, &across);
+        }
+    }
+}
+
+impl Antenna {
+    /// Whether a body within one disc may cost a path to another disc something.
+    fn meets(&self, aim: Disc, aim_z: f64, body: Disc, top_m: f64) -> bool {
+        let start_m: DVec2 = self.place_m.truncate();
+        let way_m = aim.center_m - start_m;
+        let length_m = way_m.length();
+        let (along, off_m) = (way_m / length_m.max(1e-9), body.center_m - start_m);
+        let from_start_m = along.dot(off_m);
+        let room_m = body.radius_m + self.wave.beside_m;
+        if from_start_m < -room_m || from_start_m > length_m + aim.radius_m + room_m {
+            return false;
+        }
+        let far = ((from_start_m + room_m) / length_m.max(1e-9)).clamp(0.0, 1.0);
+        let near = ((from_start_m - room_m) / (length_m + aim.radius_m)).clamp(0.0, 1.0);
+        if along.perp_dot(off_m).abs() > room_m + far * aim.radius_m {
+            return false;
+        }
+        let rises_m = aim_z - self.place_m.z;
+        let lowest_m = self.place_m.z + (rises_m * far).min(rises_m * near);
+        lowest_m <= top_m + self.wave.above_m
+    }
+}
+
+/// One standard deviation of real fades about a model that loses so much: residuals of 1001 passages past a 5G millimetre-wave
+/// cell (IMMERSE, TU Dortmund 2024). Where a body costs next to nothing, so does the spread.
+fn spread_db(model_db: f64) -> f64 {
+    let positive_db = model_db.max(0.0);
+    (1.5 + 0.9 * positive_db.sqrt()).min(6.0) * (positive_db / 0.5).min(1.0)
+}
+
+fn quantiles_db(of_step: &[f32], sorted_db: &mut Vec<f32>) -> [f64; 3] {
+    if of_step.iter().all(|db| *db == 0.0) {
+        return [0.0; 3];
+    }
+    sorted_db.clear();
+    sorted_db.extend_from_slice(of_step);
+    sorted_db.sort_unstable_by(f32::total_cmp);
+    // Sample i of n stands for the share (i + 1/2) / n.
+    let last = (sorted_db.len() - 1) as f64;
+    LEVELS.map(|level| {
+        let at = (level * sorted_db.len() as f64 - 0.5).clamp(0.0, last);
+        let (i, share) = (at as usize, at.fract());
+        let next = sorted_db[(i + 1).min(sorted_db.len() - 1)];
+        f64::from(sorted_db[i]) * (1.0 - share) + f64::from(next) * share
+    })
+}
+
+#[cfg(test)]
+#[path = "links_tests.rs"]
+mod tests;

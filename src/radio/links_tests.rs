@@ -1,0 +1,180 @@
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::*;
+use crate::Config;
+use crate::forecast::{Forecast, constant_velocity};
+use crate::geometry::{Aabb, Obb};
+use crate::radio::Passage;
+use crate::radio::models::kirchhoff_mean;
+use crate::site::Radio;
+use crate::track::Track;
+
+/// Somebody who is known well, at a place, with a velocity.
+fn somebody(id: u64, position_m: DVec2, velocity_mps: DVec2) -> Track {
+    let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE };
+    let mut covariance = [[0.0; 4]; 4];
+    [4e-4, 4e-4, 4e-3, 4e-3].into_iter().enumerate().for_each(|(i, variance)| covariance[i][i] = variance);
+    Track {
+        id,
+        position_m,
+        velocity_mps,
+        covariance,
+        heading_rad: velocity_mps.to_angle(),
+        heading_sigma_rad: 0.1,
+        heading_behind: 0.0,
+        height_m: 1.75,
+        height_sigma_m: 0.02,
+        width_scale: 1.0,
+        width_scale_sigma: 0.02,
+        gait: crate::gait::GaitPhase::UNKNOWN,
+        points: 30,
+        confirmed: true,
+        aabb,
+        obb: Obb::from_aabb(&aabb),
+        observed: Default::default(),
+    }
+}
+
+fn config(fade_spread: bool) -> Config {
+    let mut config = Config::default();
+    for ap in &mut config.site.access_points {
+        ap.radio = Some(Radio { fade_spread, ..Radio::default() });
+    }
+    config
+}
+
+fn faded(config: &Config, tracks: &[Track]) -> (Caster, Fader, Vec<Loss>) {
+    let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
+    let (mut caster, mut fader) = (Caster::new(&config.blockage, &config.site), Fader::new(&config.site));
+    let mut losses = Vec::new();
+    caster.cast(tracks, &forecasts, &mut Vec::new());
+    fader.fade(&caster, &mut losses);
+    (caster, fader, losses)
+}
+
+#[test]
+fn who_stands_behind_somebody_loses_power_and_who_stands_before_him_does_not() {
+    // The access point `side` hangs at (14, 0, 2).
+    let tracks = [(4.0, 0), (2.0, 1)].map(|(x, id)| somebody(id, DVec2::new(x, 0.0), DVec2::ZERO));
+    let (_, fader, losses) = faded(&config(false), &tracks);
+    assert_eq!(losses.len(), 4);
+    let of_side = |track: u64| losses.iter().find(|l| l.access_point == 0 && l.track == track).unwrap();
+    assert_eq!(*of_side(0), Loss::clear(0, 0));
+    let [low, median, high] = of_side(1).now_db;
+    assert!(low > 8.0 && median > 12.0 && high < 35.0, "{:?}", of_side(1).now_db);
+    assert!(of_side(1).p_out_now > 0.8 && of_side(1).p_out[8] >= of_side(1).p_out_now - 1e-9);
+    assert!(fader.outages().of(0, 1, 0).iter().any(|word| *word != 0));
+    assert_eq!(fader.outages().people(), 2);
+}
+
+#[test]
+fn somebody_who_crosses_a_link_takes_it_out_when_he_is_there() {
+    let crosses = somebody(0, DVec2::new(6.0, -0.75), DVec2::new(0.0, 1.5));
+    let stands = somebody(1, DVec2::new(2.0, 0.0), DVec2::ZERO);
+    let (_, _, losses) = faded(&config(false), &[crosses, stands]);
+    let loss = losses.iter().find(|l| l.access_point == 0 && l.track == 1).unwrap();
+    assert!(loss.p_out_now < 0.1, "{loss:?}");
+    // He is on the line after half a second.
+    assert!(loss.steps_db[4][1] > 8.0 && loss.steps_db[8][1] < 2.0, "{loss:?}");
+    assert!(loss.onset_s[1].is_some_and(|s| (0.29..0.51).contains(&s)), "{:?}", loss.onset_s);
+}
+
+#[test]
+fn the_spread_of_real_fades_widens_what_is_told() {
+    let tracks = [(4.0, 0), (2.0, 1)].map(|(x, id)| somebody(id, DVec2::new(x, 0.0), DVec2::ZERO));
+    let width_db = |fade_spread| {
+        let (.., losses) = faded(&config(fade_spread), &tracks);
+        let [low, _, high] = losses.iter().find(|l| l.access_point == 0 && l.track == 1).unwrap().now_db;
+        high - low
+    };
+    assert!(width_db(true) > width_db(false) + 5.0, "{} {}", width_db(true), width_db(false));
+    assert_eq!(spread_db(0.0), 0.0);
+    assert!((spread_db(4.0) - 3.3).abs() < 1e-12 && spread_db(40.0) == 6.0);
+}
+
+/// Random crowds: every sample's loss is that of the exact model over everybody, so nobody who matters is left out.
+#[test]
+fn losses_are_those_of_everybody_asked_one_by_one() {
+    let mut random = Pcg64::seed_from_u64(7);
+    let mut fades = 0;
+    for ue in [
+        Ue { forward_m: 0.0, left_m: 0.0, height_share: 0.5 },
+        Ue { forward_m: 0.3, left_m: 0.1, height_share: 0.6 },
+    ] {
+        let mut config = config(false);
+        config.site.ue = ue;
+        let mut within = |most: f64| random.random_range(-most..most);
+        let tracks: Vec<Track> = (0..12)
+            .map(|id| {
+                somebody(id, DVec2::new(within(7.0), within(7.0)), DVec2::new(within(1.5), within(1.5)))
+            })
+            .collect();
+        let (caster, mut fader, losses) = faded(&config, &tracks);
+        let (people, samples) = caster.drawn().unwrap();
+        for person in 0..people.len() {
+            fader.turn(people, person);
+        }
+        for (ap, place) in config.site.access_points.iter().enumerate() {
+            for owner in 0..people.len() {
+                let loss = losses.iter().find(|l| l.access_point == ap && l.track == owner as u64).unwrap();
+                for step in [0, 4, 9] {
+                    let mut all_db: Vec<f64> = (0..samples)
+                        .map(|k| one_by_one(&fader, people, place.position(), &ue, owner, step, k))
+                        .collect();
+                    all_db.sort_by(f64::total_cmp);
+                    let median_db = all_db[samples / 2];
+                    let found = if step == 0 { loss.now_db[1] } else { loss.steps_db[step - 1][1] };
+                    assert!(
+                        (found - median_db).abs() < 0.5 + 0.1 * median_db.abs(),
+                        "{ap} {owner} {step}: found {found}, exactly {median_db}"
+                    );
+                    fades += usize::from(median_db > 5.0);
+                }
+            }
+        }
+    }
+    assert!(fades > 10, "{fades}: nothing was compared");
+}
+
+fn one_by_one(
+    fader: &Fader,
+    people: &[Trajectories],
+    ap_m: DVec3,
+    ue: &Ue,
+    owner: usize,
+    step: usize,
+    k: usize,
+) -> f64 {
+    let wavelength_m = Radio::default().wavelength_m();
+    let place = |p: &Trajectories| {
+        p.mean_m[step] + DVec2::from([0, 1].map(|i| f64::from(p.off_m[i][step * p.samples + k])))
+    };
+    let ahead = |of: usize| {
+        let [cos, sin] = [0, 1].map(|i| f64::from(fader.turns[of][i][k]));
+        people[of].ahead[step].rotate(DVec2::new(cos, sin))
+    };
+    let q = &people[owner];
+    let ue_m = ue.on_body(place(q), ahead(owner).to_angle(), f64::from(q.height_m[k]));
+    let mut sum_db = 0.0;
+    for (body, p) in people.iter().enumerate() {
+        if body == owner && ue.is_on_axis() {
+            continue;
+        }
+        let Some(passage) = Passage::new(ap_m, ue_m, place(p), 0.0) else { continue };
+        if passage.from_tx_m < 0.05 || passage.to_rx_m < 0.05 {
+            continue;
+        }
+        let along = (ap_m - ue_m).truncate().normalize();
+        let height_m = f64::from(p.height_m[k]);
+        let scale = height_m / 1.72 * f64::from(p.width_scale[k]);
+        let facing = ahead(body);
+        let half_m = scale * (0.13 * along.perp_dot(facing)).hypot(0.28 * along.dot(facing));
+        let parts = [
+            passage.rectangle(half_m, 0.0, 0.82 * height_m),
+            passage.rectangle(0.1 * scale, 0.82 * height_m, height_m),
+        ];
+        sum_db += kirchhoff_mean(wavelength_m, &passage, &parts, 0.04).min(50.0);
+    }
+    sum_db
+}
