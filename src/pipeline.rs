@@ -6,7 +6,7 @@ use crate::detect::{Background, Clocks, Cluster, Clusterer, Detection, Measurer,
 use crate::forecast::{Forecast, Forecaster, Weights};
 use crate::lidar::Views;
 use crate::mounting::Mountings;
-use crate::radio::{Fader, Loss};
+use crate::radio::{Fader, Loss, Outages};
 use crate::track::{Track, Tracker};
 use crate::{Config, Error, Frame, Health};
 
@@ -198,6 +198,11 @@ impl Pipeline {
     /// ```
     pub fn clocks(&self) -> &Clocks {
         &self.clocks
+    }
+
+    /// The samples of the last step: in which of them each link is out, and when.
+    pub fn outages(&self) -> &Outages {
+        self.fader.outages()
     }
 
     /// From the next step on links are those of this configuration's access points, UE and stage 3; everybody stays

@@ -121,6 +121,11 @@ impl Caster {
         (self.method == BlockageMethod::Probability).then(|| self.sampler.drawn())
     }
 
+    /// How many samples the configuration asks for.
+    pub(crate) fn samples_asked(&self) -> usize {
+        self.numbers.samples
+    }
+
     /// The paper's way: boxes at the means, yes or no.
     fn cast_boxes(&self, people: &[(&Track, &Forecast)], blockages: &mut Vec<Blockage>) {
         let boxes_now: Vec<PersonBox> = people

@@ -129,6 +129,19 @@ impl Decider {
         }
     }
 
+    /// What to do about one device that `serving` serves: the person at `person` among those of `outages`, of whose link `loss`
+    /// is. `None` where the site does not say what changes cost.
+    pub fn advise(
+        &mut self,
+        serving: usize,
+        loss: &Loss,
+        person: usize,
+        outages: &Outages,
+    ) -> Option<Decision> {
+        let costs = self.costs?;
+        Some(self.of_device(&costs, loss.track, serving, loss, person, outages))
+    }
+
     fn has_radio(&self, ap: usize) -> bool {
         self.radios.get(ap).copied().unwrap_or_default()
     }

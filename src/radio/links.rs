@@ -82,7 +82,7 @@ pub struct Fader {
     radios: Vec<Option<Antenna>>,
     ue: Ue,
     table: Table,
-    quantiles: Option<(usize, Quantiles)>,
+    quantiles: Option<Quantiles>,
     /// By access point and track: by how much each sample's fades are deeper than the model's, standard normal.
     spreads: BTreeMap<(usize, u64), Vec<f32>>,
     meetings: Vec<Meeting>,
@@ -151,7 +151,7 @@ impl Fader {
         }
         self.meet(people);
         let affordable = LOSSES_MAX / self.meetings.len().max(1) / WORD * WORD;
-        let samples = drawn.min(affordable.max(WORD));
+        let (samples, asked) = (drawn.min(affordable.max(WORD)), caster.samples_asked());
         self.outages.begin(self.radios.len(), people.len(), samples);
         self.spreads.retain(|&(_, track), _| people.iter().any(|person| person.track == track));
         if self.turns.len() < people.len() {
@@ -166,7 +166,7 @@ impl Fader {
             }
             for person in 0..people.len() {
                 let end = self.ends[link];
-                losses.push(self.of_link(access_point, person, people, begin..end, samples));
+                losses.push(self.of_link(access_point, person, people, begin..end, [samples, asked]));
                 (begin, link) = (end, link + 1);
             }
         }
@@ -215,7 +215,7 @@ impl Fader {
         owner: usize,
         people: &[Trajectories],
         meetings: std::ops::Range<usize>,
-        samples: usize,
+        [samples, asked]: [usize; 2],
     ) -> Loss {
         let track = people[owner].track;
         let mut loss = Loss::clear(access_point, track);
@@ -233,10 +233,7 @@ impl Fader {
         }
         let Some(antenna) = &self.radios[access_point] else { return loss };
         if antenna.spreads && !self.spreads.contains_key(&(access_point, track)) {
-            let count = people[owner].samples;
-            let known = self.quantiles.take().filter(|(of, _)| *of == count);
-            let (_, quantiles) =
-                self.quantiles.insert(known.unwrap_or_else(|| (count, Quantiles::new(count))));
+            let quantiles = self.quantiles.get_or_insert_with(|| Quantiles::new(asked));
             let key = track.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (access_point as u64 + 1) << 32;
             self.spreads.insert((access_point, track), quantiles.normal(key));
         }

@@ -14,6 +14,19 @@ pub struct Outages {
 }
 
 impl Outages {
+    /// So many samples of each link, none of them out.
+    pub fn new(access_points: usize, people: usize, samples: usize) -> Self {
+        let mut outages = Self::default();
+        outages.begin(access_points, people, samples);
+        outages
+    }
+
+    /// A link is out at a step of a sample.
+    pub fn set(&mut self, access_point: usize, person: usize, step: usize, sample: usize) {
+        let first = self.first(access_point, person, step);
+        self.bits[first + sample / WORD] |= 1 << (sample % WORD);
+    }
+
     /// No link is out.
     pub(super) fn begin(&mut self, access_points: usize, people: usize, samples: usize) {
         (self.people, self.samples, self.words) = (people, samples, samples.div_ceil(WORD));

@@ -1,0 +1,222 @@
+//! One device in the network: served, changing, or lost and on its way back; and what that costs it.
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use umbracast::site::{Costs, Radio};
+use umbracast_sim::random::stream;
+
+use crate::truth::{TICK_S, Traces};
+
+/// Reference signals come so often (3GPP TS 38.213, the usual period of synchronisation blocks).
+pub const REPORT_TICKS: usize = 2;
+/// Standard deviation of a report, dB: what links in sight show in the passages of IMMERSE.
+const REPORT_NOISE_DB: f64 = 0.6;
+/// No modulation carries more, bits a second in each hertz.
+const MOST_BPS_HZ: f64 = 7.4;
+/// A change back within so long is a ping-pong.
+const PING_PONG_S: f64 = 1.0;
+/// A change is needless where the link that was left would not have been out within so long.
+const NEEDLESS_S: f64 = 0.9;
+/// Rates are means over so many ticks.
+const WINDOW_TICKS: usize = 10;
+
+/// What a policy asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Change to an access point, by a command over the serving link.
+    Command(usize),
+    /// The device changes by itself, as it was prepared to.
+    Execute(usize),
+    /// While the link is out it is not given up, until the next order.
+    Hold,
+    /// As usual, until the next order.
+    Release,
+}
+
+/// What a policy sees at an instant.
+#[derive(Debug)]
+pub struct View<'a> {
+    /// The instant.
+    pub tick: usize,
+    /// Whose device.
+    pub person: usize,
+    /// The access point that serves it.
+    pub serving: usize,
+    /// By access point, the last report: signal to noise, dB.
+    pub reported_db: &'a [f64],
+    /// Whether there is a new one.
+    pub is_new: bool,
+}
+
+/// What came of a device's time.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tally {
+    /// How long it was in the scene.
+    pub ticks: usize,
+    /// Of these in outage: the link out, the device changing, or lost.
+    pub out_ticks: usize,
+    /// Changes that began.
+    pub handovers: usize,
+    /// Of these, back to the access point before within a second.
+    pub ping_pongs: usize,
+    /// Of these, away from a link that would not have been out.
+    pub needless: usize,
+    /// Commands that the serving link did not carry.
+    pub lost_commands: usize,
+    /// Links that were given up.
+    pub recoveries: usize,
+    /// Mean rates of 100 ms, bits a second.
+    pub rates_bps: Vec<f32>,
+}
+
+impl Tally {
+    /// Takes up another device's.
+    pub fn add(&mut self, other: &Self) {
+        self.ticks += other.ticks;
+        self.out_ticks += other.out_ticks;
+        self.handovers += other.handovers;
+        self.ping_pongs += other.ping_pongs;
+        self.needless += other.needless;
+        self.lost_commands += other.lost_commands;
+        self.recoveries += other.recoveries;
+        self.rates_bps.extend_from_slice(&other.rates_bps);
+    }
+
+    /// Share of the time in outage.
+    pub fn outage(&self) -> f64 {
+        self.out_ticks as f64 / self.ticks.max(1) as f64
+    }
+}
+
+/// The network's numbers.
+#[derive(Debug, Clone)]
+pub struct Network {
+    /// By access point.
+    pub radios: Vec<Option<Radio>>,
+    /// Of the procedures.
+    pub costs: Costs,
+    /// Of the reports' noise.
+    pub seed: u64,
+}
+
+impl Network {
+    /// Those with a radio.
+    pub fn ways(&self) -> impl Iterator<Item = usize> {
+        (0..self.radios.len()).filter(|&ap| self.radios[ap].is_some())
+    }
+
+    /// Whether a link is out.
+    pub fn is_out(&self, traces: &Traces, tick: usize, ap: usize, person: usize) -> bool {
+        self.radios[ap].is_none_or(|radio| traces.loss_db(tick, ap, person) >= radio.margin_db)
+    }
+
+    /// Signal to noise of a link.
+    pub fn snr_db(&self, traces: &Traces, tick: usize, ap: usize, person: usize) -> f64 {
+        self.radios[ap].map_or(f64::NEG_INFINITY, |radio| {
+            radio.snr_db(traces.length_m(tick, ap, person).max(0.1)) - traces.loss_db(tick, ap, person)
+        })
+    }
+
+    /// The access point that a device connects to at an instant.
+    pub fn strongest(&self, traces: &Traces, tick: usize, person: usize) -> usize {
+        let snr_db = |ap: &usize| self.snr_db(traces, tick, *ap, person);
+        self.ways().max_by(|a, b| snr_db(a).total_cmp(&snr_db(b))).unwrap_or_default()
+    }
+}
+
+enum Phase {
+    Served,
+    Changing { until: usize, to: usize },
+    Lost { until: usize },
+}
+
+/// Drives a device through a scene under a policy, from `begin` on.
+pub fn drive(
+    network: &Network,
+    traces: &Traces,
+    person: usize,
+    begin: usize,
+    mut policy: impl FnMut(&View<'_>) -> Option<Order>,
+) -> Tally {
+    let ticks_of = |seconds: f64| (seconds / TICK_S).round() as usize;
+    let costs = &network.costs;
+    let mut noise = stream(network.seed, "reports", person as u64);
+    let mut serving = network.strongest(traces, begin, person);
+    let (mut phase, mut command, mut held, mut out_for) = (Phase::Served, None, false, 0);
+    let mut last_change: Option<(usize, usize)> = None;
+    let mut reported_db = vec![f64::NEG_INFINITY; network.radios.len()];
+    let (mut tally, mut window_bps) = (Tally::default(), 0.0);
+    for tick in begin..traces.ticks {
+        match phase {
+            Phase::Changing { until, to } if tick >= until => (serving, phase) = (to, Phase::Served),
+            Phase::Lost { until } if tick >= until => {
+                (serving, phase) = (network.strongest(traces, tick, person), Phase::Served);
+            }
+            _ => {}
+        }
+        let is_new = tick.is_multiple_of(REPORT_TICKS);
+        if is_new {
+            for ap in network.ways() {
+                reported_db[ap] =
+                    network.snr_db(traces, tick, ap, person) + REPORT_NOISE_DB * normal(&mut noise);
+            }
+        }
+        let out = network.is_out(traces, tick, serving, person);
+        let mut change = None;
+        match policy(&View { tick, person, serving, reported_db: &reported_db, is_new }) {
+            Some(Order::Command(to)) if command.is_none() => {
+                command = Some((tick + ticks_of(costs.command_s), to));
+                held = false;
+            }
+            Some(Order::Execute(to)) => change = Some(to),
+            Some(Order::Hold) => held = true,
+            Some(Order::Release) => held = false,
+            _ => {}
+        }
+        if let Some((_, to)) = command.filter(|(at, _)| *at <= tick) {
+            command = None;
+            if !matches!(phase, Phase::Served) || out {
+                tally.lost_commands += 1;
+            } else {
+                change = Some(to);
+            }
+        }
+        if let (Some(to), Phase::Served) = (change.filter(|to| *to != serving), &phase) {
+            tally.handovers += 1;
+            let back = last_change.is_some_and(|(at, from)| from == to && tick - at <= ticks_of(PING_PONG_S));
+            tally.ping_pongs += usize::from(back);
+            let last = (tick + ticks_of(NEEDLESS_S)).min(traces.ticks);
+            let needed = (tick..last).any(|later| network.is_out(traces, later, serving, person));
+            tally.needless += usize::from(!needed);
+            last_change = Some((tick, serving));
+            phase = Phase::Changing { until: tick + ticks_of(costs.interruption_s), to };
+        }
+        tally.ticks += 1;
+        let serves = matches!(phase, Phase::Served) && !out;
+        tally.out_ticks += usize::from(!serves);
+        out_for = if matches!(phase, Phase::Served) && out { out_for + 1 } else { 0 };
+        if out_for >= ticks_of(costs.given_up_after_s) && !held {
+            tally.recoveries += 1;
+            out_for = 0;
+            phase = Phase::Lost { until: tick + ticks_of(costs.recovery_s) };
+        }
+        if serves {
+            window_bps += rate_bps(network, network.snr_db(traces, tick, serving, person), serving);
+        }
+        if (tick - begin + 1).is_multiple_of(WINDOW_TICKS) {
+            tally.rates_bps.push((window_bps / WINDOW_TICKS as f64) as f32);
+            window_bps = 0.0;
+        }
+    }
+    tally
+}
+
+/// Shannon's, with the most that a modulation carries.
+fn rate_bps(network: &Network, snr_db: f64, ap: usize) -> f64 {
+    let bits = (1.0 + 10.0_f64.powf(0.1 * snr_db)).log2().min(MOST_BPS_HZ);
+    network.radios[ap].map_or(0.0, |radio| radio.bandwidth_mhz * 1e6 * bits)
+}
+
+fn normal(random: &mut impl Rng) -> f64 {
+    StandardNormal.sample(random)
+}
