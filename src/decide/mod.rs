@@ -54,7 +54,7 @@ pub enum Action {
     Wait,
     /// Change to the target now.
     HandOver,
-    /// A change to the target is likely to be right within a second, and not yet.
+    /// Be prepared to change to the target as soon as the serving link falls.
     Prepare,
 }
 
@@ -70,8 +70,8 @@ impl Action {
     }
 }
 
-/// A change is prepared where it is the best in so many of the samples.
-const LIKELY: f64 = 0.3;
+/// A change is prepared where it would help in so many of the samples: preparing costs little.
+const LIKELY: f64 = 0.05;
 
 /// The stage. It remembers which access point serves whom, and takes it that its advice is followed unless it is told otherwise.
 #[derive(Debug, Clone)]
@@ -188,11 +188,11 @@ impl Decider {
         if let Some((target, cost_s)) = best.filter(|(_, cost_s)| *cost_s < values.stay_s) {
             (decision.action, decision.target) = (Action::HandOver, Some(target));
             decision.saved_s = values.stay_s - cost_s;
+        } else if let Some((target, _)) = values.later.filter(|(_, share)| *share >= LIKELY) {
+            (decision.action, decision.target) = (Action::Prepare, Some(target));
         } else if values.held_s < values.given_up_s && loss.p_out_now >= LIKELY {
             decision.action = Action::Wait;
             decision.saved_s = values.given_up_s - values.held_s;
-        } else if values.later >= LIKELY {
-            (decision.action, decision.target) = (Action::Prepare, best.map(|(target, _)| target));
         }
         decision
     }

@@ -21,18 +21,26 @@ pub(super) struct Values {
     /// Of an outage now that is sat out, and of one that the network gives up.
     pub(super) held_s: f64,
     pub(super) given_up_s: f64,
-    /// In which share of the samples a change comes later.
-    pub(super) later: f64,
+    /// Where to when the serving link goes out, and in which share of the samples it does and a change then helps.
+    pub(super) later: Option<(usize, f64)>,
 }
 
 /// Its working memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Programme {
-    /// By way and sample: the cost from the next step on.
-    next_s: Vec<f32>,
-    here_s: Vec<f32>,
+    /// By step, way and sample: the cost from that step on, and after the last step none.
+    value_s: Vec<f32>,
     /// By sample: that of the best way.
     least_s: Vec<f32>,
+}
+
+/// What does not change over steps.
+struct Numbers {
+    conditional: bool,
+    /// The share of a step that a command is under way: if the link goes out then, it is lost.
+    lost: f32,
+    change_s: f32,
+    given_up_s: f32,
 }
 
 impl Programme {
@@ -44,89 +52,113 @@ impl Programme {
         person: usize,
         outages: &Outages,
     ) -> Values {
+        let numbers = Numbers {
+            conditional: costs.conditional,
+            lost: ((costs.age_s + costs.command_s) / STEP_S).min(1.0) as f32,
+            change_s: (costs.interruption_s + costs.price_s) as f32,
+            given_up_s: (costs.given_up_after_s + costs.recovery_s + costs.price_s) as f32,
+        };
         let samples = outages.samples();
-        self.next_s.clear();
-        self.next_s.resize(ways.len() * samples, 0.0);
-        self.here_s.clone_from(&self.next_s);
-        // A command that is under way when the link goes out is lost: the share of a step that it takes.
-        let lost = ((costs.age_s + costs.command_s) / STEP_S).min(1.0) as f32;
-        let change_s = (costs.interruption_s + costs.price_s) as f32;
-        let given_up_s = (costs.given_up_after_s + costs.recovery_s + costs.price_s) as f32;
-        for step in (1..MOMENTS).rev() {
-            self.find_least(samples);
+        let of_step = ways.len() * samples;
+        self.value_s.clear();
+        self.value_s.resize((MOMENTS + 1) * of_step, 0.0);
+        for step in (0..MOMENTS).rev() {
+            self.find_least(step + 1, of_step, samples);
+            let (here_s, next_s) = self.value_s[step * of_step..].split_at_mut(of_step);
             for (way, &ap) in ways.iter().enumerate() {
                 let out = outages.of(ap, person, step);
                 let soon = if step + 1 < MOMENTS { outages.of(ap, person, step + 1) } else { &[] };
                 let row = way * samples..(way + 1) * samples;
-                let (next_s, here_s) = (&self.next_s[row.clone()], &mut self.here_s[row]);
+                let (next_s, here_s) = (&next_s[row.clone()], &mut here_s[row]);
                 for k in 0..samples {
-                    let least_s = self.least_s[k];
-                    here_s[k] = if has(out, k) {
-                        (STEP_S as f32 + next_s[k]).min(given_up_s + least_s)
+                    let stayed_s = if has(out, k) {
+                        (STEP_S as f32 + next_s[k]).min(numbers.given_up_s + self.least_s[k])
                     } else {
-                        let missed = if has(soon, k) { lost } else { 0.0 };
-                        let changed_s = change_s + least_s + missed * (next_s[k] - least_s);
-                        next_s[k].min(changed_s)
+                        next_s[k]
                     };
+                    let lost = numbers.lost(has(out, k), has(soon, k));
+                    let changed_s = numbers.change_s + self.least_s[k];
+                    here_s[k] = stayed_s.min(changed_s + lost * (stayed_s - changed_s).max(0.0));
                 }
             }
-            std::mem::swap(&mut self.next_s, &mut self.here_s);
         }
-        self.weigh(costs, ways, serving, person, outages, [lost, change_s, given_up_s])
+        self.weigh(&numbers, ways, serving, person, outages)
     }
 
     /// Of what is done now, over all samples.
     fn weigh(
         &mut self,
-        costs: &Costs,
+        numbers: &Numbers,
         ways: &[usize],
         serving: usize,
         person: usize,
         outages: &Outages,
-        [lost, change_s, given_up_s]: [f32; 3],
     ) -> Values {
         let samples = outages.samples();
-        self.find_least(samples);
+        let of_step = ways.len() * samples;
+        self.find_least(1, of_step, samples);
         let own = ways.iter().position(|ap| *ap == serving).unwrap_or_default();
-        let own_s = &self.next_s[own * samples..(own + 1) * samples];
+        let value_s = |step: usize, way: usize, k: usize| self.value_s[step * of_step + way * samples + k];
         let (out, soon) = (outages.of(serving, person, 0), outages.of(serving, person, 1));
-        let mut values = Values::default();
-        let mut sums = vec![0.0_f64; ways.len()];
+        let mut changed_s = vec![0.0_f64; ways.len()];
+        let mut later_s = vec![0.0_f64; ways.len()];
         let (mut stay, mut held, mut given_up, mut later) = (0.0, 0.0, 0.0, 0);
         for k in 0..samples {
-            let stay_s = own_s[k];
-            let given_up_s = given_up_s + self.least_s[k];
-            held += f64::from(stay_s);
+            let stayed_s = value_s(1, own, k) + if has(out, k) { STEP_S as f32 } else { 0.0 };
+            let given_up_s = numbers.given_up_s + self.least_s[k];
+            held += f64::from(stayed_s);
             given_up += f64::from(given_up_s);
-            stay += f64::from(if has(out, k) { stay_s.min(given_up_s) } else { stay_s });
-            later += usize::from(stay_s > self.least_s[k] + 0.5 * STEP_S as f32);
-            // A link that is out hears no command, where one is needed.
-            let missed = match (has(out, k), has(soon, k)) {
-                _ if costs.command_s == 0.0 => 0.0,
-                (true, _) => 1.0,
-                (false, true) => lost,
-                (false, false) => 0.0,
-            };
-            for (way, sum) in sums.iter_mut().enumerate() {
-                let changed_s = change_s + self.next_s[way * samples + k];
-                *sum += f64::from(changed_s + missed * (stay_s - changed_s));
+            // A prepared change may follow within the step.
+            stay +=
+                f64::from(if numbers.conditional { value_s(0, own, k) } else { stayed_s.min(given_up_s) });
+            let lost = numbers.lost(has(out, k), has(soon, k)) * f32::from(u8::from(!numbers.conditional));
+            for (way, sum) in changed_s.iter_mut().enumerate() {
+                let changed_s = numbers.change_s + value_s(1, way, k);
+                *sum += f64::from(changed_s + lost * (stayed_s - changed_s));
+            }
+            let onset = (0..MOMENTS).find(|&step| has(outages.of(serving, person, step), k));
+            let Some(onset) = onset else { continue };
+            let least_s = (0..ways.len()).map(|way| value_s(onset, way, k)).fold(f32::MAX, f32::min);
+            if numbers.change_s + least_s < value_s(onset + 1, own, k) + STEP_S as f32 {
+                later += 1;
+                later_s
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(way, sum)| *sum += f64::from(value_s(onset, way, k)));
             }
         }
         let mean = |sum: f64| sum / samples as f64;
-        (values.stay_s, values.held_s, values.given_up_s) = (mean(stay), mean(held), mean(given_up));
-        values.later = later as f64 / samples as f64;
-        let others = ways.iter().zip(sums).filter(|(ap, _)| **ap != serving);
-        values.changed_s = others.map(|(ap, sum)| (*ap, mean(sum))).collect();
-        values
+        let others = || (0..ways.len()).filter(|way| *way != own);
+        let best_later = others().min_by(|a, b| later_s[*a].total_cmp(&later_s[*b])).filter(|_| later > 0);
+        Values {
+            stay_s: mean(stay),
+            changed_s: others().map(|way| (ways[way], mean(changed_s[way]))).collect(),
+            held_s: mean(held),
+            given_up_s: mean(given_up),
+            later: best_later.map(|way| (ways[way], mean(f64::from(later)))),
+        }
     }
 
-    fn find_least(&mut self, samples: usize) {
+    fn find_least(&mut self, step: usize, of_step: usize, samples: usize) {
         self.least_s.clear();
         self.least_s.resize(samples, f32::MAX);
-        for of_way in self.next_s.chunks_exact(samples) {
+        for of_way in self.value_s[step * of_step..(step + 1) * of_step].chunks_exact(samples) {
             for (least_s, way_s) in self.least_s.iter_mut().zip(of_way) {
                 *least_s = least_s.min(*way_s);
             }
+        }
+    }
+}
+
+impl Numbers {
+    /// The chance that a change that begins now does not come about. A link that is out hears no command; a prepared device
+    /// needs none.
+    #[inline(always)]
+    fn lost(&self, out: bool, soon: bool) -> f32 {
+        match (self.conditional, out, soon) {
+            (true, ..) | (_, false, false) => 0.0,
+            (_, true, _) => 1.0,
+            (_, false, true) => self.lost,
         }
     }
 }

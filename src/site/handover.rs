@@ -17,6 +17,10 @@ use serde::{Deserialize, Serialize};
 pub struct Handover {
     /// The procedure that the network has.
     pub procedure: Procedure,
+    /// Whether a device can be prepared for a change and carry it out by itself, without a command, when the serving link falls
+    /// (conditional handover of Release 16, conditional LTM of Release 19). Without it changes need a command.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conditional: Option<bool>,
     /// How long nothing is sent while a device changes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interruption_ms: Option<f64>,
@@ -65,8 +69,10 @@ pub enum Procedure {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Costs {
     /// See [`Handover`].
+    pub conditional: bool,
+    /// See [`Handover`].
     pub interruption_s: f64,
-    /// See [`Handover`]; 0 where no command is needed.
+    /// See [`Handover`].
     pub command_s: f64,
     /// See [`Handover`].
     pub age_s: f64,
@@ -84,11 +90,12 @@ impl Handover {
         let (interruption_ms, command_ms) = match self.procedure {
             Procedure::NrL3 => (70.0, 20.0),
             Procedure::NrLtm => (25.0, 20.0),
-            Procedure::NrCho => (70.0, 0.0),
-            Procedure::Wigig => (100.0, 0.0),
+            Procedure::NrCho => (70.0, 20.0),
+            Procedure::Wigig => (100.0, 1.0),
         };
         let seconds = |given: Option<f64>, usual_ms: f64| given.unwrap_or(usual_ms) * 1e-3;
         Costs {
+            conditional: self.conditional.unwrap_or(self.procedure != Procedure::NrL3),
             interruption_s: seconds(self.interruption_ms, interruption_ms),
             command_s: seconds(self.command_ms, command_ms),
             age_s: seconds(self.age_ms, 30.0),

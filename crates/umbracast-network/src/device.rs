@@ -17,6 +17,9 @@ const MOST_BPS_HZ: f64 = 7.4;
 const PING_PONG_S: f64 = 1.0;
 /// A change is needless where the link that was left would not have been out within so long.
 const NEEDLESS_S: f64 = 0.9;
+/// A prepared device changes when the serving link has fallen by so much from the level at which it was prepared: five of the
+/// reports' standard deviations and more.
+const FALLEN_DB: f64 = 4.0;
 /// Rates are means over so many ticks.
 const WINDOW_TICKS: usize = 10;
 
@@ -27,6 +30,8 @@ pub enum Order {
     Command(usize),
     /// The device changes by itself, as it was prepared to.
     Execute(usize),
+    /// The device changes by itself when the serving link falls, until the next order.
+    Prepare(usize),
     /// While the link is out it is not given up, until the next order.
     Hold,
     /// As usual, until the next order.
@@ -143,6 +148,7 @@ pub fn drive(
     let mut noise = stream(network.seed, "reports", person as u64);
     let mut serving = network.strongest(traces, begin, person);
     let (mut phase, mut command, mut held, mut out_for) = (Phase::Served, None, false, 0);
+    let mut prepared: Option<(usize, f64)> = None;
     let mut last_change: Option<(usize, usize)> = None;
     let mut reported_db = vec![f64::NEG_INFINITY; network.radios.len()];
     let (mut tally, mut window_bps) = (Tally::default(), 0.0);
@@ -169,9 +175,20 @@ pub fn drive(
                 held = false;
             }
             Some(Order::Execute(to)) => change = Some(to),
-            Some(Order::Hold) => held = true,
-            Some(Order::Release) => held = false,
+            Some(Order::Prepare(to)) => {
+                // The level to fall from is the best that was heard while being prepared.
+                let before = prepared.map_or(f64::NEG_INFINITY, |(_, level_db)| level_db);
+                prepared = Some((to, before.max(reported_db[serving])));
+                held = false;
+            }
+            Some(Order::Hold) => (held, prepared) = (true, None),
+            Some(Order::Release) => (held, prepared) = (false, None),
             _ => {}
+        }
+        if let Some((to, level_db)) = prepared.filter(|_| is_new) {
+            if reported_db[serving] < level_db - FALLEN_DB {
+                change = Some(to);
+            }
         }
         if let Some((_, to)) = command.filter(|(at, _)| *at <= tick) {
             command = None;
@@ -189,6 +206,7 @@ pub fn drive(
             let needed = (tick..last).any(|later| network.is_out(traces, later, serving, person));
             tally.needless += usize::from(!needed);
             last_change = Some((tick, serving));
+            prepared = None;
             phase = Phase::Changing { until: tick + ticks_of(costs.interruption_s), to };
         }
         tally.ticks += 1;

@@ -160,6 +160,7 @@ impl<'a> Advised<'a> {
         let decision = self.advise(frame, view)?;
         Some(match (decision.action, decision.target) {
             (Action::HandOver, Some(target)) => Order::Command(target),
+            (Action::Prepare, Some(target)) if self.network.costs.conditional => Order::Prepare(target),
             (Action::Wait, _) => Order::Hold,
             _ => Order::Release,
         })
