@@ -197,3 +197,6 @@ impl Decider {
         decision
     }
 }
+
+#[cfg(test)]
+mod tests;

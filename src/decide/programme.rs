@@ -40,6 +40,8 @@ struct Numbers {
     /// The share of a step that a command is under way: if the link goes out then, it is lost.
     lost: f32,
     change_s: f32,
+    /// What is left of a step after a change in it: in outage where the new link is out.
+    rest_s: f32,
     given_up_s: f32,
 }
 
@@ -56,6 +58,7 @@ impl Programme {
             conditional: costs.conditional,
             lost: ((costs.age_s + costs.command_s) / STEP_S).min(1.0) as f32,
             change_s: (costs.interruption_s + costs.price_s) as f32,
+            rest_s: (STEP_S - costs.interruption_s).max(0.0) as f32,
             given_up_s: (costs.given_up_after_s + costs.recovery_s + costs.price_s) as f32,
         };
         let samples = outages.samples();
@@ -63,7 +66,7 @@ impl Programme {
         self.value_s.clear();
         self.value_s.resize((MOMENTS + 1) * of_step, 0.0);
         for step in (0..MOMENTS).rev() {
-            self.find_least(step + 1, of_step, samples);
+            self.find_least(&numbers, ways, person, outages, step);
             let (here_s, next_s) = self.value_s[step * of_step..].split_at_mut(of_step);
             for (way, &ap) in ways.iter().enumerate() {
                 let out = outages.of(ap, person, step);
@@ -96,7 +99,7 @@ impl Programme {
     ) -> Values {
         let samples = outages.samples();
         let of_step = ways.len() * samples;
-        self.find_least(1, of_step, samples);
+        self.find_least(numbers, ways, person, outages, 0);
         let own = ways.iter().position(|ap| *ap == serving).unwrap_or_default();
         let value_s = |step: usize, way: usize, k: usize| self.value_s[step * of_step + way * samples + k];
         let (out, soon) = (outages.of(serving, person, 0), outages.of(serving, person, 1));
@@ -113,7 +116,8 @@ impl Programme {
                 f64::from(if numbers.conditional { value_s(0, own, k) } else { stayed_s.min(given_up_s) });
             let lost = numbers.lost(has(out, k), has(soon, k)) * f32::from(u8::from(!numbers.conditional));
             for (way, sum) in changed_s.iter_mut().enumerate() {
-                let changed_s = numbers.change_s + value_s(1, way, k);
+                let rest_s = if has(outages.of(ways[way], person, 0), k) { numbers.rest_s } else { 0.0 };
+                let changed_s = numbers.change_s + rest_s + value_s(1, way, k);
                 *sum += f64::from(changed_s + lost * (stayed_s - changed_s));
             }
             let onset = (0..MOMENTS).find(|&step| has(outages.of(serving, person, step), k));
@@ -139,12 +143,24 @@ impl Programme {
         }
     }
 
-    fn find_least(&mut self, step: usize, of_step: usize, samples: usize) {
+    /// By sample, what is left after a change at `step` to the best way.
+    fn find_least(
+        &mut self,
+        numbers: &Numbers,
+        ways: &[usize],
+        person: usize,
+        outages: &Outages,
+        step: usize,
+    ) {
+        let samples = outages.samples();
+        let of_step = ways.len() * samples;
         self.least_s.clear();
         self.least_s.resize(samples, f32::MAX);
-        for of_way in self.value_s[step * of_step..(step + 1) * of_step].chunks_exact(samples) {
-            for (least_s, way_s) in self.least_s.iter_mut().zip(of_way) {
-                *least_s = least_s.min(*way_s);
+        let next_s = &self.value_s[(step + 1) * of_step..(step + 2) * of_step];
+        for (of_way, &ap) in next_s.chunks_exact(samples).zip(ways) {
+            let out = outages.of(ap, person, step);
+            for (k, (least_s, way_s)) in self.least_s.iter_mut().zip(of_way).enumerate() {
+                *least_s = least_s.min(way_s + if has(out, k) { numbers.rest_s } else { 0.0 });
             }
         }
     }

@@ -185,10 +185,10 @@ pub fn drive(
             Some(Order::Release) => (held, prepared) = (false, None),
             _ => {}
         }
-        if let Some((to, level_db)) = prepared.filter(|_| is_new) {
-            if reported_db[serving] < level_db - FALLEN_DB {
-                change = Some(to);
-            }
+        if let Some((to, level_db)) = prepared.filter(|_| is_new)
+            && reported_db[serving] < level_db - FALLEN_DB
+        {
+            change = Some(to);
         }
         if let Some((_, to)) = command.filter(|(at, _)| *at <= tick) {
             command = None;

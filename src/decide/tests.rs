@@ -1,0 +1,98 @@
+use super::*;
+use crate::Config;
+use crate::site::{AccessPoint, Handover, Radio};
+
+/// Three access points with radios, of which changes cost what these procedures do.
+fn decider(handover: Handover) -> Decider {
+    let mut site = Config::default().site;
+    let place = |x: f64| AccessPoint {
+        name: format!("at {x}"),
+        position_m: [x, 0.0, 2.0],
+        radio: Some(Radio::default()),
+    };
+    site.access_points = [-5.0, 0.0, 5.0].map(place).to_vec();
+    site.handover = Some(handover);
+    Decider::new(&site)
+}
+
+/// Commands alone: nobody changes by himself.
+fn commands() -> Handover {
+    Handover { conditional: Some(false), ..Handover::default() }
+}
+
+const SAMPLES: usize = 64;
+
+/// Access point `ap` is out at these steps in the first so many samples.
+fn out(outages: &mut Outages, ap: usize, steps: std::ops::RangeInclusive<usize>, samples: usize) {
+    for sample in 0..samples {
+        steps.clone().for_each(|step| outages.set(ap, 0, step, sample));
+    }
+}
+
+/// What the first access point's link is thought to lose, as far as decisions read it.
+fn loss(p_out_now: f64, p_out: f64) -> Loss {
+    let onset_s = [(p_out > 0.0).then_some(0.4); 3];
+    Loss { p_out_now, p_out: [p_out; STEPS], onset_s, ..Loss::clear(0, 7) }
+}
+
+#[test]
+fn who_is_not_at_risk_stays() {
+    let outages = Outages::new(3, 1, SAMPLES);
+    let decision = decider(commands()).advise(0, &loss(0.0, 0.0), 0, &outages).unwrap();
+    assert_eq!((decision.action, decision.target, decision.saved_s), (Action::Stay, None, 0.0));
+}
+
+#[test]
+fn a_link_that_will_surely_be_out_is_left_for_one_that_will_not() {
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    // At once after the next command could still pass, and for half a second.
+    out(&mut outages, 0, 1..=5, SAMPLES);
+    out(&mut outages, 1, 3..=6, SAMPLES);
+    let decision = decider(commands()).advise(0, &loss(0.0, 1.0), 0, &outages).unwrap();
+    assert_eq!((decision.action, decision.target), (Action::HandOver, Some(2)));
+    assert!(decision.saved_s > 0.02, "{decision:?}");
+}
+
+#[test]
+fn who_can_wait_waits_for_a_better_forecast() {
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    // In half of the samples, and not soon.
+    out(&mut outages, 0, 6..=8, SAMPLES / 2);
+    let decision = decider(commands()).advise(0, &loss(0.0, 0.5), 0, &outages).unwrap();
+    assert_eq!((decision.action, decision.target), (Action::Prepare, Some(1)));
+    // Onset at 0.4 s at the earliest: a step earlier, less interruption, command and age.
+    assert!(decision.deadline_s.is_some_and(|s| (s - 0.225).abs() < 1e-9), "{decision:?}");
+}
+
+#[test]
+fn access_points_behind_one_person_fail_together_and_are_no_refuge() {
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    // The second is out in just the samples in which the first is, the third as often but in the others.
+    out(&mut outages, 0, 1..=4, SAMPLES / 2);
+    out(&mut outages, 1, 1..=4, SAMPLES / 2);
+    for sample in SAMPLES / 2..SAMPLES {
+        (1..=4).for_each(|step| outages.set(2, 0, step, sample));
+    }
+    let prepares = decider(Handover::default()).advise(0, &loss(0.0, 0.5), 0, &outages).unwrap();
+    assert_eq!((prepares.action, prepares.target), (Action::Prepare, Some(2)));
+}
+
+#[test]
+fn a_short_outage_of_all_is_sat_out() {
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    (0..3).for_each(|ap| out(&mut outages, ap, 0..=0, SAMPLES));
+    let decision = decider(Handover::default()).advise(0, &loss(1.0, 1.0), 0, &outages).unwrap();
+    assert_eq!(decision.action, Action::Wait);
+    assert!(decision.saved_s > 0.1, "giving up costs 160 ms, the outage 100: {decision:?}");
+}
+
+#[test]
+fn a_device_is_served_as_it_was_advised_until_the_network_says_otherwise() {
+    let mut decider = decider(commands());
+    decider.serve(7, 2);
+    assert_eq!(decider.serving.get(&7), Some(&2));
+    let mut without = Decider::new(&Config::default().site);
+    let mut decisions = vec![];
+    without.decide(&[], &[], &Outages::new(1, 0, SAMPLES), &mut decisions);
+    assert!(decisions.is_empty() && without.advise(0, &loss(0.0, 0.0), 0, &Outages::new(1, 1, 1)).is_none());
+}
