@@ -47,7 +47,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 40] = [
+const JOBS: [Job; 41] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -69,6 +69,7 @@ const JOBS: [Job; 40] = [
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", Needs::Nothing, glass::glass),
     job("gestures", "people who talk with their hands beside a sensor", Needs::Nothing, gestures::gestures),
     job("cut", "what a frame gains that closes as soon as the part with people has", Needs::Nothing, crowds::cut),
+    job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", Needs::Nothing, crowds::network),
     job("live", "ten minutes live, three times over, the page open", Needs::Asking, live::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", Needs::Asking, nodes::nodes),
     job("halls", "1 to 64 halls on one host", Needs::Asking, nodes::halls),

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::fs;
 
 use super::book::Book;
-use crate::tools::{Result, argument};
+use crate::tools::{Result, argument, root};
 
 /// How recorded walkers of the circle antipode experiment are read.
 const ANTIPODE: [&str; 6] = ["--centre", "--unit", "cm", "--fps", "25", "--trajectories"];
@@ -219,5 +219,15 @@ pub fn logictronix(book: &mut Book) -> Result<()> {
             book.umbracast_says(["evaluate".into(), argument(&out), "--labels".into(), labels.clone()])?;
         }
     }
+    Ok(())
+}
+
+/// Policies of changing access points, in closed loop.
+pub fn network(book: &mut Book) -> Result<()> {
+    let line =
+        "cargo run --release --quiet --package umbracast-network --example closed_loop -- 220000 40 20";
+    book.command(line);
+    let said = book.bash(&root(), line)?;
+    book.line(&said);
     Ok(())
 }
