@@ -36,6 +36,9 @@ pub struct Mqtt {
     pub password_file: Option<PathBuf>,
     /// The certificate that the broker's is signed by, PEM: with it the connection is encrypted.
     pub ca: Option<PathBuf>,
+    /// Warnings and password go to a broker on another host as they are. Without `ca` that has to be said.
+    #[serde(default)]
+    pub plain: bool,
 }
 
 /// Sends the warnings of a hall.
@@ -226,7 +229,7 @@ mod tests {
     fn a_broker_gets_every_warning_as_json_and_is_told_who_is_there() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = broker.local_addr().unwrap().to_string();
-        let settings = Mqtt { broker: address, user: None, password_file: None, ca: None };
+        let settings = Mqtt { broker: address, user: None, password_file: None, ca: None, plain: false };
         let sender = Sender::start(&settings, "lab").unwrap();
         sender.send(&event()); // Waits until the broker is there.
         let (mut stream, _) = broker.accept().unwrap();
@@ -260,7 +263,13 @@ mod tests {
 
     #[test]
     fn a_broker_that_is_never_there_stops_nobody() {
-        let settings = Mqtt { broker: "127.0.0.1:1".to_owned(), user: None, password_file: None, ca: None };
+        let settings = Mqtt {
+            broker: "127.0.0.1:1".to_owned(),
+            user: None,
+            password_file: None,
+            ca: None,
+            plain: false,
+        };
         let sender = Sender::start(&settings, "lab").unwrap();
         (0..WAITING + 10).for_each(|_| sender.send(&event()));
         assert!(sender.lost() >= 10);

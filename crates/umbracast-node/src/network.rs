@@ -151,6 +151,15 @@ impl Network {
         if let Some(hall) = &self.hall {
             chunk(hall).map_err(|e| e.within("network.hall"))?;
         }
+        if let Some(mqtt) = self.mqtt.as_ref().filter(|mqtt| mqtt.ca.is_none() && !mqtt.plain)
+            && !is_loopback(&mqtt.broker)
+        {
+            return Err(Error::new(format!(
+                "network.mqtt: expected ca, the certificate that encrypts the connection, or plain = true, beside a broker on \
+                 another host, found {:?} alone",
+                mqtt.broker
+            )));
+        }
         let guarded = self.users_file.is_some() || self.tls.as_ref().is_some_and(|tls| tls.both);
         if !self.roles.is_empty() && !guarded {
             return Err(Error::new(
@@ -337,11 +346,14 @@ mod tests {
             ("[network]\nwait = 1.0", "lab.toml:4: unknown field `wait`"),
             ("[network]\nwait_s = -1.0", "network.wait_s: expected 0 to 60, found -1"),
             ("[network]\nhall = \"a/b\"", "network.hall: expected a name"),
+            ("[network.mqtt]\nbroker = \"10.0.0.9:1883\"", "or plain = true"),
             ("[network]\nlisten = [\"tcp/0.0.0.0:7447\"]", "other hosts reach, found \"tcp/0.0.0.0:7447\""),
         ] {
             let error = network(table).unwrap_err().to_string();
             assert!(error.contains(told), "{table}: {error}");
         }
+        assert!(network("[network.mqtt]\nbroker = \"10.0.0.9:1883\"\nplain = true").is_ok());
+        assert!(network("[network.mqtt]\nbroker = \"127.0.0.1:1883\"").is_ok());
         assert!(network("[network]\nlisten = [\"tcp/0.0.0.0:7447\"]\nanyone = true").is_ok());
         let mut site = umbracast::Config::default().site;
         site.name = "hall 3/east".to_owned();

@@ -25,7 +25,7 @@ fn a_place_gives_the_returns_that_people_who_stand_there_have_in_scenes() {
         height_m: Some(1.72),
     };
     let mut simulated = [0.0; 5];
-    let (scenes, frames) = (16, 2);
+    let (scenes, frames) = (64, 2);
     for seed in 0..scenes {
         let ahead = DVec2::from_angle(seed as f64 / scenes as f64 * TAU);
         let trajectories =

@@ -205,6 +205,16 @@ mod tests {
         Ok((entries, reader.lost().is_some()))
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn strangers_on_the_host_do_not_read_a_recording() {
+        use std::os::unix::fs::PermissionsExt;
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.mcap");
+        record(&path);
+        assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o137, 0);
+    }
+
     #[test]
     fn packets_and_configuration_survive() {
         let directory = tempfile::tempdir().unwrap();

@@ -61,7 +61,7 @@ impl RecordingWriter {
         start_ns: i64,
     ) -> Result<Self, Error> {
         let fail = |e: &dyn std::fmt::Display| Error::new(e.to_string()).within(path.display());
-        let file = BufWriter::new(File::create(path).map_err(|e| fail(&e))?);
+        let file = BufWriter::new(create(path).map_err(|e| fail(&e))?);
         // Packets hardly compress (a sixth), and a reader then needs no codec.
         let mcap = options
             .compression(None)
@@ -208,4 +208,12 @@ impl RecordingWriter {
     fn fail(&self, error: &mcap::McapError) -> Error {
         Error::new(error.to_string()).within(self.path.display())
     }
+}
+/// A new file that its owner and his group read: a recording shows where people were.
+fn create(path: &Path) -> std::io::Result<File> {
+    let mut options = File::options();
+    options.write(true).create(true).truncate(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o640);
+    options.open(path)
 }

@@ -144,6 +144,11 @@ impl Connections {
 }
 
 impl Guest {
+    /// Where it is connected from.
+    pub fn from(&self) -> IpAddr {
+        self.0.from
+    }
+
     /// It asked for what it may see: from now on it keeps its place.
     pub fn let_in(&self) {
         self.with(|open| open.let_in = true);

@@ -17,12 +17,13 @@
 mod watched;
 mod tls;
 mod connections;
+mod doors;
 mod metrics;
 mod openapi;
 
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::path::PathBuf;
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
@@ -31,7 +32,7 @@ use axum::http::uri::Authority;
 use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
-use axum::response::{Html, IntoResponse, Response};
+use axum::response::{AppendHeaders, Html, IntoResponse, Response};
 use axum::routing::get;
 use axum::{Extension, Json, Router};
 use serde_json::{Value, json};
@@ -44,11 +45,14 @@ use umbracast::{Error, Site};
 use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
 use crate::warnings::Event;
+use doors::Doors;
 use tls::Tls;
 pub use watched::Watched;
 
 /// The page: HTML, style and script in one, nothing loaded from elsewhere.
 const PAGE: &str = include_str!("page.html");
+/// The cookie that holds the page's token.
+const COOKIE: &str = "umbracast_token";
 /// Events that wait for a slow client; beyond it is told how many it missed.
 const EVENTS_WAITING: usize = 1024;
 /// Without a frame for so long, something is wrong.
@@ -88,6 +92,7 @@ struct Shared {
     newest: watch::Sender<Arc<Published>>,
     events: broadcast::Sender<Event>,
     token: Option<String>,
+    doors: Mutex<Doors>,
     connections: Arc<Connections>,
 }
 
@@ -117,13 +122,7 @@ fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Er
             "{address}: expected a token (UMBRACAST_TOKEN) for an address that other hosts can reach, found none"
         )));
     }
-    // As it stands in an address: nothing that a browser writes otherwise there.
-    let plain = |token: &String| {
-        !token.is_empty() && token.bytes().all(|b| b.is_ascii_alphanumeric() || b"-._~".contains(&b))
-    };
-    if !token.as_ref().is_none_or(plain) {
-        return Err(Error::new("UMBRACAST_TOKEN: expected letters, digits, - . _ ~, found something else"));
-    }
+    token.as_deref().map_or(Ok(()), doors::check_token)?;
     let tls = tls.map(|(cert, key)| Tls::open(&cert, &key)).transpose()?;
     let listener = TcpListener::bind(address).map_err(|e| Error::new(e.to_string()).within(address))?;
     let failed = |e: std::io::Error| Error::new(e.to_string()).within(address);
@@ -137,8 +136,16 @@ fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Er
     let (sender, event_sender) = (newest.clone(), events.clone());
     let connections = Connections::new(limits);
     let open = connections.clone();
-    let shared =
-        Shared { watched, site: site.clone(), newest: sender, events: event_sender, token, connections };
+    let doors = Mutex::default();
+    let shared = Shared {
+        watched,
+        site: site.clone(),
+        newest: sender,
+        events: event_sender,
+        token,
+        doors,
+        connections,
+    };
     let thread = std::thread::spawn(move || {
         runtime.block_on(async move {
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
@@ -189,10 +196,25 @@ fn router(shared: Arc<Shared>) -> Router {
 
 /// Lets in who may see this.
 async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+    let guest = request.extensions().get::<Guest>().cloned();
+    let now_ns = shared.watched.clock.now_ns();
+    if let Some(guest) = &guest
+        && doors::lock(&shared.doors).is_closed(guest.from(), now_ns)
+    {
+        return (StatusCode::TOO_MANY_REQUESTS, "too many wrong tokens: try again in a minute\n")
+            .into_response();
+    }
     match refused(shared.token.as_deref(), &request) {
-        Some(refusal) => refusal.into_response(),
+        Some(refusal) => {
+            if let Some(guest) =
+                guest.filter(|_| refusal.0 == StatusCode::UNAUTHORIZED && given(&request).is_some())
+            {
+                doors::lock(&shared.doors).note_wrong(guest.from(), now_ns);
+            }
+            refusal.into_response()
+        }
         None => {
-            if let Some(guest) = request.extensions().get::<Guest>() {
+            if let Some(guest) = guest {
                 guest.let_in();
             }
             next.run(request).await
@@ -200,22 +222,29 @@ async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) 
     }
 }
 
-/// Who has not the token is refused. Without one, only loopback is listened to, and what a browser there sends for a page
-/// from elsewhere is refused: it carries that page's origin, or a name that leads here and is not this host's.
-fn refused(token: Option<&str>, request: &Request) -> Option<(StatusCode, &'static str)> {
+/// The token that a request carries: in its head, in its address, or in the cookie that the page was given.
+fn given(request: &Request) -> Option<&str> {
     let head = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
-    let Some(token) = token else {
-        let host = head(header::HOST).unwrap_or_default();
-        let foreign_origin = head(header::ORIGIN)
-            .is_some_and(|origin| origin.split_once("://").is_none_or(|(_, name)| name != host));
-        let foreign = foreign_origin || !is_loopback(host);
-        return foreign.then_some((StatusCode::FORBIDDEN, "expected a request of this page's own\n"));
-    };
     let bearer = head(header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
     let mut in_query = request.uri().query().into_iter().flat_map(|query| query.split('&'));
-    let given = bearer.or_else(|| in_query.find_map(|pair| pair.strip_prefix("token=")));
+    let mut cookies = head(header::COOKIE).into_iter().flat_map(|cookies| cookies.split("; "));
+    bearer
+        .or_else(|| in_query.find_map(|pair| pair.strip_prefix("token=")))
+        .or_else(|| cookies.find_map(|cookie| cookie.strip_prefix(COOKIE)?.strip_prefix('=')))
+}
+
+/// A request without the token is refused, and so is what a browser sends for a page from elsewhere: it carries that page's origin.
+/// Without a token, only loopback is listened to; there a name that leads here and is not this host's is refused as well.
+fn refused(token: Option<&str>, request: &Request) -> Option<(StatusCode, &'static str)> {
+    let head = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
+    let host = head(header::HOST).unwrap_or_default();
+    let foreign_origin = head(header::ORIGIN)
+        .is_some_and(|origin| origin.split_once("://").is_none_or(|(_, name)| name != host));
+    if foreign_origin || (token.is_none() && !is_loopback(host)) {
+        return Some((StatusCode::FORBIDDEN, "expected a request of this page's own\n"));
+    }
     let refusal = (StatusCode::UNAUTHORIZED, "expected a token: Authorization: Bearer, or ?token=\n");
-    (!given.is_some_and(|given| same(given, token))).then_some(refusal)
+    token.filter(|token| !given(request).is_some_and(|given| same(given, token))).map(|_| refusal)
 }
 
 /// Whether a `Host` names this host alone, with or without a port.
@@ -233,10 +262,14 @@ fn same(given: &str, token: &str) -> bool {
     given.len() == token.len() && differing == 0
 }
 
-async fn page() -> impl IntoResponse {
+/// The page keeps the token of its address in a cookie that no script reads and no other site's page sends, and takes it out of
+/// the address.
+async fn page(request: Request) -> impl IntoResponse {
+    let cookie = given(&request).map(|token| format!("{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"));
     let policy = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; \
                   img-src data:; frame-ancestors 'none'";
-    ([(header::CONTENT_SECURITY_POLICY, policy), (header::CACHE_CONTROL, "no-store")], Html(PAGE))
+    let heads = [(header::CONTENT_SECURITY_POLICY, policy), (header::CACHE_CONTROL, "no-store")];
+    (heads, cookie.map(|cookie| [(header::SET_COOKIE, cookie)]).map(AppendHeaders), Html(PAGE))
 }
 
 async fn site(State(shared): State<Arc<Shared>>) -> Json<Value> {

@@ -106,14 +106,30 @@ fn every_field_of_a_frame_is_in_the_interface() {
 
 #[test]
 fn without_its_token_nobody_sees_anything() {
-    let (server, _) = server(Some("secret"));
-    for path in
-        ["/", "/api/frame", "/api/live", "/api/events", "/metrics", "/api/frame?token=secre", "/?token="]
-    {
+    let (server, _) = server(Some("a-secret-of-sixteen"));
+    for path in [
+        "/",
+        "/api/frame",
+        "/api/live",
+        "/api/events",
+        "/metrics",
+        "/api/frame?token=a-secret-of-sixtee",
+        "/?token=",
+    ] {
         assert_eq!(get(&server, path, "").0, 401, "{path}");
     }
-    assert_eq!(get(&server, "/api/frame?token=secret", "").0, 200);
-    assert_eq!(get(&server, "/api/frame", "Authorization: Bearer secret\r\n").0, 200);
+    assert_eq!(get(&server, "/api/frame?token=a-secret-of-sixteen", "").0, 200);
+    assert_eq!(get(&server, "/api/frame", "Authorization: Bearer a-secret-of-sixteen\r\n").0, 200);
+    // A page from elsewhere is refused though the browser sends the cookie along.
+    let cookie = "Cookie: a=b; umbracast_token=a-secret-of-sixteen\r\n";
+    assert_eq!(get(&server, "/api/frame", cookie).0, 200);
+    let foreign = format!("{cookie}Origin: http://elsewhere.example\r\n");
+    assert_eq!(get(&server, "/api/frame", &foreign).0, 403);
+    // Two wrong tokens were given above; a request without any is no guess.
+    for _ in 0..8 {
+        assert_eq!(get(&server, "/api/frame?token=guessed", "").0, 401);
+    }
+    assert_eq!(get(&server, "/api/frame", cookie).0, 429, "closed for a minute");
     server.stop();
 }
 
