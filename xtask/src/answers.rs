@@ -82,12 +82,17 @@ pub fn ask(umbracast: &Path, root: &Path, data: Option<&Path>) -> Result<String,
         text += &format!("{name}{}\n", if *needs_data { ", real data" } else { "" });
         let said = String::from_utf8_lossy(&done.stdout).into_owned();
         for line in said.lines().filter(|line| tells(line)) {
-            let line = line.replace(&data, "DATA").replace(&*out.display().to_string(), "OUT");
+            let line = without(&without(line, &data, "DATA"), &out.display().to_string(), "OUT");
             text += &format!("  {}\n", line.split_whitespace().collect::<Vec<_>>().join(" "));
         }
     }
     let _ = fs::remove_dir_all(out);
     Ok(text)
+}
+
+/// The line with a folder's name in place of its path; without real data there is no path.
+fn without(line: &str, path: &str, name: &str) -> String {
+    if path.is_empty() { line.to_owned() } else { line.replace(path, name) }
 }
 
 /// Everything but how long something took.
@@ -155,6 +160,12 @@ mod tests {
         assert_eq!(differences(KEPT, &moved).len(), 1);
         assert_eq!(differences(KEPT, "crossing\n  recall 0.996\n").len(), 2);
         assert_eq!(differences(KEPT, &KEPT.replace("recall", "precision")).len(), 1);
+    }
+
+    #[test]
+    fn without_real_data_a_line_stays_as_it_is() {
+        assert_eq!(without("recall 0.9", "", "DATA"), "recall 0.9");
+        assert_eq!(without("/x/a.pcap: 3 packets", "/x", "DATA"), "DATA/a.pcap: 3 packets");
     }
 
     #[test]
