@@ -4,7 +4,7 @@ use umbracast::config::{Config, Mode};
 use umbracast::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point, Prior};
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::lidar::{Cloud, Scan, SensorPoint};
-use umbracast::{Frame, Health};
+use umbracast::{Frame, Health, Pipeline};
 
 const SENSORS_M: [DVec3; 2] = [DVec3::new(-6.0, 0.0, 3.0), DVec3::new(6.0, 0.0, 3.0)];
 const ROOM_RADIUS_M: f64 = 14.0;
@@ -163,6 +163,24 @@ fn who_stands_at_the_start_is_seen_at_once_and_whole_once_they_walk() {
     }
     let (seen, whole) = (chain.points.len(), knowing.points.len());
     assert!(seen as f64 > 0.8 * whole as f64, "{seen} of {whole} points");
+}
+
+#[test]
+fn who_stands_from_the_first_frame_on_is_followed_for_as_long_as_they_stand() {
+    let config = config(Mode::Default);
+    for empty_scan in [true, false] {
+        let mut pipeline = Pipeline::new(&config, None).unwrap();
+        if empty_scan {
+            pipeline.learn_empty(&frame(&config, 0, &[]));
+        }
+        for k in 1..=450 {
+            let outcome = pipeline.step(&frame(&config, k, &PEOPLE_M));
+            let followed = |at: &DVec2| {
+                outcome.tracks.iter().any(|t| t.confirmed && t.position_m.distance(*at) < 0.2)
+            };
+            assert!(k < 10 || PEOPLE_M.iter().all(followed), "frame {k}, empty scan: {empty_scan}");
+        }
+    }
 }
 
 #[test]

@@ -12,9 +12,9 @@ const HIGHEST_M: f64 = 4.0;
 const APART_M: f64 = 0.3;
 /// A person's: fewer points say nothing of a shape,
 const POINTS_MIN: usize = 10;
-/// who stands or walks is so high, and more of him is seen than a bush or a sign shows,
-const TOP_M: std::ops::Range<f64> = 1.2..2.1;
-const HEIGHT_MIN_M: f64 = 0.9;
+/// who stands, walks or sits is so high, and more of him is seen than a bush or a sign shows,
+const TOP_M: std::ops::Range<f64> = 1.0..2.1;
+const HEIGHT_MIN_M: f64 = 0.7;
 /// and a stride with swinging arms is not longer, from corner to corner.
 const DIAGONAL_M: std::ops::Range<f64> = 0.2..1.1;
 

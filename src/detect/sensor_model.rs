@@ -8,6 +8,7 @@ use crate::elementary::wide;
 use crate::geometry::{DVec3, Pose};
 use crate::lidar::{Cloud, Column, Model, RangeImage, Scan, SensorPoint};
 use crate::site::{Hall, Sensor};
+use std::ops::Range;
 
 /// Width of a pixel of an organised scan: a little more than one column of a sensor at 10 Hz.
 const AZIMUTH_BIN_DEG: f64 = 0.2;
@@ -79,27 +80,47 @@ impl Learn<'_> {
         !matches!(self, Self::Furniture(_))
     }
 
-    /// Of a return; `new_at_m` says where, if it is new and people can be there.
-    fn verdict(self, new_at_m: Option<DVec3>) -> Verdict {
-        match (self, new_at_m) {
+    /// Of a return, new or not; `at_m` says where it is, if people can be there.
+    fn verdict(self, at_m: Option<DVec3>, new: bool) -> Verdict {
+        match (self, at_m) {
+            // What is not new there may be of somebody too: a body's edge beside a pixel whose background is nearer. If it
+            // were learned, the body would be learned from its edge inwards.
             (Self::OnTheWay(priors), Some(at_m)) if is_somebodys(priors, at_m) => Verdict::Somebodys,
             (Self::Empty | Self::OnTheWay(_), _) => Verdict::Learned,
             (Self::Furniture(priors), Some(at_m))
-                if is_furnitures(priors, at_m) && !is_somebodys(priors, at_m) =>
+                if new && is_furnitures(priors, at_m) && !is_somebodys(priors, at_m) =>
             {
                 Verdict::Furnitures
             }
             (Self::Furniture(_), _) => Verdict::Left,
         }
     }
+
+    /// Ranges at which somebody may be whom this does not learn: most returns are of the hall behind all of them.
+    fn ranges_near_people(self, site_from_sensor: &Pose, clip: &Clip) -> Vec<Range<f32>> {
+        let Self::OnTheWay(priors) = self else { return Vec::new() };
+        let sensor_m = site_from_sensor.point(DVec3::ZERO);
+        let range = |(prior, reach_m): (&Prior, f64)| {
+            let away_m = prior.position_m.distance(sensor_m.truncate());
+            let above_floor_m = sensor_m.z - clip.hall.floor_m(prior.position_m);
+            let off_m = above_floor_m.abs().max((above_floor_m - clip.highest_m).abs());
+            // Half a metre more, for the floor under him may be a ramp's.
+            (away_m - reach_m) as f32..(away_m + reach_m).hypot(off_m + 0.5) as f32
+        };
+        people(priors).map(range).collect()
+    }
 }
 
 /// Somebody who stands still must not be learned.
 fn is_somebodys(priors: &[Prior], at_m: DVec3) -> bool {
-    priors.iter().any(|prior| {
-        let reach_m = FREEZE_M + prior.position_sigma_m.min(FREEZE_M);
-        !prior.is_furniture && prior.position_m.distance_squared(at_m.truncate()) < reach_m * reach_m
-    })
+    people(priors)
+        .any(|(prior, reach_m)| prior.position_m.distance_squared(at_m.truncate()) < reach_m * reach_m)
+}
+
+/// Those who are expected, and how near to them a return may be theirs.
+fn people(priors: &[Prior]) -> impl Iterator<Item = (&Prior, f64)> {
+    let reach_m = |prior: &Prior| FREEZE_M + prior.position_sigma_m.min(FREEZE_M);
+    priors.iter().filter(|prior| !prior.is_furniture).map(move |prior| (prior, reach_m(prior)))
 }
 
 fn is_furnitures(priors: &[Prior], at_m: DVec3) -> bool {
@@ -257,6 +278,7 @@ impl SensorModel {
             [all.clone().fold(f32::INFINITY, f32::min), all.fold(f32::NEG_INFINITY, f32::max)]
         };
         let [turned_ns, offset_cdeg] = [0, 1].map(least_and_most);
+        let near_people = learn.ranges_near_people(&scan.site_from_sensor, clip);
         for (c, (column, ranges_m)) in image.columns.iter().zip(image.range_m.chunks_exact(beams)).enumerate()
         {
             // Nearly every column sees nothing but the hall.
@@ -293,15 +315,17 @@ impl SensorModel {
                     }
                     continue;
                 }
-                let mut new_at_m = None;
-                if !background {
+                let verdict = if background && !near_people.iter().any(|ranges| ranges.contains(&range_m)) {
+                    Verdict::Learned
+                } else {
                     let point = organised_point(scan, image, c, b, range_m);
-                    if clip.holds(point.position_m) {
+                    let at_m = Some(point.position_m).filter(|&at_m| clip.holds(at_m));
+                    if !background && at_m.is_some() {
                         points.push(point);
-                        new_at_m = Some(point.position_m);
                     }
-                }
-                ranges.take(pixel, range_m, learn.verdict(new_at_m));
+                    learn.verdict(at_m, !background)
+                };
+                ranges.take(pixel, range_m, verdict);
             }
         }
     }
@@ -323,19 +347,17 @@ impl SensorModel {
             let limits_m = rows.iter().flatten().map(|&row| self.cloud_ranges.limit_m(pixel(row)));
             let limit_m = limits_m.fold(f32::INFINITY, f32::min);
             let own = self.row_of_elevation[elevation_bin].map(pixel);
-            let mut new_at_m = None;
-            if range_m < limit_m && range_m >= self.range_min_m {
-                let point = unorganised_point(scan, &point);
-                if clip.holds(point.position_m) {
-                    points.push(point);
-                    new_at_m = Some(point.position_m);
-                }
+            let point = unorganised_point(scan, &point);
+            let new = range_m < limit_m && range_m >= self.range_min_m;
+            let at_m = Some(point.position_m).filter(|&at_m| clip.holds(at_m));
+            if new && at_m.is_some() {
+                points.push(point);
             }
             let Some(own) = own else { continue };
             if range_m >= limit_m && !learn.is_all() {
                 self.cloud_ranges.see_past(own, range_m);
             } else {
-                self.cloud_ranges.take(own, range_m, learn.verdict(new_at_m));
+                self.cloud_ranges.take(own, range_m, learn.verdict(at_m, new));
             }
         }
     }

@@ -9,21 +9,21 @@ use crate::geometry::DVec2;
 /// Who has come so far from where the track began has walked: positions of furniture jump by less, as more or less of it
 /// is seen.
 const WALKED_M: f64 = 1.0;
-/// What has never walked is furniture after this long,
+/// What has never walked is furniture after this long, unless it has the shape of a person and not the place of a part of
+/// other furniture: nobody stops being a person by standing still.
 const FURNITURE_AFTER_S: f64 = 4.0;
-/// and this, where it has the shape of somebody who stands and not the place of a part of other furniture: who is there
-/// from the start may look around for a while.
-const UPRIGHT_AFTER_S: f64 = 30.0;
-/// Who stands is higher, not as long in plan view, and has a head on top.
-const UPRIGHT_TOP_M: f64 = 1.3;
-const UPRIGHT_DIAGONAL_M: f64 = 0.9;
+/// Who stands or sits shows returns above this (a small adult sits 1.15 m high on a chair of 0.44 m, and the highest beam on
+/// him may be a beam gap lower; a chair without somebody on it ends below), is not as long in plan view, and has a head on
+/// top.
+const PERSON_TOP_M: f64 = 1.0;
+const PERSON_DIAGONAL_M: f64 = 1.0;
 const HEAD_DIAGONAL_M: f64 = 0.6;
 
 /// What first shows this near to furniture is taken for a part of it that was hidden: a large table's other end.
 pub(super) const BESIDE_M: f64 = 0.9;
-/// A detection that cannot be of somebody who stands counts for so many that can: of one who stands 96 of 100 are
-/// upright, of a cupboard up to 45.
-const NOT_UPRIGHT: f64 = 2.0;
+/// A detection that cannot be of a person counts for so many that can: of one who stands 96 of 100 can, of a cupboard up
+/// to 45.
+const NO_PERSON: f64 = 2.0;
 
 /// Where a track began, and what it has shown since.
 #[derive(Debug, Clone, Copy)]
@@ -33,8 +33,8 @@ pub(super) struct Origin {
     /// Beside furniture.
     beside: bool,
     walked: bool,
-    /// Detections that might be of somebody who stands, less [`NOT_UPRIGHT`] for each that might not.
-    upright: f64,
+    /// Detections that may be of a person, less [`NO_PERSON`] for each that cannot.
+    like_person: f64,
 }
 
 impl Remembered for Origin {
@@ -43,13 +43,13 @@ impl Remembered for Origin {
         words.vec2(&mut self.position_m);
         words.bool(&mut self.beside);
         words.bool(&mut self.walked);
-        words.f64(&mut self.upright);
+        words.f64(&mut self.like_person);
     }
 }
 
 impl Origin {
     pub(super) fn new(position_m: DVec2, born_ns: i64, beside: bool) -> Self {
-        Self { born_ns, position_m, beside, walked: false, upright: 0.0 }
+        Self { born_ns, position_m, beside, walked: false, like_person: 0.0 }
     }
 
     pub(super) fn age_s(&self, time_ns: i64) -> f64 {
@@ -60,16 +60,16 @@ impl Origin {
     pub(super) fn see(&mut self, detection: &Detection, position_m: DVec2, speed_mps: f64) {
         self.walked |= speed_mps > WALKS_FROM_MPS && position_m.distance(self.position_m) > WALKED_M;
         let diagonal_m = detection.aabb.size_m().truncate().length();
-        let upright = detection.top_m > UPRIGHT_TOP_M
-            && diagonal_m < UPRIGHT_DIAGONAL_M
+        let may_be_person = detection.top_m > PERSON_TOP_M
+            && diagonal_m < PERSON_DIAGONAL_M
             && detection.top_diagonal_m < HEAD_DIAGONAL_M;
-        self.upright += if upright { 1.0 } else { -NOT_UPRIGHT };
+        self.like_person += if may_be_person { 1.0 } else { -NO_PERSON };
     }
 
     /// True once it is taken for something that was put there.
     pub(super) fn is_furniture(&self, time_ns: i64) -> bool {
-        let after_s = if self.upright > 0.0 && !self.beside { UPRIGHT_AFTER_S } else { FURNITURE_AFTER_S };
-        !self.walked && self.age_s(time_ns) > after_s
+        let may_be_person = self.like_person > 0.0 && !self.beside;
+        !self.walked && !may_be_person && self.age_s(time_ns) > FURNITURE_AFTER_S
     }
 }
 
@@ -106,11 +106,12 @@ mod tests {
     }
 
     #[test]
-    fn what_never_walks_is_furniture_sooner_or_later() {
+    fn what_never_walks_is_furniture_unless_it_has_the_shape_of_a_person() {
         let (head, cupboard) = (0.25, 0.9);
         assert_eq!([3, 5].map(|s| is_furniture(s, 0.8, head, 0.0)), [false, true], "a chair");
         assert_eq!([3, 5].map(|s| is_furniture(s, 1.8, cupboard, 0.0)), [false, true], "a cupboard");
-        assert_eq!([29, 31].map(|s| is_furniture(s, 1.8, head, 0.0)), [false, true], "who stands, perhaps");
+        assert_eq!([31, 300].map(|s| is_furniture(s, 1.8, head, 0.0)), [false; 2], "who stands");
+        assert_eq!([5, 300].map(|s| is_furniture(s, 1.25, head, 0.0)), [false; 2], "who sits");
         assert!(!is_furniture(300, 1.8, head, 0.5), "who walks");
         let beside = Origin::new(DVec2::ZERO, 0, true);
         assert!(seen(beside, 5, 1.8, head, 0.0), "the hidden side of a cupboard");

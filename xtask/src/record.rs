@@ -13,6 +13,7 @@ mod locked;
 mod mutations;
 mod nodes;
 mod scores;
+mod standing;
 
 use std::fs;
 
@@ -47,7 +48,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 41] = [
+const JOBS: [Job; 42] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -66,6 +67,7 @@ const JOBS: [Job; 41] = [
     job("speed", "how long a frame takes, in every mode", Needs::Nothing, house::speed),
     job("growth", "how long a step takes with more people and access points", Needs::Nothing, house::growth),
     job("living", "furniture put in, people who stand, no empty scan", Needs::Nothing, living::living),
+    job("standing", "people who stand or sit from the first frame on", Needs::Nothing, standing::standing),
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", Needs::Nothing, glass::glass),
     job("gestures", "people who talk with their hands beside a sensor", Needs::Nothing, gestures::gestures),
     job("cut", "what a frame gains that closes as soon as the part with people has", Needs::Nothing, crowds::cut),

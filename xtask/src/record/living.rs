@@ -289,12 +289,12 @@ fn stand(seed: u64) -> String {
 }
 
 /// Where the stools are that people sit down on, well inside the hall.
-fn stools() -> [(f64, f64); 4] {
+pub(super) fn stools() -> [(f64, f64); 4] {
     [(3.6, 0.3), (6.2, 1.9), (5.0, 3.5), (7.0, 5.0)].map(|(r, a): (f64, f64)| (r * a.cos(), r * a.sin()))
 }
 
 /// The default hall with these in it.
-fn with_stools() -> Result<String> {
+pub(super) fn with_stools() -> Result<String> {
     let mut text = default_furniture()?;
     for (x_m, y_m) in stools() {
         let _ = write!(
@@ -328,7 +328,7 @@ pub(super) fn draws(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// Ten places a second of who stands at the first stop until `from_s`, goes from stop to stop, and stays at the last.
-fn way(stops: &[(f64, f64)], from_s: f64, speed_mps: f64, seconds: f64) -> Vec<(f64, f64)> {
+pub(super) fn way(stops: &[(f64, f64)], from_s: f64, speed_mps: f64, seconds: f64) -> Vec<(f64, f64)> {
     let mut at = stops[0];
     let mut next = 1;
     (0..=(10.0 * seconds) as u32)
@@ -351,7 +351,7 @@ fn way(stops: &[(f64, f64)], from_s: f64, speed_mps: f64, seconds: f64) -> Vec<(
 }
 
 /// People evenly along circles about the middle: how many, radius, speed.
-fn rings(seconds: f64, rings: &[(u32, f64, f64)]) -> Vec<Vec<(f64, f64)>> {
+pub(super) fn rings(seconds: f64, rings: &[(u32, f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let ring = |&(people, radius_m, speed_mps): &(u32, f64, f64)| {
         (0..people).map(move |person| {
             let first = TAU / f64::from(people) * f64::from(person) + 0.3;

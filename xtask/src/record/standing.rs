@@ -1,0 +1,263 @@
+//! People who stand or sit where they are when the recording begins, by beams and by clouds.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fs;
+use std::path::PathBuf;
+
+use super::book::Book;
+use super::living::{Row, draws, read, rings, simulated, stools, table, walked, way, with_stools};
+use crate::tools::{Result, argument, root};
+
+const SCENES: u64 = 20;
+/// Seeds of the ways, which no other record draws.
+const FIRST_WAY: u64 = 1000;
+/// Who stands does so from the first frame on for this long.
+const STANDS_S: f64 = 300.0;
+/// From here on everybody is to be seen.
+const FROM_FRAME: u32 = 10;
+/// A track this near to a person is the person's.
+const GATE_M: f64 = 0.5;
+/// Ids below this are of those who stand.
+const STANDING: u64 = 4;
+/// Clouds are large: fewer and shorter scenes.
+const CLOUD_SCENES: u64 = 10;
+const CLOUDS_S: f64 = 20.0;
+
+/// Hall of 20 x 12 m, the sensors on its short walls. The second sensor is left out where one of model `points` is meant.
+const SMALL_HALL: &str = r#"[site]
+name = "small"
+pillars = []
+furniture = []
+[site.hall]
+length_m = 20.0
+width_m = 12.0
+height_m = 4.0
+[[site.access_points]]
+name = "wall"
+position_m = [0.0, 5.8, 3.0]
+[[site.sensors]]
+name = "lidar_east"
+MODEL
+position_m = [9.6, 0.0, 3.2]
+rotation_deg = { yaw = 180.0, pitch = 15.0, roll = 0.0 }
+"#;
+const SECOND_SENSOR: &str = r#"[[site.sensors]]
+name = "lidar_west"
+position_m = [-9.6, 0.0, 3.2]
+rotation_deg = { yaw = 0.0, pitch = 15.0, roll = 0.0 }
+"#;
+
+/// One table: the share of frames in which those who stand or sit are followed.
+pub fn standing(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record standing");
+    book.line(&format!(
+        "{:<36} {:>6} {:<10} {:>15} {:>7} {:>9} {:>10}",
+        "from the first frame on", "scenes", "empty scan", "person-frames", "seen", "precision", "ids a head"
+    ));
+    let site = |name: &str, text: &str| {
+        let file = book.scratch(name);
+        fs::write(&file, text).map_err(|e| e.to_string()).map(|()| file.to_string_lossy().into_owned())
+    };
+    let small = site("small.toml", &(SMALL_HALL.replace("MODEL", "model = \"hdl-32e\"") + SECOND_SENSOR))?;
+    let beams = site("one.toml", &SMALL_HALL.replace("MODEL", "model = \"hdl-32e\""))?;
+    let clouds = site("points.toml", &SMALL_HALL.replace("MODEL", "model = \"points\""))?;
+    let stools = site("stools.toml", &with_stools()?)?;
+
+    let ways: Vec<String> = (0..SCENES).map(in_default_hall).collect();
+    let sim = simulated(book, "stand", &walked(book, "stand", &ways)?)?;
+    both(book, "four stand, default hall", &sim, &[])?;
+
+    let ways: Vec<String> = (0..SCENES).map(in_small_hall).collect();
+    let mut how = walked(book, "small", &ways)?;
+    how.extend(["--site".to_owned(), small.clone()]);
+    let sim = simulated(book, "small", &how)?;
+    both(book, "four stand, hall of 20 x 12 m", &sim, &["--site", &small])?;
+
+    let ways: Vec<String> = (0..SCENES).map(on_stools).collect();
+    let mut how = walked(book, "sit", &ways)?;
+    how.extend(["--bodies", "sitting", "--site", &stools].map(str::to_owned));
+    let sim = simulated(book, "sit", &how)?;
+    both(book, "four sit, default hall", &sim, &[])?;
+
+    let ways: Vec<String> = (0..CLOUD_SCENES).map(for_clouds).collect();
+    let mut how = walked(book, "clouds", &ways)?;
+    how.extend(["--clouds", "--site", &beams].map(str::to_owned));
+    let sim = simulated(book, "clouds", &how)?;
+    row(
+        book,
+        "two stand, `points`, PointCloud2",
+        &sim,
+        &scenes_of(&sim)?,
+        &["--site", &clouds, "--no-empty"],
+    )?;
+    let files = as_pcd(book, &sim)?;
+    row(book, "two stand, `points`, PCD", &sim, &files, &["--site", &clouds, "--no-empty"])?;
+    book.line(&format!(
+        "Default mode. Four stand or sit for {STANDS_S:.0} s while three to six walk about them; before the clouds two \
+         stand for 4 and 7 s and then walk. Seen: share of the frames from 1 s on in which each of them has a confirmed \
+         track within {GATE_M} m. Precision: of all confirmed tracks from 1 s on. PCD: unorganised, ASCII, 8 bytes a number."
+    ));
+    Ok(())
+}
+
+/// With an empty scan and without.
+fn both(book: &mut Book, what: &str, sim: &str, site: &[&str]) -> Result<()> {
+    let scenes = scenes_of(sim)?;
+    row(book, what, sim, &scenes, &[site, &["--empty", &format!("{sim}/empty.mcap")]].concat())?;
+    row(book, what, sim, &scenes, &[site, &["--no-empty"]].concat())
+}
+
+fn row(book: &mut Book, what: &str, sim: &str, inputs: &[PathBuf], how: &[&str]) -> Result<()> {
+    let people = read(&format!("{sim}/people.csv"))?;
+    let mut seen = Seen::default();
+    // Folders of PCD files are a scene each, which a command takes one by one.
+    let runs: Vec<&[PathBuf]> =
+        if inputs.iter().all(|input| input.is_dir()) { inputs.chunks(1).collect() } else { vec![inputs] };
+    for (k, run) in runs.iter().enumerate() {
+        let out = format!("{sim}-out");
+        let words: Vec<OsString> =
+            ["run", "--csv", "--out", &out].iter().chain(how).map(OsString::from).collect();
+        book.quietly(&[words, run.iter().map(argument).collect()].concat())?;
+        let mut tracks = read(&format!("{out}/tracks.csv"))?;
+        let mut people: Vec<&Row> = people.iter().collect();
+        if runs.len() > 1 {
+            tracks.iter_mut().for_each(|track| track.scene = k as u32);
+            people.retain(|person| person.scene == k as u32);
+        }
+        seen.add(&people, &tracks);
+    }
+    let known = if how.contains(&"--empty") { "known" } else { "none" };
+    let scenes = people.iter().map(|person| person.scene + 1).max().unwrap_or(0);
+    let ids: usize = seen.ids.values().map(Vec::len).sum();
+    book.line(&format!(
+        "{what:<36} {scenes:>6} {known:<10} {:>15} {:>7.4} {:>9.4} {:>10.2}",
+        seen.all,
+        seen.seen as f64 / seen.all as f64,
+        seen.right as f64 / seen.told as f64,
+        ids as f64 / seen.ids.len() as f64,
+    ));
+    Ok(())
+}
+
+#[derive(Default)]
+struct Seen {
+    all: u64,
+    seen: u64,
+    told: u64,
+    right: u64,
+    ids: BTreeMap<(u32, u64), Vec<u64>>,
+}
+
+impl Seen {
+    fn add(&mut self, people: &[&Row], tracks: &[Row]) {
+        let mut people_of: BTreeMap<(u32, u32), Vec<_>> = BTreeMap::new();
+        let mut tracks_of: BTreeMap<(u32, u32), Vec<_>> = BTreeMap::new();
+        let late = |frame: u32| frame >= FROM_FRAME;
+        people
+            .iter()
+            .filter(|p| late(p.frame))
+            .for_each(|p| people_of.entry((p.scene, p.frame)).or_default().push(p));
+        tracks
+            .iter()
+            .filter(|t| t.confirmed && late(t.frame))
+            .for_each(|t| tracks_of.entry((t.scene, t.frame)).or_default().push(t));
+        for (key, here) in &people_of {
+            let tracks = tracks_of.get(key).map_or(&[][..], Vec::as_slice);
+            let off_m = |a: &Row, b: &Row| (a.x_m - b.x_m).hypot(a.y_m - b.y_m);
+            self.told += tracks.len() as u64;
+            self.right += tracks.iter().filter(|t| here.iter().any(|p| off_m(t, p) < GATE_M)).count() as u64;
+            for person in here.iter().filter(|person| person.id < STANDING) {
+                self.all += 1;
+                if let Some(track) = tracks.iter().find(|track| off_m(track, person) < GATE_M) {
+                    self.seen += 1;
+                    let ids = self.ids.entry((person.scene, person.id)).or_default();
+                    if !ids.contains(&track.id) {
+                        ids.push(track.id);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The recordings of a folder of scenes.
+fn scenes_of(sim: &str) -> Result<Vec<PathBuf>> {
+    let mut scenes: Vec<PathBuf> =
+        fs::read_dir(sim).map_err(|e| e.to_string())?.flatten().map(|file| file.path()).collect();
+    scenes.retain(|path| path.to_string_lossy().contains("scene-"));
+    scenes.sort();
+    Ok(scenes)
+}
+
+/// The clouds of each scene as a folder of PCD files.
+fn as_pcd(book: &Book, sim: &str) -> Result<Vec<PathBuf>> {
+    scenes_of(sim)?
+        .iter()
+        .enumerate()
+        .map(|(k, scene)| {
+            let folder = book.scratch(&format!("pcd-{k:02}"));
+            let line = format!(
+                "cargo run --release --quiet --package umbracast-io --example clouds_to_pcd -- {} /lidar_east/points {}",
+                scene.display(),
+                folder.display()
+            );
+            book.bash(&root(), &line).map(|_| folder)
+        })
+        .collect()
+}
+
+/// Four stand on rays from the middle of the default hall; six walk in rings.
+fn in_default_hall(scene: u64) -> String {
+    let mut draw = draws(FIRST_WAY + scene);
+    let mut people: Vec<Vec<(f64, f64)>> = (0..4)
+        .map(|person| {
+            let angle = std::f64::consts::TAU / 4.0 * f64::from(person) + draw();
+            let radius_m = 3.5 + 4.5 * draw();
+            way(&[(radius_m * angle.cos(), radius_m * angle.sin())], STANDS_S, 1.0, STANDS_S)
+        })
+        .collect();
+    people.extend(rings(STANDS_S, &[(4, 9.5, 1.2), (2, 2.0, 0.8)]));
+    table(&people)
+}
+
+/// Four stand in the hall of 20 x 12 m, three walk up and down beside and between them.
+fn in_small_hall(scene: u64) -> String {
+    let mut draw = draws(FIRST_WAY + 100 + scene);
+    let mut people: Vec<Vec<(f64, f64)>> = (0..4)
+        .map(|person| {
+            let at = (-7.5 + 4.6 * f64::from(person) + draw(), -4.0 + 8.0 * draw());
+            way(&[at], STANDS_S, 1.0, STANDS_S)
+        })
+        .collect();
+    people.extend([-5.2, 5.2, 0.3].map(|y_m| {
+        let (speed_mps, first_m) = (1.0 + 0.3 * draw(), 32.0 * draw());
+        (0..=(10.0 * STANDS_S) as u32)
+            .map(|k| (first_m + 0.1 * speed_mps * f64::from(k)) % 32.0)
+            .map(|gone_m: f64| (8.0 - (16.0 - gone_m).abs(), y_m + 0.3 * gone_m.sin()))
+            .collect()
+    }));
+    table(&people)
+}
+
+/// Four sit on the stools; six walk in rings.
+fn on_stools(scene: u64) -> String {
+    let mut draw = draws(FIRST_WAY + 200 + scene);
+    let mut people: Vec<Vec<(f64, f64)>> =
+        stools().iter().map(|&at| way(&[at], STANDS_S, 1.0, STANDS_S)).collect();
+    people.extend(rings(STANDS_S, &[(4, 9.5, 1.0 + 0.4 * draw()), (2, 2.0, 0.6 + 0.4 * draw())]));
+    table(&people)
+}
+
+/// Two stand for 4 and 7 s and then walk.
+fn for_clouds(scene: u64) -> String {
+    let mut draw = draws(FIRST_WAY + 300 + scene);
+    let people: Vec<_> = [(-4.0, 4.0), (3.0, 7.0)]
+        .map(|(x_m, until_s)| {
+            let (x_m, y_m) = (x_m + 3.0 * draw(), -4.0 + 8.0 * draw());
+            let across = if y_m < 0.0 { 4.5 } else { -4.5 };
+            way(&[(x_m, y_m), (x_m, across), (x_m + 1.5, 0.0)], until_s, 1.1, CLOUDS_S)
+        })
+        .into();
+    table(&people)
+}
