@@ -149,7 +149,8 @@ pub struct Sensor {
     /// Longest range it reports, metres.
     #[serde(default = "farthest_m")]
     pub range_max_m: f64,
-    /// Standard deviation of its range, metres: how near the background a return may lie and still be new follows.
+    /// Standard deviation of its range on a surface nearby that faces it, metres. Simulated sensors err by it; what is new
+    /// follows from what the sensor itself is seen to err by.
     #[serde(default = "noise_m")]
     pub range_noise_m: f64,
     /// The sensor's own file, which says where its beams look: an Ouster's metadata, an XT32's angles. Whoever reads
@@ -354,7 +355,7 @@ pub struct AccessPoint {
 /// use umbracast::site::Ue;
 ///
 /// // A phone at the ear of somebody, a little left of the axis.
-/// let ear = Ue { forward_m: 0.0, left_m: 0.09, height_share: 0.924 };
+/// let ear = Ue { forward_m: 0.0, left_m: 0.09, height_share: 0.924, spread_m: 0.0 };
 /// assert!((ear.on_body(umbracast::geometry::DVec2::ZERO, 0.0, 1.75).z - 1.617).abs() < 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -366,6 +367,10 @@ pub struct Ue {
     pub left_m: f64,
     /// Above the floor that is stood on, as a share of the standing height.
     pub height_share: f64,
+    /// How far from there the device of one person or another is, and comes to be as hands move: one standard deviation along
+    /// each axis, metres.
+    #[serde(default)]
+    pub spread_m: f64,
 }
 
 impl Ue {
@@ -375,7 +380,7 @@ impl Ue {
     /// ```
     /// use umbracast::geometry::{DVec2, DVec3};
     ///
-    /// let ue = umbracast::site::Ue { forward_m: 0.3, left_m: 0.0, height_share: 0.5 };
+    /// let ue = umbracast::site::Ue { forward_m: 0.3, left_m: 0.0, height_share: 0.5, spread_m: 0.0 };
     /// assert_eq!(ue.on_body(DVec2::new(2.0, 1.0), 0.0, 1.8), DVec3::new(2.3, 1.0, 0.9));
     /// ```
     pub fn on_body(&self, position_m: DVec2, heading_rad: f64, height_m: f64) -> DVec3 {
@@ -389,7 +394,15 @@ impl Ue {
 
     /// Whether it is above the person's position, whichever way the person faces.
     pub(crate) fn is_on_axis(&self) -> bool {
-        self.forward_m == 0.0 && self.left_m == 0.0
+        self.forward_m == 0.0 && self.left_m == 0.0 && self.spread_m == 0.0
+    }
+
+    /// How far from the axis it may be in a sample, and how far above or below its mean height.
+    pub(crate) fn reach_m(&self) -> [f64; 2] {
+        // Of a thousand quantiles the last is 3.3 standard deviations off.
+        const MOST: f64 = 3.3;
+        let aside_m = std::f64::consts::SQRT_2 * MOST * self.spread_m;
+        [self.forward_m.abs() + self.left_m.abs() + aside_m, MOST * self.spread_m]
     }
 }
 

@@ -175,9 +175,8 @@ fn who_stands_from_the_first_frame_on_is_followed_for_as_long_as_they_stand() {
         }
         for k in 1..=450 {
             let outcome = pipeline.step(&frame(&config, k, &PEOPLE_M));
-            let followed = |at: &DVec2| {
-                outcome.tracks.iter().any(|t| t.confirmed && t.position_m.distance(*at) < 0.2)
-            };
+            let followed =
+                |at: &DVec2| outcome.tracks.iter().any(|t| t.confirmed && t.position_m.distance(*at) < 0.2);
             assert!(k < 10 || PEOPLE_M.iter().all(followed), "frame {k}, empty scan: {empty_scan}");
         }
     }

@@ -21,6 +21,8 @@ pub(super) struct Draws {
     pub(super) phase: Vec<f32>,
     /// Even.
     pub(super) arm_swing: Vec<f32>,
+    /// How far ahead, left and up the device is from its mean place.
+    pub(super) device: [Vec<f32>; 3],
 }
 
 impl Draws {
@@ -32,7 +34,9 @@ impl Draws {
         let process_noise = std::array::from_fn(|_| std::array::from_fn(|_| normal()));
         let (height, width, heading) = (normal(), normal(), normal());
         let mut even = || shuffled(&quantiles.even, 0.5, &mut random);
-        Self { state, process_noise, height, width, heading, phase: even(), arm_swing: even() }
+        let (phase, arm_swing) = (even(), even());
+        let device = std::array::from_fn(|_| shuffled(&quantiles.normal, 0.0, &mut random));
+        Self { state, process_noise, height, width, heading, phase, arm_swing, device }
     }
 }
 

@@ -22,9 +22,6 @@ pub struct Numbers {
     pub height_sigma_m: f64,
     /// The same of the trunk's heading.
     pub heading_sigma_rad: f64,
-    /// The same where the owner's body and the UE turn together: the body is where its own UE is carried, and what others
-    /// depart by does not count. On tuning scenes of the three halls in `config/sites`.
-    pub own_heading_sigma_rad: f64,
 }
 
 impl Numbers {
@@ -49,7 +46,6 @@ impl Numbers {
             width_sigma: 0.055,
             height_sigma_m: 0.02,
             heading_sigma_rad: 10.0_f64.to_radians(),
-            own_heading_sigma_rad: 3.0_f64.to_radians(),
         }
     }
 }

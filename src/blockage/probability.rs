@@ -172,6 +172,7 @@ impl Sampler {
                 .entry(track.id)
                 .or_insert_with(|| Draws::new(&self.quantiles, numbers.seed, track.id));
             self.people[self.present].fill(numbers, &self.figure, draws, self.samples, track, forecast);
+            self.people[self.present].hold(ue, draws);
             self.people[self.present].stand_on(&self.hall);
             self.present += 1;
         }
@@ -247,21 +248,16 @@ impl Sampler {
         let (asks_own, Aim { ue, ap_m, person: number }) = (!aim.ue.is_on_axis(), aim);
         if asks_own {
             self.people[number].walk(&self.figure, &self.draws);
-            self.people[number].face_as_owner(&self.draws);
         }
-        let (person, reach_m) = (&self.people[number], ue.forward_m.abs() + ue.left_m.abs());
+        let (person, [reach_m, rises_m]) = (&self.people[number], ue.reach_m());
         let disc = Disc { radius_m: person.second.radius_m + reach_m, ..person.second };
-        let lowest_m = ue.height_share * person.heights_m[0] + person.floors_m[0];
+        let lowest_m = ue.height_share * person.heights_m[0] + person.floors_m[0] - rises_m;
         let in_way = self.things.look(ap, ap_m, disc, lowest_m);
         let things = in_way.then_some(&self.things);
         let known = Known { others: &self.link.firsts, samples: self.samples, person, number };
         let aim = |rays: &mut Rays, step: usize| rays.aim(ap_m, ue, person, step, 0..words);
         let (crossing, rays) = (&mut self.crossing, &mut self.rays);
-        let causes = self.causes.of(&known, &self.figure, things, asks_own, crossing, rays, aim);
-        if asks_own {
-            self.people[number].face_as_blocker();
-        }
-        causes
+        self.causes.of(&known, &self.figure, things, asks_own, crossing, rays, aim)
     }
 
     /// What these words of samples show of a link at a step. `rest` are the link's meetings from that step on; those of

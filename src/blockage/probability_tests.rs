@@ -55,7 +55,7 @@ fn one_by_one(sampler: &Sampler, numbers: &Numbers, ue: &Ue, ap_m: DVec3, q: usi
         p.posture(&sampler.draws[&p.track], numbers.body.arms.still_share, step, k)
     };
     let q_at = |step: usize| {
-        let q = posture(&people[q], step);
+        let (ue, q) = (people[q].device_of(ue, k), posture(&people[q], step));
         ue.on_body(q.position_m, q.ahead.to_angle(), q.height_m)
     };
     let others = || people.iter().enumerate().filter(|(other, _)| *other != q).map(|(_, p)| p);
@@ -76,7 +76,8 @@ fn causes(
     let (person, mut bits) = (&sampler.people[q], [0; 2]);
     for step in 0..MOMENTS {
         let posture = person.posture(&sampler.draws[&person.track], numbers.body.arms.still_share, step, k);
-        let ue_m = ue.on_body(posture.position_m, posture.ahead.to_angle(), posture.height_m);
+        let held = person.device_of(ue, k);
+        let ue_m = held.on_body(posture.position_m, posture.ahead.to_angle(), posture.height_m);
         if !ue.is_on_axis() {
             bits[0] |= u16::from(blocks(&numbers.body, &posture, ap_m, ue_m)) << step;
         }
@@ -133,7 +134,8 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
     const THRESHOLD: f64 = 0.47;
     let config = Config::default();
     let mut random = Pcg64::seed_from_u64(3);
-    let ear = Ue { forward_m: 0.05, left_m: 0.1, height_share: 0.9 };
+    let ear = Ue { forward_m: 0.05, left_m: 0.1, height_share: 0.9, spread_m: 0.0 };
+    let hand = Ue { forward_m: 0.3, left_m: -0.2, height_share: 0.6, spread_m: 0.1 };
     let aps_m = [DVec3::new(9.0, 1.0, 2.0), DVec3::new(0.0, 0.0, 3.0), DVec3::new(-3.0, -6.0, 0.6)];
     let (mut in_doubt, mut seen_late) = (0, 0);
     let mut site = config.site.clone();
@@ -144,10 +146,9 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
         ap.position_m = ap_m.to_array();
     }
     let mut by_hall = 0;
-    for (samples, ue) in [(128, config.site.ue), (70, ear)] {
+    for (samples, ue) in [(128, config.site.ue), (70, ear), (96, hand)] {
         let numbers = Numbers::new(&config.blockage);
-        let own_heading_sigma_rad = numbers.heading_sigma_rad;
-        let numbers = Numbers { samples, own_heading_sigma_rad, ..numbers };
+        let numbers = Numbers { samples, ..numbers };
         let tracks: Vec<Track> = (0..14).map(|id| somebody(id, &mut random)).collect();
         let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
         let mut sampler = Sampler::new(&numbers, &site);

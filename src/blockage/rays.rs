@@ -54,18 +54,20 @@ impl Rays {
                 (end_x[k], end_y[k]) = (base_x + off_x[k], base_y + off_y[k]);
             }
             if !ue.is_on_axis() {
-                let (forward_m, left_m) = (ue.forward_m as f32, ue.left_m as f32);
+                let [forward_m, left_m] = [0, 1].map(|i| word_of(&person.device_m[i], word));
                 let [own_x, own_y] = [0, 1].map(|i| word_of(&person.gait.own[i], of_step + word));
                 for k in 0..WORD {
-                    end_x[k] += forward_m * own_x[k] - left_m * own_y[k];
-                    end_y[k] += forward_m * own_y[k] + left_m * own_x[k];
+                    end_x[k] += forward_m[k] * own_x[k] - left_m[k] * own_y[k];
+                    end_y[k] += forward_m[k] * own_y[k] + left_m[k] * own_x[k];
                 }
             }
+            const LEVEL: [f32; WORD] = [0.0; WORD];
+            let up_m = if ue.is_on_axis() { &LEVEL } else { word_of(&person.device_m[2], word) };
             let (end_z, height_m) = (word_of_mut(end_z, word), word_of(&person.height_m, word));
             let (to_x, to_y) = (word_of_mut(to_x, word), word_of_mut(to_y, word));
             let length_m = word_of_mut(&mut self.length_m, word);
             for k in 0..WORD {
-                end_z[k] = height_share * height_m[k] + floor_m;
+                end_z[k] = height_share * height_m[k] + floor_m + up_m[k];
                 let length = (end_x[k] * end_x[k] + end_y[k] * end_y[k]).sqrt();
                 let per = 1.0 / larger(length, 1e-6);
                 (to_x[k], to_y[k], length_m[k]) = (end_x[k] * per, end_y[k] * per, length);

@@ -41,6 +41,8 @@ pub(super) struct Shadows {
     ap_m: DVec3,
     ue_reach_m: f64,
     ue_height_share: f64,
+    /// How far above or below that height it may be.
+    ue_rises_m: f64,
     /// Sectors that each person's body covers.
     covered: Vec<Sectors>,
     /// Where each sector's bodies begin in `bodies`, and one past the last.
@@ -83,7 +85,7 @@ impl Shadows {
     /// Looks at everybody from an access point.
     pub(super) fn fall(&mut self, ap_m: DVec3, ue: &Ue, people: &[Trajectories]) {
         self.ap_m = ap_m;
-        self.ue_reach_m = ue.forward_m.abs() + ue.left_m.abs();
+        [self.ue_reach_m, self.ue_rises_m] = ue.reach_m();
         self.ue_height_share = ue.height_share;
         self.covered.clear();
         self.covered.extend(people.iter().map(|p| Sectors::of(wider(p.second, p.reach_m), ap_m.truncate())));
@@ -131,7 +133,8 @@ impl Shadows {
             }
         }
         let rises_m = |floors_m: [f64; 2]| {
-            [0, 1].map(|i| self.ue_height_share * q.heights_m[i] + floors_m[i] - self.ap_m.z)
+            let off_m = [-self.ue_rises_m, self.ue_rises_m];
+            [0, 1].map(|i| self.ue_height_share * q.heights_m[i] + floors_m[i] + off_m[i] - self.ap_m.z)
         };
         let rises_of_second_m = rises_m(q.floors_m);
         let second = Bundle::of_second(self.ap_m, q, self.ue_reach_m);

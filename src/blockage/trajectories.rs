@@ -17,7 +17,7 @@ use super::steps::{heading_at, position_at};
 use crate::forecast::Forecast;
 use crate::gait::{self, FOREMOST_RAD, GaitPhase, LEFTMOST_RAD, WALKS_FROM_MPS, sway_share};
 use crate::geometry::DVec2;
-use crate::site::Hall;
+use crate::site::{Hall, Ue};
 use crate::track::Track;
 use crate::{STEP_S, STEPS};
 
@@ -62,8 +62,8 @@ pub(crate) struct Trajectories {
     pub(crate) height_m: Vec<f32>,
     pub(crate) width_scale: Vec<f32>,
     pub(crate) turn_rad: Vec<f32>,
-    /// Of what the turn is more than the velocity's, one standard deviation; the same for the owner's own UE.
-    turn_sigma_rad: [f32; 2],
+    /// By sample: how far ahead of the axis, left of it, and above its mean height the device is. Empty where it is on the axis.
+    pub(crate) device_m: [Vec<f32>; 3],
     speed_mps: Vec<f32>,
     phase: Option<GaitPhase>,
     /// Phases of even shares, in their order.
@@ -71,7 +71,6 @@ pub(crate) struct Trajectories {
     /// Of another frame until the body is in somebody's way.
     pub(super) gait: Gait,
     walks: bool,
-    faces: bool,
     /// Offset and drift of each sample at the step that is drawn.
     state: [Vec<f32>; 4],
 }
@@ -83,8 +82,6 @@ pub(super) struct Gait {
     pub(super) axis_m: [Vec<f32>; 2],
     /// By step and sample: the unit vector that the trunk faces.
     pub(super) own: [Vec<f32>; 2],
-    /// The same as the owner's own UE goes round with it.
-    with_ue: [Vec<f32>; 2],
     /// By step and sample: how far the arms swing, left ahead, as speed over hip height.
     pub(super) wave_hz: Vec<f32>,
     /// By sample: speed over hip height of whoever swings the arms; 0 for arms that hang still.
@@ -113,7 +110,7 @@ impl Trajectories {
         self.asked = numbers.samples;
         self.track = track.id;
         self.phase = Some(track.gait);
-        (self.walks, self.faces) = (false, false);
+        self.walks = false;
         self.mean_m = std::array::from_fn(|s| position_at(track, forecast, s));
         self.ahead = std::array::from_fn(|s| DVec2::from_angle(heading_at(track, forecast, s)));
         self.start(draws, &root(&forecast.coupling.state));
@@ -129,6 +126,26 @@ impl Trajectories {
             self.place(s, numbers.joint);
         }
         self.bound(figure);
+    }
+
+    /// Where each sample has the device.
+    pub(super) fn hold(&mut self, ue: &Ue, draws: &Draws) {
+        let samples = if ue.is_on_axis() { 0 } else { self.samples };
+        let (mean_m, spread_m) = ([ue.forward_m, ue.left_m, 0.0].map(|m| m as f32), ue.spread_m as f32);
+        for ((device_m, mean_m), z) in self.device_m.iter_mut().zip(mean_m).zip(&draws.device) {
+            renew(device_m, z[..samples].iter().map(|z| mean_m + spread_m * z));
+        }
+    }
+
+    /// The device as sample `k` has it.
+    #[cfg(test)]
+    pub(crate) fn device_of(&self, ue: &Ue, k: usize) -> Ue {
+        if ue.is_on_axis() {
+            return *ue;
+        }
+        let [forward_m, left_m, up_m] = [0, 1, 2].map(|i| f64::from(self.device_m[i][k]));
+        let height_share = ue.height_share + up_m / f64::from(self.height_m[k]);
+        Ue { forward_m, left_m, height_share, ..*ue }
     }
 
     /// The floor below each step.
@@ -190,12 +207,7 @@ impl Trajectories {
         let velocity = track.velocity_mps;
         let walks = velocity.length() > WALKS_FROM_MPS;
         let trunk_rad = numbers.heading_sigma_rad;
-        let sigma_rad = |of_trunk: f64| {
-            let sigma = if walks { of_trunk } else { track.heading_sigma_rad.hypot(of_trunk) };
-            sigma as f32
-        };
-        self.turn_sigma_rad = [trunk_rad, numbers.own_heading_sigma_rad].map(sigma_rad);
-        let turn_sigma_rad = self.turn_sigma_rad[0];
+        let turn_sigma_rad = if walks { trunk_rad } else { track.heading_sigma_rad.hypot(trunk_rad) } as f32;
         let (height_m, width) = (track.height_m as f32, track.width_scale as f32);
         let height_sigma_m = track.height_sigma_m.hypot(numbers.height_sigma_m) as f32;
         let width_sigma = track.width_scale_sigma.hypot(numbers.width_sigma) as f32;
@@ -293,40 +305,6 @@ impl Trajectories {
             let off_m = [0, 1].map(|i| &self.off_m[i][step * n..(step + 1) * n]);
             gait.walk_step(figure, step, self.ahead[step], off_m);
         }
-    }
-}
-
-impl Trajectories {
-    /// From here to [`Trajectories::face_as_blocker`] the samples face as their own UE goes with them. The gait is known.
-    #[inline(always)]
-    pub(super) fn face_as_owner(&mut self, draws: &BTreeMap<u64, Draws>) {
-        if !self.faces {
-            self.faces = true;
-            let (n, gait, z) = (self.samples, &mut self.gait, &draws[&self.track].heading);
-            let less_rad = self.turn_sigma_rad[0] - self.turn_sigma_rad[1];
-            renew(&mut gait.turn[0], self.turn_rad.iter().zip(z).map(|(turn, z)| turn - less_rad * z));
-            cos_sin(&mut gait.turn);
-            let [cos, sin] = &gait.turn;
-            let [with_x, with_y] = &mut gait.with_ue;
-            with_x.resize(MOMENTS * n, 0.0);
-            with_y.resize(MOMENTS * n, 0.0);
-            for step in 0..MOMENTS {
-                let [ahead_x, ahead_y] = self.ahead[step].to_array().map(|x| x as f32);
-                let row = step * n..(step + 1) * n;
-                let (with_x, with_y) = (&mut with_x[row.clone()], &mut with_y[row]);
-                for k in 0..n {
-                    with_x[k] = ahead_x * cos[k] - ahead_y * sin[k];
-                    with_y[k] = ahead_y * cos[k] + ahead_x * sin[k];
-                }
-            }
-        }
-        std::mem::swap(&mut self.gait.own, &mut self.gait.with_ue);
-    }
-
-    /// As others meet them again.
-    #[inline(always)]
-    pub(super) fn face_as_blocker(&mut self) {
-        std::mem::swap(&mut self.gait.own, &mut self.gait.with_ue);
     }
 }
 

@@ -159,6 +159,7 @@ fn furniture(index: usize, furniture: &Furniture, site: &Site) -> Result<(), Err
 fn ue(ue: &Ue) -> Result<(), Error> {
     within("site.ue.forward_m", ue.forward_m, -2.0, 2.0)?;
     within("site.ue.left_m", ue.left_m, -2.0, 2.0)?;
+    within("site.ue.spread_m", ue.spread_m, 0.0, 0.5)?;
     // Over the head of who holds it up.
     within("site.ue.height_share", ue.height_share, 0.0, 1.5)
 }

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn an_azimuth_lies_in_its_bin_whatever_it_is() {
-    let model = RangeModel::new(0.05, 0.2);
+    let model = RangeModel::new(0.2);
     for (azimuth_cdeg, bin) in [
         (0.0, 0),
         (19.9, 0),
@@ -25,7 +25,7 @@ fn an_azimuth_lies_in_its_bin_whatever_it_is() {
 
 #[test]
 fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
-    let mut model = RangeModel::new(0.05, 1.0);
+    let mut model = RangeModel::new(1.0);
     model.grow(ROWS);
     (0..model.limit_m.len()).for_each(|pixel| model.limit_m[pixel] = 2.0 + (pixel * 7 % 13) as f32);
     let columns = [
@@ -62,7 +62,7 @@ fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
 
 #[test]
 fn who_comes_and_stands_where_somebody_is_expected_never_becomes_the_background() {
-    let mut model = RangeModel::new(0.05, 1.0);
+    let mut model = RangeModel::new(1.0);
     model.grow(ROWS);
     for _ in 0..40 {
         look(&mut model, 0, 0);
@@ -84,6 +84,25 @@ fn who_comes_and_stands_where_somebody_is_expected_never_becomes_the_background(
     }
 }
 
+/// The margin once followed from the site file's key that also draws the simulator's noise.
+#[test]
+fn the_margin_comes_from_how_the_empty_hall_scatters() {
+    let margin_m = |off_m: f32| {
+        let mut model = RangeModel::new(1.0);
+        model.grow(ROWS);
+        for revolution in 0..20 {
+            // Mean absolute deviation: `off_m`.
+            let range_m = FAR_M + if revolution % 2 == 0 { off_m } else { -off_m };
+            (0..model.bins * ROWS).for_each(|pixel| model.observe(pixel, range_m));
+            model.close_revolution(true);
+        }
+        model.margin_m
+    };
+    assert_eq!(margin_m(0.001), 0.05, "never less: bodies breathe, walls shake");
+    assert!((margin_m(0.016) - 0.1).abs() < 0.01, "{}", margin_m(0.016));
+    assert!((margin_m(0.03) - 0.19).abs() < 0.02, "{}", margin_m(0.03));
+}
+
 const ROWS: usize = 4;
 const NEAR_M: f32 = 5.0;
 const FAR_M: f32 = 10.0;
@@ -100,7 +119,7 @@ fn look(model: &mut RangeModel, first: usize, end: usize) {
 }
 
 fn learned(first: usize, end: usize) -> RangeModel {
-    let mut model = RangeModel::new(0.1, 1.0);
+    let mut model = RangeModel::new(1.0);
     model.grow(ROWS);
     for _ in 0..10 {
         look(&mut model, first, end);

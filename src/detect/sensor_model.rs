@@ -18,10 +18,6 @@ const BIN_COLUMNS: f64 = 1.02;
 /// The same of an unorganised cloud, whose columns are not known: a VLP-16 at 20 Hz fires every 0.4 degrees.
 const CLOUD_AZIMUTH_BIN_DEG: f64 = 1.0;
 const CLOUD_ELEVATION_BIN_DEG: f64 = 0.5;
-/// A return is new when it is nearer than the background by so many standard deviations of the sensor's range,
-const MARGIN_SIGMAS: f64 = 5.0;
-/// and at least by this.
-const MARGIN_MIN_M: f64 = 0.05;
 /// Nothing is learned within this distance of an expected person.
 const FREEZE_M: f64 = 0.5;
 /// What is new within this distance of furniture's middle is a part of it: half a large table.
@@ -153,12 +149,11 @@ impl Clip {
 impl SensorModel {
     /// Knows nothing yet.
     pub(super) fn new(sensor: &Sensor) -> Self {
-        let margin_m = (MARGIN_SIGMAS * sensor.range_noise_m).max(MARGIN_MIN_M);
         Self {
             range_min_m: sensor.range_min_m as f32,
             range_max_m: sensor.range_max_m as f32,
-            ranges: RangeModel::new(margin_m, azimuth_bin_deg(sensor)),
-            cloud_ranges: RangeModel::new(margin_m, CLOUD_AZIMUTH_BIN_DEG),
+            ranges: RangeModel::new(azimuth_bin_deg(sensor)),
+            cloud_ranges: RangeModel::new(CLOUD_AZIMUTH_BIN_DEG),
             row_of_elevation: vec![None; (180.0 / CLOUD_ELEVATION_BIN_DEG) as usize + 3],
             elevation_bins_per_rad: 1.0_f64.to_degrees() / CLOUD_ELEVATION_BIN_DEG,
             known: false,

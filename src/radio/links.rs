@@ -181,10 +181,10 @@ impl Fader {
     fn meet(&mut self, people: &[Trajectories]) {
         self.meetings.clear();
         self.ends.clear();
-        let reach_m = self.ue.forward_m.hypot(self.ue.left_m);
+        let [reach_m, rises_m] = self.ue.reach_m();
         for antenna in self.radios.iter().flatten() {
             for (owner, q) in people.iter().enumerate() {
-                let lowest_m = self.ue.height_share * q.heights_m[0] + q.floors_m[0];
+                let lowest_m = self.ue.height_share * q.heights_m[0] + q.floors_m[0] - rises_m;
                 let near = |aim: Disc, p: &Trajectories, body: Disc| {
                     let aim = Disc { radius_m: aim.radius_m + reach_m, ..aim };
                     antenna.meets(aim, lowest_m, body, p.floors_m[1] + p.heights_m[1])
@@ -293,16 +293,17 @@ impl Fader {
             let [cos, sin] = [self.turns[of][0][k], self.turns[of][1][k]];
             [x * cos - y * sin, x * sin + y * cos]
         };
-        let (forward_m, left_m) = (self.ue.forward_m as f32, self.ue.left_m as f32);
         let (share, ap_z) = (self.ue.height_share as f32, ap_m.z as f32);
         let floors_m = [q.floor_m[step] as f32, p.floor_m[step] as f32];
         for k in 0..samples {
             let mut end_m = place(q, k);
-            if forward_m != 0.0 || left_m != 0.0 {
+            let mut end_z = share * q.height_m[k] + floors_m[0];
+            if !self.ue.is_on_axis() {
                 let [x, y] = ahead(owner, k);
+                let [forward_m, left_m, up_m] = [0, 1, 2].map(|i| q.device_m[i][k]);
                 end_m = [end_m[0] + forward_m * x - left_m * y, end_m[1] + forward_m * y + left_m * x];
+                end_z += up_m;
             }
-            let end_z = share * q.height_m[k] + floors_m[0];
             let length_m = (end_m[0] * end_m[0] + end_m[1] * end_m[1]).sqrt().max(1e-3);
             let to = [end_m[0] / length_m, end_m[1] / length_m];
             let foot_m = place(p, k);

@@ -99,8 +99,9 @@ fn losses_are_those_of_everybody_asked_one_by_one() {
     let mut random = Pcg64::seed_from_u64(7);
     let mut fades = 0;
     for ue in [
-        Ue { forward_m: 0.0, left_m: 0.0, height_share: 0.5 },
-        Ue { forward_m: 0.3, left_m: 0.1, height_share: 0.6 },
+        Ue { forward_m: 0.0, left_m: 0.0, height_share: 0.5, spread_m: 0.0 },
+        Ue { forward_m: 0.3, left_m: 0.1, height_share: 0.6, spread_m: 0.0 },
+        Ue { forward_m: 0.3, left_m: 0.1, height_share: 0.6, spread_m: 0.1 },
     ] {
         let mut config = config(false);
         config.site.ue = ue;
@@ -111,7 +112,8 @@ fn losses_are_those_of_everybody_asked_one_by_one() {
             })
             .collect();
         let (caster, mut fader, losses) = faded(&config, &tracks);
-        let (people, samples) = caster.drawn().unwrap();
+        // Where bodies are many, not all samples are asked.
+        let ((people, _), samples) = (caster.drawn().unwrap(), fader.outages().samples());
         for person in 0..people.len() {
             fader.turn(people, person);
         }
@@ -155,7 +157,8 @@ fn one_by_one(
         people[of].ahead[step].rotate(DVec2::new(cos, sin))
     };
     let q = &people[owner];
-    let ue_m = ue.on_body(place(q), ahead(owner).to_angle(), f64::from(q.height_m[k]));
+    let held = q.device_of(ue, k);
+    let ue_m = held.on_body(place(q), ahead(owner).to_angle(), f64::from(q.height_m[k]));
     let mut sum_db = 0.0;
     for (body, p) in people.iter().enumerate() {
         if body == owner && ue.is_on_axis() {

@@ -17,7 +17,7 @@ pub const FILE: &str = "record/answers.txt";
 
 /// One question: its name, whether it needs the real data, and the words that `umbracast` is asked with. `DATA` stands for the
 /// folder of the real data, `OUT` for one to write to.
-const QUESTIONS: [(&str, bool, &[&str]); 6] = [
+const QUESTIONS: [(&str, bool, &[&str]); 9] = [
     (
         "crossing",
         false,
@@ -46,6 +46,31 @@ const QUESTIONS: [(&str, bool, &[&str]); 6] = [
             "DATA/circle_antipode/circle-10m-08-1x.txt",
         ],
     ),
+    (
+        "people from the first frame on",
+        false,
+        &[
+            "simulate",
+            "--preset",
+            "orca-03",
+            "--scenes",
+            "1",
+            "--people",
+            "5",
+            "--seed",
+            "100700",
+            "--site",
+            "config/sites/l-hall.toml",
+            "--out",
+            "SIM",
+        ],
+    ),
+    (
+        "without an empty scan",
+        false,
+        &["run", "--no-empty", "--mode", "default", "--out", "OUT", "SIM/scene-0000.mcap"],
+    ),
+    ("their scores", false, &["evaluate", "OUT", "--truth", "SIM"]),
     ("capture", true, &["inspect", "DATA/hdl32e/hdl32_example.pcap"]),
     (
         "clouds",
@@ -67,13 +92,16 @@ const QUESTIONS: [(&str, bool, &[&str]); 6] = [
 /// What a program answers now, question by question; those that need the data only where there is some.
 pub fn ask(umbracast: &Path, root: &Path, data: Option<&Path>) -> Result<String, String> {
     let out = std::env::temp_dir().join(format!("umbracast-answers-{}", std::process::id()));
+    let sim = out.with_extension("sim");
     let mut text = String::new();
     for (name, needs_data, words) in
         QUESTIONS.iter().filter(|(_, needs_data, _)| !needs_data || data.is_some())
     {
         let data = data.map(|data| data.display().to_string()).unwrap_or_default();
-        let words =
-            words.iter().map(|word| word.replace("DATA", &data).replace("OUT", &out.display().to_string()));
+        let [sim, out_name] = [&sim, &out].map(|path| path.display().to_string());
+        let words = words
+            .iter()
+            .map(|word| word.replace("DATA", &data).replace("OUT", &out_name).replace("SIM", &sim));
         let done = Command::new(umbracast).args(words).arg("--quiet").current_dir(root).output();
         let done = done.map_err(|e| format!("{}: {e}", umbracast.display()))?;
         if !matches!(done.status.code(), Some(0 | 3)) {
@@ -82,11 +110,12 @@ pub fn ask(umbracast: &Path, root: &Path, data: Option<&Path>) -> Result<String,
         text += &format!("{name}{}\n", if *needs_data { ", real data" } else { "" });
         let said = String::from_utf8_lossy(&done.stdout).into_owned();
         for line in said.lines().filter(|line| tells(line)) {
-            let line = without(&without(line, &data, "DATA"), &out.display().to_string(), "OUT");
+            let line = without(&without(line, &data, "DATA"), &sim, "SIM");
+            let line = without(&line, &out_name, "OUT");
             text += &format!("  {}\n", line.split_whitespace().collect::<Vec<_>>().join(" "));
         }
     }
-    let _ = fs::remove_dir_all(out);
+    let _ = (fs::remove_dir_all(out), fs::remove_dir_all(&sim));
     Ok(text)
 }
 

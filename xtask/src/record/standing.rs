@@ -10,7 +10,10 @@ use super::living::{Row, draws, read, rings, simulated, stools, table, walked, w
 use crate::tools::{Result, argument, root};
 
 const SCENES: u64 = 20;
-/// Seeds of the ways, which no other record draws.
+/// So many at a time: recordings of five minutes take gigabytes.
+const BATCH: usize = 4;
+/// Seeds of bodies and noise, and of the ways, which no other record draws.
+const FIRST_SEED: u64 = 240_000;
 const FIRST_WAY: u64 = 1000;
 /// Who stands does so from the first frame on for this long.
 const STANDS_S: f64 = 300.0;
@@ -21,7 +24,7 @@ const GATE_M: f64 = 0.5;
 /// Ids below this are of those who stand.
 const STANDING: u64 = 4;
 /// Clouds are large: fewer and shorter scenes.
-const CLOUD_SCENES: u64 = 10;
+const CLOUD_SCENES: u64 = 8;
 const CLOUDS_S: f64 = 20.0;
 
 /// Hall of 20 x 12 m, the sensors on its short walls. The second sensor is left out where one of model `points` is meant.
@@ -64,35 +67,40 @@ pub fn standing(book: &mut Book) -> Result<()> {
     let clouds = site("points.toml", &SMALL_HALL.replace("MODEL", "model = \"points\""))?;
     let stools = site("stools.toml", &with_stools()?)?;
 
+    let beams_and_clouds = ["--clouds", "--site", beams.as_str()];
+    let no_scan = ["--site", clouds.as_str(), "--no-empty"];
+    let from_clouds: &Rows = &|book, sim, scenes, seen| {
+        seen[0].add(book, sim, scenes, &no_scan)?;
+        for (k, files) in as_pcd(book, sim)?.iter().enumerate() {
+            seen[1].add_scene(book, sim, k as u32, files, &no_scan)?;
+        }
+        Ok(())
+    };
+    let scanned = |site: Option<&'static str>, file: &str| {
+        let site: Vec<String> = site.into_iter().chain(site.map(|_| file)).map(str::to_owned).collect();
+        move |book: &mut Book, sim: &str, scenes: &[PathBuf], seen: &mut [Seen; 2]| {
+            let site: Vec<&str> = site.iter().map(String::as_str).collect();
+            let empty = format!("{sim}/empty.mcap");
+            seen[0].add(book, sim, scenes, &[&site[..], &["--empty", &empty]].concat())?;
+            seen[1].add(book, sim, scenes, &[&site[..], &["--no-empty"]].concat())
+        }
+    };
     let ways: Vec<String> = (0..SCENES).map(in_default_hall).collect();
-    let sim = simulated(book, "stand", &walked(book, "stand", &ways)?)?;
-    both(book, "four stand, default hall", &sim, &[])?;
+    let seen = batches(book, &ways, &[], &scanned(None, ""))?;
+    tell(book, ["four stand, default hall"; 2], ["known", "none"], SCENES, &seen);
 
     let ways: Vec<String> = (0..SCENES).map(in_small_hall).collect();
-    let mut how = walked(book, "small", &ways)?;
-    how.extend(["--site".to_owned(), small.clone()]);
-    let sim = simulated(book, "small", &how)?;
-    both(book, "four stand, hall of 20 x 12 m", &sim, &["--site", &small])?;
+    let seen = batches(book, &ways, &["--site", &small], &scanned(Some("--site"), &small))?;
+    tell(book, ["four stand, hall of 20 x 12 m"; 2], ["known", "none"], SCENES, &seen);
 
     let ways: Vec<String> = (0..SCENES).map(on_stools).collect();
-    let mut how = walked(book, "sit", &ways)?;
-    how.extend(["--bodies", "sitting", "--site", &stools].map(str::to_owned));
-    let sim = simulated(book, "sit", &how)?;
-    both(book, "four sit, default hall", &sim, &[])?;
+    let seen = batches(book, &ways, &["--bodies", "sitting", "--site", &stools], &scanned(None, ""))?;
+    tell(book, ["four sit, default hall"; 2], ["known", "none"], SCENES, &seen);
 
     let ways: Vec<String> = (0..CLOUD_SCENES).map(for_clouds).collect();
-    let mut how = walked(book, "clouds", &ways)?;
-    how.extend(["--clouds", "--site", &beams].map(str::to_owned));
-    let sim = simulated(book, "clouds", &how)?;
-    row(
-        book,
-        "two stand, `points`, PointCloud2",
-        &sim,
-        &scenes_of(&sim)?,
-        &["--site", &clouds, "--no-empty"],
-    )?;
-    let files = as_pcd(book, &sim)?;
-    row(book, "two stand, `points`, PCD", &sim, &files, &["--site", &clouds, "--no-empty"])?;
+    let seen = batches(book, &ways, &beams_and_clouds, from_clouds)?;
+    let names = ["two stand, `points`, PointCloud2", "two stand, `points`, PCD"];
+    tell(book, names, ["none"; 2], CLOUD_SCENES, &seen);
     book.line(&format!(
         "Default mode. Four stand or sit for {STANDS_S:.0} s while three to six walk about them; before the clouds two \
          stand for 4 and 7 s and then walk. Seen: share of the frames from 1 s on in which each of them has a confirmed \
@@ -101,43 +109,35 @@ pub fn standing(book: &mut Book) -> Result<()> {
     Ok(())
 }
 
-/// With an empty scan and without.
-fn both(book: &mut Book, what: &str, sim: &str, site: &[&str]) -> Result<()> {
-    let scenes = scenes_of(sim)?;
-    row(book, what, sim, &scenes, &[site, &["--empty", &format!("{sim}/empty.mcap")]].concat())?;
-    row(book, what, sim, &scenes, &[site, &["--no-empty"]].concat())
+/// What is asked of the scenes of a batch, for two rows.
+type Rows<'a> = dyn Fn(&mut Book, &str, &[PathBuf], &mut [Seen; 2]) -> Result<()> + 'a;
+
+/// Simulates a few scenes at a time, which take gigabytes, and asks the rows of each batch.
+fn batches(book: &mut Book, ways: &[String], how: &[&str], rows: &Rows) -> Result<[Seen; 2]> {
+    let mut seen = [Seen::default(), Seen::default()];
+    for (k, ways) in ways.chunks(BATCH).enumerate() {
+        let name = format!("batch-{k}");
+        let mut words = walked(book, &name, ways)?;
+        words.extend(how.iter().map(|word| (*word).to_owned()));
+        words.extend(["--seed".to_owned(), (FIRST_SEED + (BATCH * k) as u64).to_string()]);
+        let sim = simulated(book, &name, &words)?;
+        rows(book, &sim, &scenes_of(&sim)?, &mut seen)?;
+        fs::remove_dir_all(&sim).map_err(|e| e.to_string())?;
+    }
+    Ok(seen)
 }
 
-fn row(book: &mut Book, what: &str, sim: &str, inputs: &[PathBuf], how: &[&str]) -> Result<()> {
-    let people = read(&format!("{sim}/people.csv"))?;
-    let mut seen = Seen::default();
-    // Folders of PCD files are a scene each, which a command takes one by one.
-    let runs: Vec<&[PathBuf]> =
-        if inputs.iter().all(|input| input.is_dir()) { inputs.chunks(1).collect() } else { vec![inputs] };
-    for (k, run) in runs.iter().enumerate() {
-        let out = format!("{sim}-out");
-        let words: Vec<OsString> =
-            ["run", "--csv", "--out", &out].iter().chain(how).map(OsString::from).collect();
-        book.quietly(&[words, run.iter().map(argument).collect()].concat())?;
-        let mut tracks = read(&format!("{out}/tracks.csv"))?;
-        let mut people: Vec<&Row> = people.iter().collect();
-        if runs.len() > 1 {
-            tracks.iter_mut().for_each(|track| track.scene = k as u32);
-            people.retain(|person| person.scene == k as u32);
-        }
-        seen.add(&people, &tracks);
+fn tell(book: &mut Book, what: [&str; 2], known: [&str; 2], scenes: u64, seen: &[Seen; 2]) {
+    for ((what, known), seen) in what.iter().zip(known).zip(seen) {
+        let share = |part: u64, all: u64| part as f64 / all as f64;
+        book.line(&format!(
+            "{what:<36} {scenes:>6} {known:<10} {:>15} {:>7.4} {:>9.4} {:>10.2}",
+            seen.all,
+            share(seen.seen, seen.all),
+            share(seen.right, seen.told),
+            share(seen.ids, seen.heads),
+        ));
     }
-    let known = if how.contains(&"--empty") { "known" } else { "none" };
-    let scenes = people.iter().map(|person| person.scene + 1).max().unwrap_or(0);
-    let ids: usize = seen.ids.values().map(Vec::len).sum();
-    book.line(&format!(
-        "{what:<36} {scenes:>6} {known:<10} {:>15} {:>7.4} {:>9.4} {:>10.2}",
-        seen.all,
-        seen.seen as f64 / seen.all as f64,
-        seen.right as f64 / seen.told as f64,
-        ids as f64 / seen.ids.len() as f64,
-    ));
-    Ok(())
 }
 
 #[derive(Default)]
@@ -146,39 +146,72 @@ struct Seen {
     seen: u64,
     told: u64,
     right: u64,
-    ids: BTreeMap<(u32, u64), Vec<u64>>,
+    /// Different tracks, summed over those who were seen.
+    ids: u64,
+    heads: u64,
 }
 
 impl Seen {
-    fn add(&mut self, people: &[&Row], tracks: &[Row]) {
-        let mut people_of: BTreeMap<(u32, u32), Vec<_>> = BTreeMap::new();
-        let mut tracks_of: BTreeMap<(u32, u32), Vec<_>> = BTreeMap::new();
-        let late = |frame: u32| frame >= FROM_FRAME;
-        people
-            .iter()
-            .filter(|p| late(p.frame))
-            .for_each(|p| people_of.entry((p.scene, p.frame)).or_default().push(p));
-        tracks
-            .iter()
-            .filter(|t| t.confirmed && late(t.frame))
-            .for_each(|t| tracks_of.entry((t.scene, t.frame)).or_default().push(t));
+    /// Runs and counts these scenes.
+    fn add(&mut self, book: &mut Book, sim: &str, scenes: &[PathBuf], how: &[&str]) -> Result<()> {
+        let tracks = run(book, sim, scenes, how)?;
+        self.count(&read(&format!("{sim}/people.csv"))?, &tracks);
+        Ok(())
+    }
+
+    /// The same of a folder of clouds, which is one scene.
+    fn add_scene(
+        &mut self,
+        book: &mut Book,
+        sim: &str,
+        scene: u32,
+        files: &PathBuf,
+        how: &[&str],
+    ) -> Result<()> {
+        let mut tracks = run(book, sim, std::slice::from_ref(files), how)?;
+        tracks.iter_mut().for_each(|track| track.scene = scene);
+        let mut people = read(&format!("{sim}/people.csv"))?;
+        people.retain(|person| person.scene == scene);
+        self.count(&people, &tracks);
+        fs::remove_dir_all(files).map_err(|e| e.to_string())
+    }
+
+    fn count(&mut self, people: &[Row], tracks: &[Row]) {
+        let mut people_of: BTreeMap<(u32, u32), Vec<&Row>> = BTreeMap::new();
+        let mut tracks_of: BTreeMap<(u32, u32), Vec<&Row>> = BTreeMap::new();
+        let mut ids: BTreeMap<(u32, u64), Vec<u64>> = BTreeMap::new();
+        let late = |row: &&Row| row.frame >= FROM_FRAME;
+        people.iter().filter(late).for_each(|p| people_of.entry((p.scene, p.frame)).or_default().push(p));
+        let tracks = tracks.iter().filter(|track| track.confirmed).filter(late);
+        tracks.for_each(|t| tracks_of.entry((t.scene, t.frame)).or_default().push(t));
+        let is_near = |a: &Row, b: &Row| (a.x_m - b.x_m).hypot(a.y_m - b.y_m) < GATE_M;
         for (key, here) in &people_of {
             let tracks = tracks_of.get(key).map_or(&[][..], Vec::as_slice);
-            let off_m = |a: &Row, b: &Row| (a.x_m - b.x_m).hypot(a.y_m - b.y_m);
             self.told += tracks.len() as u64;
-            self.right += tracks.iter().filter(|t| here.iter().any(|p| off_m(t, p) < GATE_M)).count() as u64;
+            self.right += tracks.iter().filter(|t| here.iter().any(|p| is_near(t, p))).count() as u64;
             for person in here.iter().filter(|person| person.id < STANDING) {
                 self.all += 1;
-                if let Some(track) = tracks.iter().find(|track| off_m(track, person) < GATE_M) {
+                if let Some(track) = tracks.iter().find(|track| is_near(track, person)) {
                     self.seen += 1;
-                    let ids = self.ids.entry((person.scene, person.id)).or_default();
+                    let ids = ids.entry((person.scene, person.id)).or_default();
                     if !ids.contains(&track.id) {
                         ids.push(track.id);
                     }
                 }
             }
         }
+        self.heads += ids.len() as u64;
+        self.ids += ids.values().map(|ids| ids.len() as u64).sum::<u64>();
     }
+}
+
+/// The tracks of a run on these inputs.
+fn run(book: &Book, sim: &str, inputs: &[PathBuf], how: &[&str]) -> Result<Vec<Row>> {
+    let out = format!("{sim}-out");
+    let words: Vec<OsString> =
+        ["run", "--csv", "--out", &out].iter().chain(how).map(OsString::from).collect();
+    book.quietly(&[words, inputs.iter().map(argument).collect()].concat())?;
+    read(&format!("{out}/tracks.csv"))
 }
 
 /// The recordings of a folder of scenes.

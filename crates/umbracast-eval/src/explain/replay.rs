@@ -242,8 +242,7 @@ fn note_links(
             walker.mesh_at(frame.time_ns, vertices);
             vertices.iter_mut().for_each(|v| *v = axis_m + (*v - axis_m) * DVec3::new(width, width, 1.0));
         });
-        let on_body = site.ue.on_body(state.position_m, state.heading_rad, state.height_m);
-        Some((mesh, on_body + DVec3::Z * state.floor_m))
+        Some((mesh, walker.ue_m_at(&site.ue, frame.time_ns)?))
     };
     let bodies: Vec<_> = walkers.iter().map(wider).collect();
     for (access_point, at) in site.access_points.iter().enumerate() {

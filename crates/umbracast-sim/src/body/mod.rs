@@ -6,6 +6,7 @@ pub mod gait;
 mod skeleton;
 mod shape;
 mod feet;
+mod device;
 mod facing;
 mod walk;
 pub mod kind;

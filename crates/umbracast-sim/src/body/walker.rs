@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};
-use umbracast::site::Hall;
+use umbracast::site::{Hall, Ue};
 
 use super::build::Build;
 use super::gestures::Gestures;
@@ -15,7 +15,7 @@ use super::shape::{Shape, Surface};
 use super::sitting::Sitting;
 use super::skeleton::{Holds, PelvisPose, Pose};
 use super::walk::{self, Instant, Walk};
-use super::{feet, gait, things};
+use super::{device, feet, gait, things};
 use crate::crowd::Trajectory;
 use crate::random::stream;
 
@@ -60,6 +60,7 @@ pub struct Walker {
     upright: Pose,
     /// Whose floor is not level.
     hall: Option<Arc<Hall>>,
+    seed: u64,
 }
 
 impl Walker {
@@ -100,6 +101,7 @@ impl Walker {
             gait: None,
             upright,
             hall: None,
+            seed,
         }
     }
 
@@ -123,6 +125,14 @@ impl Walker {
     pub fn on_floor_of(mut self, hall: &Arc<Hall>) -> Self {
         self.hall = (!hall.floors.is_empty()).then(|| hall.clone());
         self
+    }
+
+    /// Where the device is that the person carries, in the site; `None` outside the time of the trajectory.
+    pub fn ue_m_at(&self, ue: &Ue, time_ns: i64) -> Option<DVec3> {
+        let state = self.state_at(time_ns)?;
+        let ue = device::held(ue, self.seed, time_ns, state.height_m);
+        let on_body = ue.on_body(state.position_m, state.heading_rad, state.height_m);
+        Some(on_body + DVec3::Z * state.floor_m)
     }
 
     /// The person's state, or `None` while not in the scene.

@@ -4,9 +4,9 @@ use umbracast::geometry::DVec2;
 
 use super::trajectory::{Crowd, Trajectory};
 
-/// Nobody's axis is nearer to another's. Shoulders with arms are 0.46 m wide; one behind the other, a foot of 0.27 m and the
-/// short step of a crowd take as much.
-pub const ROOM_M: f64 = 0.46;
+/// Nobody's axis is nearer to another's. Strangers in a lift or a queue stand 0.35 m apart, one behind the other; shoulders with
+/// arms are 0.46 m wide, so bodies that stand so side by side overlap at the elbows.
+pub const ROOM_M: f64 = 0.35;
 /// Places are put right at these times, and between them smoothly.
 const NODE_NS: i64 = 100_000_000;
 /// One standard deviation, in nodes, of the time over which somebody makes room: people do so within half a second.

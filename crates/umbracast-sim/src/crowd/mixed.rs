@@ -48,8 +48,8 @@ const MOST_TURN_CHANGE_RADPS2: f32 = 2.0;
 const TURN_S: f32 = 0.5;
 /// A row follows the direction of motion only when there is one.
 const LEAST_SPEED_MPS: f32 = 0.2;
-/// A scene in which strangers come nearer than this is dropped: their bodies would touch.
-pub(super) const APART_M: f64 = 0.45;
+/// A scene in which strangers come nearer than this is dropped: their trunks would touch.
+pub(super) const APART_M: f64 = 0.35;
 
 /// People who walk together: one, or a row.
 struct Party {

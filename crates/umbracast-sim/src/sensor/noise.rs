@@ -8,6 +8,15 @@ use super::edges;
 use super::view::{NOBODY, View};
 use crate::random::stream;
 
+/// A range errs as its data sheet says where the surface is near and faces the sensor. What comes back is less farther away and
+/// from slant surfaces (by the cosine of the angle of incidence: Soudarissanane et al. 2011, "Scanning geometry"), and ranges err
+/// by the root of how much less: at this distance by 1.4 times as much,
+const TWICE_AT_M: f32 = 30.0;
+/// and by so many times at most.
+const MOST: f32 = 4.0;
+/// Dark cloth returns a quarter of what other cloth does.
+const DARK: f32 = 4.0;
+
 /// How one sensor errs. Every frame has generators of its own, and every ray takes one draw whether or not
 /// anything is there: what one ray meets changes the noise of no other.
 #[derive(Debug, Clone)]
@@ -57,14 +66,17 @@ impl Noise {
         if let Some(dark) = &self.dark_cloth {
             self.swallow(dark, view, &mut stream(scene_and_sensor, "dark cloth", frame));
         }
+        let scales = self.scales(view);
         let image = &mut view.image;
         let mut range_draws = stream(scene_and_sensor, "range noise", frame);
         let mut loss_draws = stream(scene_and_sensor, "drop-outs", frame);
         // The draw is below this for the given share of 64-bit numbers; the cast saturates.
         let lost_below = (self.dropout * 2.0_f64.powi(64)) as u64;
-        for (range_m, reflectivity) in image.range_m.iter_mut().zip(&mut image.reflectivity) {
+        for ((range_m, reflectivity), scale) in
+            image.range_m.iter_mut().zip(&mut image.reflectivity).zip(scales)
+        {
             let noise: f32 = StandardNormal.sample(&mut range_draws);
-            *range_m += self.range_bias_m + self.range_noise_m * noise;
+            *range_m += self.range_bias_m + self.range_noise_m * scale * noise;
             let lost = loss_draws.next_u64() < lost_below;
             if lost || !self.range_limits_m.contains(range_m) {
                 (*range_m, *reflectivity) = (0.0, 0);
@@ -72,22 +84,51 @@ impl Noise {
         }
     }
 
+    /// How many times as much as the data sheet says each pixel's range errs.
+    pub(super) fn scales(&self, view: &View) -> Vec<f32> {
+        let mut dark =
+            self.dark_cloth.map(|dark| Wearers { share: dark.people, seed: self.seed, wears: Vec::new() });
+        let per_column_rad = view.step_rad() as f32;
+        let scale = |(pixel, &range_m): (usize, &f32)| {
+            let slope = view.slope_m(pixel) / (range_m * per_column_rad);
+            let per_cosine = (1.0 + slope * slope).sqrt();
+            let worn = dark.as_mut().is_some_and(|dark| dark.has(view.owner[pixel]));
+            let less = (1.0 + (range_m / TWICE_AT_M).powi(2)) * per_cosine * if worn { DARK } else { 1.0 };
+            less.sqrt().min(MOST)
+        };
+        view.image.range_m.iter().enumerate().map(scale).collect()
+    }
+
     /// Loses a share of what comes back of those who wear dark cloth: the same people for every sensor.
     fn swallow(&self, dark: &DarkCloth, view: &mut View, draws: &mut impl Rng) {
-        let mut wears: Vec<Option<bool>> = Vec::new();
+        let mut wearers = Wearers { share: dark.people, seed: self.seed, wears: Vec::new() };
         for (range_m, &owner) in view.image.range_m.iter_mut().zip(&view.owner) {
             let is_lost = draws.random::<f64>() < dark.dropout;
-            if owner == NOBODY || !is_lost {
-                continue;
-            }
-            let person = owner as usize;
-            if wears.len() <= person {
-                wears.resize(person + 1, None);
-            }
-            let draw = || stream(self.seed, "wears dark cloth", owner.into()).random::<f64>() < dark.people;
-            if *wears[person].get_or_insert_with(draw) {
+            if is_lost && wearers.has(owner) {
                 *range_m = f32::INFINITY;
             }
         }
+    }
+}
+
+/// Who wears dark cloth: the same people for every sensor.
+struct Wearers {
+    share: f64,
+    seed: u64,
+    /// By person, once drawn.
+    wears: Vec<Option<bool>>,
+}
+
+impl Wearers {
+    fn has(&mut self, owner: u32) -> bool {
+        if owner == NOBODY {
+            return false;
+        }
+        let person = owner as usize;
+        if self.wears.len() <= person {
+            self.wears.resize(person + 1, None);
+        }
+        let draw = || stream(self.seed, "wears dark cloth", owner.into()).random::<f64>() < self.share;
+        *self.wears[person].get_or_insert_with(draw)
     }
 }

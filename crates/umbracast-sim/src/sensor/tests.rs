@@ -247,12 +247,14 @@ fn noise_and_drop_outs_have_the_given_statistics() {
     let simulated = &mut sensors.sensors[0];
     let mut view = simulated.look(0, &[]);
     let truth = view.image.range_m.clone();
+    let scales = simulated.noise.scales(&view);
     simulated.noise.measure(0, &mut view);
     let errors: Vec<f64> = truth
         .iter()
         .zip(&view.image.range_m)
-        .filter(|&(_, &measured)| measured > 0.0)
-        .map(|(&t, &m)| f64::from(m - t))
+        .zip(&scales)
+        .filter(|&((_, &measured), _)| measured > 0.0)
+        .map(|((&t, &m), &scale)| f64::from((m - t) / scale))
         .collect();
     let n = errors.len() as f64;
     let mean = errors.iter().sum::<f64>() / n;
@@ -261,6 +263,26 @@ fn noise_and_drop_outs_have_the_given_statistics() {
     assert!(mean.abs() < 4.0 * 0.02 / n.sqrt(), "mean {mean}");
     assert!((deviation - 0.02).abs() < 2e-4, "deviation {deviation}");
     assert!((lost - 0.02).abs() < 2e-3, "lost {lost}");
+}
+
+/// A surface far away, or slant, errs by more than one nearby that faces the sensor; none by more than four times as much.
+#[test]
+fn ranges_err_more_far_away_and_on_slant_surfaces() {
+    let mut sensors = Sensors::new(&site(), 5).unwrap();
+    let simulated = &mut sensors.sensors[0];
+    let view = simulated.look(0, &[]);
+    let scales = simulated.noise.scales(&view);
+    let of = |wanted: &dyn Fn(f32, f32) -> bool| {
+        let pixels = (0..scales.len()).filter(|&i| wanted(view.image.range_m[i], view.slope_m(i)));
+        let scales: Vec<f32> = pixels.map(|i| scales[i]).collect();
+        assert!(!scales.is_empty());
+        scales.iter().sum::<f32>() / scales.len() as f32
+    };
+    let near = of(&|range_m, slope_m| range_m < 12.0 && slope_m < 0.002);
+    let far = of(&|range_m, slope_m| range_m > 24.0 && slope_m < 0.002);
+    let slant = of(&|range_m, slope_m| range_m < 12.0 && slope_m > 0.04);
+    assert!(near < 1.1 && far > 1.2 && slant > 1.2, "{near} {far} {slant}");
+    assert!(scales.iter().all(|scale| (1.0..=4.0).contains(scale)));
 }
 
 #[test]

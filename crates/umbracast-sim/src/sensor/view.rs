@@ -9,6 +9,9 @@ use super::panes::Mirrored;
 /// Owner of a pixel that shows the hall.
 pub const NOBODY: u32 = u32::MAX;
 
+/// Neighbouring columns that differ by more show two surfaces, not one that is slant.
+const EDGE_M: f32 = 0.3;
+
 /// True ranges along the reported directions, and whose body each pixel shows.
 #[derive(Debug, Clone)]
 pub struct View {
@@ -23,6 +26,8 @@ pub struct View {
     /// The number of the pane whose reflections are being shown, 0 for what is seen straight.
     pub pane: u8,
     step_cdeg: f64,
+    /// Ranges of the empty hall, in the image's order.
+    hall_m: Vec<f32>,
     /// Empty in a hall without panes.
     mirrored: Vec<Mirrored>,
 }
@@ -48,6 +53,7 @@ impl View {
             }
         }
         Self {
+            hall_m: image.range_m.clone(),
             image,
             owner: vec![NOBODY; rays],
             first_column,
@@ -66,6 +72,24 @@ impl View {
     /// The azimuth of a column's first beam, not wrapped.
     pub fn azimuth_at(&self, column: f64) -> f64 {
         self.first_cdeg + column * self.step_cdeg
+    }
+
+    /// How far the same surface comes nearer or goes away from a pixel to that of the next column; 0 where that shows another.
+    /// Of the hall this does not depend on who stands before it.
+    pub fn slope_m(&self, pixel: usize) -> f32 {
+        let beams = self.image.beams.len();
+        let owner = self.owner[pixel];
+        let ranges_m = if owner == NOBODY { &self.hall_m } else { &self.image.range_m };
+        // The last column has its neighbour before it.
+        let beside = if pixel + beams < ranges_m.len() { pixel + beams } else { pixel.saturating_sub(beams) };
+        let step_m = (ranges_m[beside] - ranges_m[pixel]).abs();
+        let is_same = owner == NOBODY || self.owner[beside] == owner;
+        if is_same && step_m < EDGE_M { step_m } else { 0.0 }
+    }
+
+    /// From one column to the next.
+    pub fn step_rad(&self) -> f64 {
+        (0.01 * self.step_cdeg).to_radians()
     }
 
     /// A surface of a body at `range_m`: shown where nothing nearer is. A reflection is nobody's body.

@@ -6,7 +6,6 @@ pub mod fixtures;
 pub use mesh::BodyMesh;
 
 use umbracast::Site;
-use umbracast::geometry::DVec3;
 
 use crate::body::Walker;
 
@@ -45,9 +44,7 @@ impl Truth {
         for (access_point, at) in site.access_points.iter().enumerate() {
             let start = at.position();
             for (own, walker) in walkers.iter().enumerate() {
-                let Some(state) = walker.state_at(time_ns) else { continue };
-                let on_body = site.ue.on_body(state.position_m, state.heading_rad, state.height_m);
-                let ue = on_body + DVec3::Z * state.floor_m;
+                let Some(ue) = walker.ue_m_at(&site.ue, time_ns) else { continue };
                 let cuts = |i: usize| self.meshes[i].blocks(walkers[i].surface(), start, ue);
                 let inside = self.meshes[own].holds(walker.surface(), ue);
                 links.push(LinkTruth {
