@@ -126,7 +126,7 @@ fn without(line: &str, path: &str, name: &str) -> String {
 
 /// Everything but how long something took.
 fn tells(line: &str) -> bool {
-    !line.trim().is_empty() && !line.contains(" ms a frame")
+    !line.trim().is_empty() && !line.contains(" ms a frame") && !line.contains(" frames in ")
 }
 
 /// The first lines that differ by more than the tolerance, or whose words differ. Questions that were not asked now, for there is
