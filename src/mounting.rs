@@ -33,6 +33,11 @@ const FILE_M: f64 = 0.03;
 /// The hall is the file's where such a share of the returns lies on its surfaces, and so many on the floor.
 const SHARE_MIN: f64 = 0.5;
 const FLOOR_MIN: usize = 40;
+/// A wall is not where the file has it if so many returns lie on a plane before or behind it, as thick as `PLANE_M` and no farther
+/// than `ASIDE_M`, and not half as many on the wall.
+const ASIDE_MIN: usize = 40;
+const PLANE_M: f64 = 0.2;
+const ASIDE_M: f64 = 1.0;
 /// Less than this stays as it is: 0.15 degrees are 4 cm at 15 m, as much as a person's position errs.
 pub const TURN_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 /// The same of a place.
@@ -258,7 +263,25 @@ fn fitted(
         let step = solved(sums, &by, surfaces)?;
         by.iter_mut().zip(step).for_each(|(by, step)| *by += step);
     }
-    (on.0 as f64 >= SHARE_MIN * points_m.len() as f64 && on.1 >= FLOOR_MIN).then_some(by)
+    let enough = on.0 as f64 >= SHARE_MIN * points_m.len() as f64 && on.1 >= FLOOR_MIN;
+    (enough && !contradicts(points_m, &corrected(given, &by), surroundings)).then_some(by)
+}
+
+/// Whether a wall is seen parallel to where the file has it, and not there: then the file is no measure for a sensor.
+fn contradicts(points_m: &[DVec3], pose: &Pose, surroundings: &Surroundings) -> bool {
+    const PLANES: usize = (2.0 * ASIDE_M / PLANE_M) as usize + 1;
+    let mut planes = vec![[0_usize; PLANES]; surroundings.surfaces.len()];
+    for point in points_m {
+        let Some((s, off_m)) = surroundings.nearest(pose.point(*point)) else { continue };
+        let plane = (off_m / PLANE_M).round() + (PLANES / 2) as f64;
+        if let Some(count) = planes[s].get_mut(plane as usize).filter(|_| plane >= 0.0) {
+            *count += 1;
+        }
+    }
+    planes.iter().any(|planes| {
+        let on = planes[PLANES / 2];
+        planes.iter().any(|&count| count >= ASIDE_MIN && count > 2 * on)
+    })
 }
 
 /// Of one surface: how its residuals change with the six, summed up.

@@ -14,6 +14,7 @@ mod mutations;
 mod nodes;
 mod scores;
 mod standing;
+mod walls;
 
 use std::fs;
 
@@ -48,7 +49,7 @@ const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 42] = [
+const JOBS: [Job; 43] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
@@ -61,6 +62,7 @@ const JOBS: [Job; 42] = [
     job("calibrate", "sensors that hang elsewhere than the file says, found again", Needs::Nothing, calibrate::calibrate),
     job("following", "a sensor screwed on askew, one that slips", Needs::Nothing, calibrate::following),
     job("rooms", "floors of random rooms, found or told, with every sensor model", Needs::Nothing, calibrate::rooms),
+    job("walls", "site files with one wall half a metre off", Needs::Nothing, walls::walls),
     job("clocks", "sensors' clocks apart, found while people walk", Needs::Nothing, calibrate::clocks),
     job("tripods", "from two sensors on tripods to warnings, command by command", Needs::Nothing, calibrate::tripods),
     job("logictronix", "real people before a real VLP-16", Needs::Data, crowds::logictronix),

@@ -8,6 +8,7 @@ use umbracast::{Error, Site};
 use crate::floor::Level;
 use crate::hall::Outline;
 use crate::joint::{self, OF_SENSOR, Placed, Seen};
+use crate::misfit::{self, Misfit};
 use crate::plan::{Plan, wrapped};
 use crate::{gauge, matching};
 
@@ -123,8 +124,11 @@ pub fn fit(
     let (start, links) = linked(site, &mut seen, &mut told);
     let no_solution = || Error::new("calibrate: expected a fit with a solution, found none");
     let by_people = joint::solve(&seen, &start, outline).ok_or_else(no_solution)?;
-    let placed = on_walls(site, outline, &mut seen, by_people.placed, &mut told);
-    let solution = joint::solve(&seen, &placed, outline).ok_or_else(no_solution)?;
+    let mut wrong = Vec::new();
+    let placed = on_walls(site, outline, &mut seen, by_people.placed, &mut wrong, &mut told);
+    doubts.extend(wrong.iter().map(|(sensors, misfit)| named(outline, sensors, misfit)));
+    let walls: Vec<usize> = wrong.iter().map(|(_, misfit)| misfit.wall).collect();
+    let solution = joint::solve(&seen, &placed, &outline.without(&walls)).ok_or_else(no_solution)?;
     let found = |(s, sensor): (usize, &Sensor)| {
         let is_linked = links.iter().any(|&(a, b)| a == s || b == s);
         let (floor, level) = levels[s];
@@ -236,6 +240,7 @@ fn on_walls(
     outline: &Outline,
     seen: &mut [Seen],
     mut placed: Vec<Placed>,
+    wrong: &mut Vec<(String, Misfit)>,
     told: &mut Vec<String>,
 ) -> Vec<Placed> {
     for group in 0..seen.len() {
@@ -245,7 +250,9 @@ fn on_walls(
             .map(|(s, p)| placed[s].site_from_level.point(p.truncate()).extend(p.z))
             .collect();
         let names: Vec<&str> = own.iter().map(|&s| site.sensors[s].name.as_str()).collect();
-        match gauge::by_walls(&points_m, outline) {
+        let (moved, misfits) = held(&points_m, outline);
+        wrong.extend(misfits.into_iter().map(|misfit| (names.join(", "), misfit)));
+        match moved {
             Some(moved) => {
                 for &s in &own {
                     placed[s].site_from_level = moved.after(&placed[s].site_from_level);
@@ -262,6 +269,37 @@ fn on_walls(
         }
     }
     placed
+}
+
+/// The motion that brings a group onto the walls, and the walls that are not where the file has them. Where one is wrong, the
+/// sensors may be laid onto it or onto those that are right: then they stay as near as can be to where the file has them.
+fn held(points_m: &[DVec3], outline: &Outline) -> (Option<Plan>, Vec<Misfit>) {
+    let as_filed = Plan { yaw_rad: 0.0, at_m: DVec2::ZERO };
+    let moved = gauge::by_walls(points_m, outline);
+    let misfits = misfit::misfits(points_m, outline, &moved.unwrap_or(as_filed));
+    if misfits.is_empty() {
+        return (moved, misfits);
+    }
+    let middle_m = points_m.iter().map(|p| p.truncate()).sum::<DVec2>() / points_m.len().max(1) as f64;
+    let but_for = |wall: usize| {
+        let moved = gauge::by_walls(points_m, &outline.without(&[wall]))?;
+        let misfits = misfit::misfits(points_m, outline, &moved);
+        let off_m = moved.point(middle_m).distance(middle_m) + ARM_M * moved.yaw_rad.abs();
+        (misfits.iter().all(|misfit| misfit.wall == wall)).then_some((off_m, moved, misfits))
+    };
+    let best = (0..outline.walls()).filter_map(but_for).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or((moved, misfits), |(_, moved, misfits)| (Some(moved), misfits))
+}
+
+/// A wall that does not fit, for a reader.
+fn named(outline: &Outline, sensors: &str, misfit: &Misfit) -> String {
+    let [from, to] = outline.wall(misfit.wall).unwrap_or_default();
+    let (by_m, way) = (misfit.in_m.abs(), if misfit.in_m < 0.0 { "farther out" } else { "farther in" });
+    format!(
+        "the wall from [{:.2}, {:.2}] to [{:.2}, {:.2}] is seen {by_m:.2} m {way} than the site file says; the file is wrong \
+         there, or at the opposite wall, or in where {sensors} hang; that wall was left out",
+        from.x, from.y, to.x, to.y
+    )
 }
 
 /// The pose that a site file takes.

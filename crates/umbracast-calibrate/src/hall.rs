@@ -31,7 +31,9 @@ pub struct Foot {
 /// Walls, pillars and furniture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
-    surfaces: Vec<Surface>,
+    /// The hall's walls first. None of what is left out; the others keep their numbers.
+    surfaces: Vec<Option<Surface>>,
+    walls: usize,
     ceiling_m: f64,
 }
 
@@ -41,6 +43,7 @@ impl Outline {
         let hall = &site.hall;
         let wall = |ends_m| Surface::Wall { ends_m, top_m: hall.height_m };
         let mut surfaces: Vec<Surface> = hall.walls().map(wall).collect();
+        let walls = surfaces.len();
         for item in &site.furniture {
             let (corners, top_m) = (item.corners(), item.size_m[2]);
             let side = |i: usize| Surface::Wall { ends_m: [corners[i], corners[(i + 1) % 4]], top_m };
@@ -51,12 +54,32 @@ impl Outline {
             radius_m: p.radius_m,
         };
         surfaces.extend(site.pillars.iter().map(pillar));
-        Self { surfaces, ceiling_m: hall.height_m }
+        Self { surfaces: surfaces.into_iter().map(Some).collect(), walls, ceiling_m: hall.height_m }
     }
 
     /// How many surfaces there are.
     pub fn len(&self) -> usize {
         self.surfaces.len()
+    }
+
+    /// How many of them, the first, are the hall's walls.
+    pub fn walls(&self) -> usize {
+        self.walls
+    }
+
+    /// The ends of a wall.
+    pub fn wall(&self, wall: usize) -> Option<[DVec2; 2]> {
+        match self.surfaces.get(wall).copied().flatten() {
+            Some(Surface::Wall { ends_m, .. }) => Some(ends_m),
+            _ => None,
+        }
+    }
+
+    /// The same where nothing is known of these surfaces.
+    pub fn without(&self, surfaces: &[usize]) -> Self {
+        let mut rest = self.clone();
+        surfaces.iter().for_each(|&surface| rest.surfaces[surface] = None);
+        rest
     }
 
     /// True for what may be of an upright surface; `z_m` above the floor.
@@ -67,8 +90,8 @@ impl Outline {
     /// The nearest surface of a point in the site's frame.
     pub fn foot(&self, point_m: DVec3) -> Option<Foot> {
         let p = point_m.truncate();
-        let of = |(surface, kind): (usize, &Surface)| {
-            let (off, across) = match *kind {
+        let of = |(surface, kind): (usize, &Option<Surface>)| {
+            let (off, across) = match (*kind)? {
                 Surface::Wall { top_m, .. } if point_m.z > top_m + 0.1 => return None,
                 Surface::Wall { ends_m: [from, to], .. } => {
                     let along = (to - from).normalize_or_zero();

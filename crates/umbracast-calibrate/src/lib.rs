@@ -15,6 +15,7 @@ mod hall;
 mod normal;
 mod joint;
 mod gauge;
+mod misfit;
 mod calibration;
 mod site_file;
 
