@@ -262,7 +262,8 @@ impl Assembler {
                 number = self.next;
             }
             if number < self.next {
-                late = true;
+                // What comes before the first frame has none to be late for: a clock that is put right begins a little before.
+                late |= number >= 0;
                 continue;
             }
             let image = self.open.entry(number).or_default().entry(sensor).or_insert_with(|| {

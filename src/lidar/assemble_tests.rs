@@ -196,6 +196,19 @@ fn a_packet_of_a_closed_frame_is_late() {
     assert_eq!(columns_of(&frames[0]).iter().map(|c| c.1).sum::<usize>(), 2 * 2171 - 12);
 }
 
+/// A clock that `calibrate` had found 50 ms ahead once made the first packets late, and the run end with 3.
+#[test]
+fn what_a_clock_put_right_brings_before_the_first_frame_is_not_late() {
+    let mut site = Config::default().site;
+    site.sensors[1].clock_offset_ms = 50.0;
+    let mut assembler = Assembler::new(&site).unwrap();
+    let mut health = Health::default();
+    for (sensor, packet) in both(packets(0, 300 * MS), packets(49 * MS, 350 * MS)) {
+        assembler.push(sensor, &packet, &mut health);
+    }
+    assert_eq!(health.packets_late, 0, "{health:?}");
+}
+
 #[test]
 fn a_packet_that_comes_twice_counts_once() {
     let once = both(packets(0, 300 * MS), packets(0, 300 * MS));
