@@ -38,6 +38,7 @@ const FLOOR_MIN: usize = 40;
 const ASIDE_MIN: usize = 40;
 const PLANE_M: f64 = 0.2;
 const ASIDE_M: f64 = 1.0;
+const PLANES: usize = (2.0 * ASIDE_M / PLANE_M) as usize + 1;
 /// Less than this stays as it is: 0.15 degrees are 4 cm at 15 m, as much as a person's position errs.
 pub const TURN_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 /// The same of a place.
@@ -57,9 +58,17 @@ pub struct Mountings {
     sensors: Vec<Mounting>,
     frames: u32,
     moved: Vec<usize>,
-    /// Returns that are looked at, and the sums over those of each surface.
+    /// Returns that are looked at.
     points_m: Vec<DVec3>,
+    of_surfaces: OfSurfaces,
+}
+
+/// What the returns say of each surface. It is kept only so that a look allocates nothing.
+#[derive(Debug, Clone, Default)]
+struct OfSurfaces {
     sums: Vec<Sums>,
+    /// How many returns lie on planes beside it.
+    planes: Vec<[usize; PLANES]>,
 }
 
 /// What sensors see of the hall.
@@ -107,7 +116,7 @@ impl Mountings {
             frames: 0,
             moved: Vec::new(),
             points_m: Vec::new(),
-            sums: Vec::new(),
+            of_surfaces: OfSurfaces::default(),
         }
     }
 
@@ -160,7 +169,7 @@ impl Mountings {
         };
         let as_used = |found: &Six| near(found, used, TURN_RAD, SHIFT_M);
         let mut fit = |gates_m: &[f64]| {
-            fitted(&self.points_m, given, used, gates_m, &self.surroundings, &mut self.sums)
+            fitted(&self.points_m, given, used, gates_m, &self.surroundings, &mut self.of_surfaces)
         };
         let again = if before.is_none() { fit(GATES_AGAIN_M).filter(as_used) } else { None };
         let Some(found) = again.or_else(|| fit(&GATES_M)) else { return };
@@ -240,7 +249,7 @@ fn fitted(
     start: &Six,
     gates_m: &[f64],
     surroundings: &Surroundings,
-    sums: &mut Vec<Sums>,
+    OfSurfaces { sums, planes }: &mut OfSurfaces,
 ) -> Option<Six> {
     let surfaces = &surroundings.surfaces;
     let mut by = *start;
@@ -264,13 +273,18 @@ fn fitted(
         by.iter_mut().zip(step).for_each(|(by, step)| *by += step);
     }
     let enough = on.0 as f64 >= SHARE_MIN * points_m.len() as f64 && on.1 >= FLOOR_MIN;
-    (enough && !contradicts(points_m, &corrected(given, &by), surroundings)).then_some(by)
+    (enough && !contradicts(points_m, &corrected(given, &by), surroundings, planes)).then_some(by)
 }
 
 /// Whether a wall is seen parallel to where the file has it, and not there: then the file is no measure for a sensor.
-fn contradicts(points_m: &[DVec3], pose: &Pose, surroundings: &Surroundings) -> bool {
-    const PLANES: usize = (2.0 * ASIDE_M / PLANE_M) as usize + 1;
-    let mut planes = vec![[0_usize; PLANES]; surroundings.surfaces.len()];
+fn contradicts(
+    points_m: &[DVec3],
+    pose: &Pose,
+    surroundings: &Surroundings,
+    planes: &mut Vec<[usize; PLANES]>,
+) -> bool {
+    planes.clear();
+    planes.resize(surroundings.surfaces.len(), [0; PLANES]);
     for point in points_m {
         let Some((s, off_m)) = surroundings.nearest(pose.point(*point)) else { continue };
         let plane = (off_m / PLANE_M).round() + (PLANES / 2) as f64;
@@ -365,7 +379,7 @@ mod tests {
             &[0.0; 6],
             &GATES_M,
             &Surroundings::new(&site.hall),
-            &mut Vec::new(),
+            &mut OfSurfaces::default(),
         )
     }
 
