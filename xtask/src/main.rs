@@ -10,10 +10,10 @@ mod structure;
 use std::process::ExitCode;
 
 const USAGE: &str = "\
-cargo xtask record NAME...    make these files of record/ anew; `all` makes all but `locked`
+cargo xtask record NAME...    make these files of record/ anew; `all` makes those of an earlier program, but none that is by name only
     --dirty                       from a tree with changes; the record says so
     --again                       with `all`: also those that are of the present program already
-cargo xtask record            list the names
+cargo xtask record            list the names: how long each takes on two cores, whether it is of the present program
 cargo xtask quote             cut every block of figures in README.md and docs/ anew from its record
 cargo xtask answers           whether the program answers what record/answers.txt keeps of it
     --write                       keep what it answers now: records of before are then of an earlier program

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! Each line of the comment is one rule: first what a line of the record begins with, then, between bars, what further
-//! lines up to the next empty one begin with. A star stands for anything. Only a comment that has rules is followed.
+//! lines up to the next empty one begin with. A star stands for anything. A record's head (commit, answers, what it took) is
+//! never quoted. Only a comment that has rules is followed.
 //!
 //! A block whose record has another digest of the program's answers than `record/answers.txt` ([`crate::answers`]), or none, is
 //! marked as of an earlier program.
@@ -15,6 +16,7 @@
 use std::fs;
 
 use crate::answers;
+use crate::record::{ANSWERS, COMMIT, TOOK};
 use crate::tools::{Result, files_below, root};
 
 /// What a comment of a quoted block begins with.
@@ -49,7 +51,7 @@ pub fn present_digest() -> Result<String> {
 
 /// Whether a record was made by a program that gave these answers.
 pub fn is_of(record: &str, digest: &str) -> bool {
-    record.lines().any(|line| line == format!("# answers {digest}"))
+    record.lines().any(|line| line.strip_prefix(ANSWERS) == Some(digest))
 }
 
 /// The page with every block cut anew. A block whose record is not there, or of which nothing is found, stays.
@@ -129,7 +131,9 @@ fn cut(record: &str, rules: &[&str]) -> (String, Vec<String>) {
         }
         block += first.trim_end();
         block.push('\n');
-        let paragraph: Vec<&str> = lines.take_while(|line| !line.trim().is_empty()).collect();
+        let head = |line: &&str| [COMMIT, ANSWERS, TOOK].iter().any(|head| line.starts_with(head));
+        let paragraph = lines.filter(|line| !head(line)).take_while(|line| !line.trim().is_empty());
+        let paragraph: Vec<&str> = paragraph.collect();
         for line in paragraph.iter().filter(|line| further.iter().any(|glob| begins(line, glob))) {
             block += line.trim_end();
             block.push('\n');
@@ -209,6 +213,13 @@ mod tests {
                 assert!(of_present, "{}: {name} is of an earlier program", page.display());
             }
         }
+    }
+
+    #[test]
+    fn the_head_of_a_record_is_not_quoted() {
+        let record = RECORD.replacen('\n', "\n# commit 1\n# answers 2\n# took 3 s\n", 1);
+        let (block, _) = cut(&record, &["$ umbracast | *"]);
+        assert_eq!(block, "$ umbracast evaluate\nmode   F1\npaper  .80\nours   .94\n");
     }
 
     #[test]

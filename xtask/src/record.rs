@@ -21,13 +21,16 @@ use std::fs;
 use crate::answers;
 use crate::quote;
 use crate::tools::{Result, Scratch, built, data, output, root, target};
-use book::{Bench, Book};
+pub use book::{ANSWERS, COMMIT, TOOK};
+use book::{Bench, Book, took_s};
 
 /// One file of `record/`, `NAME.txt`, with the pictures that belong to it.
 struct Job {
     name: &'static str,
     /// What it holds.
     what: &'static str,
+    /// About how long it takes on two cores, until a record says how long it took.
+    minutes: u32,
     /// What is needed beside this repository.
     needs: Needs,
     make: fn(&mut Book) -> Result<()>,
@@ -44,55 +47,61 @@ enum Needs {
     Asking,
 }
 
-const fn job(name: &'static str, what: &'static str, needs: Needs, make: fn(&mut Book) -> Result<()>) -> Job {
-    Job { name, what, needs, make }
+const fn job(
+    name: &'static str,
+    what: &'static str,
+    minutes: u32,
+    needs: Needs,
+    make: fn(&mut Book) -> Result<()>,
+) -> Job {
+    Job { name, what, minutes, needs, make }
 }
 
 #[rustfmt::skip]
 const JOBS: [Job; 43] = [
-    job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", Needs::Nothing, scores::headline),
-    job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", Needs::Nothing, scores::modes),
-    job("coverage", "what the sensors see of a standing person", Needs::Nothing, house::coverage),
-    job("sites", "other heights, a lost sensor, more people, pairs", Needs::Nothing, crowds::sites),
-    job("shapes", "three halls of other shapes, devices in the hand: what blocks, by cause", Needs::Nothing, crowds::shapes),
-    job("people", "other bodies, real walkers, dense crowds", Needs::Data, crowds::people),
-    job("walkers", "16 real walkers, ten draws of bodies, error budget and oracles", Needs::Data, crowds::walkers),
-    job("circle-antipode", "8 and 16 real walkers, every mode", Needs::Data, scores::antipode),
-    job("forecasts", "the residual beside a constant velocity", Needs::Data, crowds::forecasts),
-    job("calibrate", "sensors that hang elsewhere than the file says, found again", Needs::Nothing, calibrate::calibrate),
-    job("following", "a sensor screwed on askew, one that slips", Needs::Nothing, calibrate::following),
-    job("rooms", "floors of random rooms, found or told, with every sensor model", Needs::Nothing, calibrate::rooms),
-    job("walls", "site files with one wall half a metre off", Needs::Nothing, walls::walls),
-    job("clocks", "sensors' clocks apart, found while people walk", Needs::Nothing, calibrate::clocks),
-    job("tripods", "from two sensors on tripods to warnings, command by command", Needs::Nothing, calibrate::tripods),
-    job("logictronix", "real people before a real VLP-16", Needs::Data, crowds::logictronix),
-    job("speed", "how long a frame takes, in every mode", Needs::Nothing, house::speed),
-    job("growth", "how long a step takes with more people and access points", Needs::Nothing, house::growth),
-    job("living", "furniture put in, people who stand, no empty scan", Needs::Nothing, living::living),
-    job("standing", "people who stand or sit from the first frame on", Needs::Nothing, standing::standing),
-    job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", Needs::Nothing, glass::glass),
-    job("gestures", "people who talk with their hands beside a sensor", Needs::Nothing, gestures::gestures),
-    job("cut", "what a frame gains that closes as soon as the part with people has", Needs::Nothing, crowds::cut),
-    job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", Needs::Nothing, crowds::network),
-    job("live", "ten minutes live, three times over, the page open", Needs::Asking, live::live),
-    job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", Needs::Asking, nodes::nodes),
-    job("halls", "1 to 64 halls on one host", Needs::Asking, nodes::halls),
-    job("deployed", "the files for containers and clusters, run here", Needs::Asking, nodes::deployed),
-    job("faults", "a live run in which something fails", Needs::Nothing, live::faults),
-    job("kills", "a recording run killed at twenty moments", Needs::Nothing, live::kills),
-    job("mutations", "damaged files of every format, given to the command", Needs::Nothing, mutations::mutations),
-    job("same-bytes", "the same seed on one thread and on two", Needs::Nothing, house::same_bytes),
-    job("resume", "an experiment killed and gone on with", Needs::Nothing, house::resume),
-    job("explain", "why the paper's figures are what they are", Needs::Nothing, scores::explain),
-    job("ablation", "each mechanism off alone", Needs::Data, scores::ablation),
-    job("reproduce-quick", "the paper's experiment in 40 scenes", Needs::Nothing, scores::reproduce_quick),
-    job("reproduce", "the paper's experiment whole, training first: an hour", Needs::Asking, scores::reproduce),
-    job("slurm", "the job files on a Slurm of this one machine", Needs::Program("slurmctld"), house::slurm),
-    job("kubernetes", "the job files as a cluster would read them", Needs::Program("python3"), house::kubernetes),
-    job("tests", "CI on a fresh clone, nothing built", Needs::Asking, house::tests),
-    job("fresh-clone", "the first command on a fresh clone, nothing built", Needs::Asking, house::fresh_clone),
-    job("structure", "files, imports, circles, in words", Needs::Nothing, house::structure),
-    job("locked", "scenes and recordings that nothing was chosen by: every look is kept", Needs::Asking, locked::look),
+    job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
+    job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
+    job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
+    job("sites", "other heights, a lost sensor, more people, pairs", 10, Needs::Nothing, crowds::sites),
+    job("shapes", "three halls of other shapes, devices in the hand: what blocks, by cause", 4, Needs::Nothing, crowds::shapes),
+    job("people", "other bodies, real walkers, dense crowds", 6, Needs::Data, crowds::people),
+    job("walkers", "16 real walkers, ten draws of bodies, error budget and oracles", 3, Needs::Data, crowds::walkers),
+    job("circle-antipode", "8 and 16 real walkers, every mode", 2, Needs::Data, scores::antipode),
+    job("forecasts", "the residual beside a constant velocity", 4, Needs::Data, crowds::forecasts),
+    job("calibrate", "sensors that hang elsewhere than the file says, found again", 15, Needs::Nothing, calibrate::calibrate),
+    job("following", "a sensor screwed on askew, one that slips", 5, Needs::Nothing, calibrate::following),
+    job("rooms", "floors of random rooms, found or told, with every sensor model", 10, Needs::Nothing, calibrate::rooms),
+    job("walls", "site files with one wall half a metre off", 10, Needs::Nothing, walls::walls),
+    job("clocks", "sensors' clocks apart, found while people walk", 5, Needs::Nothing, calibrate::clocks),
+    job("tripods", "from two sensors on tripods to warnings, command by command", 2, Needs::Nothing, calibrate::tripods),
+    job("logictronix", "real people before a real VLP-16", 1, Needs::Data, crowds::logictronix),
+    job("speed", "how long a frame takes, in every mode", 1, Needs::Nothing, house::speed),
+    job("growth", "how long a step takes with more people and access points", 5, Needs::Nothing, house::growth),
+    job("living", "furniture put in, people who stand, no empty scan", 15, Needs::Nothing, living::living),
+    job("standing", "people who stand or sit from the first frame on", 25, Needs::Nothing, standing::standing),
+    job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", 5, Needs::Nothing, glass::glass),
+    job("gestures", "people who talk with their hands beside a sensor", 10, Needs::Nothing, gestures::gestures),
+    job("cut", "what a frame gains that closes as soon as the part with people has", 3, Needs::Nothing, crowds::cut),
+    job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", 20, Needs::Nothing, crowds::network),
+    job("live", "ten minutes live, three times over, the page open", 33, Needs::Asking, live::live),
+    job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", 25, Needs::Asking, nodes::nodes),
+    job("halls", "1 to 64 halls on one host", 8, Needs::Asking, nodes::halls),
+    job("deployed", "the files for containers and clusters, run here", 2, Needs::Asking, nodes::deployed),
+    job("faults", "a live run in which something fails", 5, Needs::Nothing, live::faults),
+    job("kills", "a recording run killed at twenty moments", 3, Needs::Nothing, live::kills),
+    job("mutations", "damaged files of every format, given to the command", 100, Needs::Nothing, mutations::mutations),
+    job("same-bytes", "the same seed on one thread and on two", 1, Needs::Nothing, house::same_bytes),
+    job("resume", "an experiment killed and gone on with", 3, Needs::Nothing, house::resume),
+    job("explain", "why the paper's figures are what they are", 4, Needs::Nothing, scores::explain),
+    job("ablation", "each mechanism off alone", 45, Needs::Data, scores::ablation),
+    job("reproduce-quick", "the paper's experiment in 40 scenes", 6, Needs::Nothing, scores::reproduce_quick),
+    job("reproduce", "the paper's experiment whole, training first: an hour", 70, Needs::Asking, scores::reproduce),
+    job("slurm", "the job files on a Slurm of this one machine", 3, Needs::Program("slurmctld"), house::slurm),
+    job("kubernetes", "the job files as a cluster would read them", 3, Needs::Program("python3"), house::kubernetes),
+    job("tests", "CI on a fresh clone, nothing built", 16, Needs::Asking, house::tests),
+    job("fresh-clone", "the first command on a fresh clone, nothing built", 4, Needs::Asking, house::fresh_clone),
+    job("structure", "files, imports, circles, in words", 1, Needs::Nothing, house::structure),
+    job("locked", "scenes and recordings that nothing was chosen by: every look is kept", 8, Needs::Asking, locked::look),
 ];
 
 /// Other names of the same.
@@ -105,16 +114,27 @@ pub fn run(words: &[&str]) -> Result<()> {
     if let Some(unknown) = flags.iter().find(|flag| !["--dirty", "--again"].contains(flag)) {
         return Err(format!("record: expected --dirty or --again, found {unknown}"));
     }
+    let digest = quote::present_digest()?;
     if names.is_empty() {
         for job in &JOBS {
-            println!("{:20} {}", job.name, job.what);
+            let by_name = if job.needs == Needs::Asking { " (by name only)" } else { "" };
+            let (minutes, state) = (minutes(job), state(job, &digest));
+            println!("{:20} {minutes:>4} min  {state:16} {}{by_name}", job.name, job.what);
         }
         return Ok(());
     }
-    let jobs = named(&names)?;
+    let all = names.contains(&"all");
+    let jobs = to_do(named(&names)?, all, flags.contains(&"--again"), &digest)?;
+    println!(
+        "{} records to make, about {} min",
+        jobs.len(),
+        jobs.iter().map(|job| minutes(job)).sum::<u32>()
+    );
+    if jobs.is_empty() {
+        return Ok(());
+    }
     let commit = commit(flags.contains(&"--dirty"))?;
     let umbracast = built(&root(), &target())?;
-    let digest = quote::present_digest()?;
     let moved = moved(&umbracast)?;
     if !moved.is_empty() {
         return Err(format!(
@@ -122,13 +142,28 @@ pub fn run(words: &[&str]) -> Result<()> {
             moved.join("\n")
         ));
     }
+    let mut failed = Vec::new();
     for job in jobs {
-        // What was stopped goes on where it was.
-        let made = fs::read_to_string(root().join("record").join(format!("{}.txt", job.name)));
-        if names.contains(&"all")
-            && !flags.contains(&"--again")
-            && made.is_ok_and(|made| quote::is_of(&made, &digest))
-        {
+        let bench = Bench { umbracast: umbracast.clone(), scratch: Scratch::new(job.name)? };
+        let mut book = Book::new(job.name, &commit, &digest, bench);
+        match (job.make)(&mut book).and_then(|()| book.close()) {
+            Ok(told) => println!("{told}"),
+            // One that fails costs its own record, not those of the night after it.
+            Err(error) => {
+                eprintln!("{}: {error}", job.name);
+                failed.push(job.name);
+            }
+        }
+    }
+    if failed.is_empty() { Ok(()) } else { Err(format!("record: not made: {}", failed.join(", "))) }
+}
+
+/// What is left of these jobs. With `all`, what was stopped goes on where it was: a record of the present program stays,
+/// and so does one for which this machine lacks something.
+fn to_do(jobs: Vec<&'static Job>, all: bool, again: bool, digest: &str) -> Result<Vec<&'static Job>> {
+    let mut left = Vec::new();
+    for job in jobs {
+        if all && !again && made(job).is_some_and(|record| quote::is_of(&record, digest)) {
             println!("{}: of the present program", job.name);
             continue;
         }
@@ -138,17 +173,33 @@ pub fn run(words: &[&str]) -> Result<()> {
             Needs::Nothing | Needs::Asking => None,
         };
         match missing {
-            Some(missing) if names.contains(&"all") => println!("{}: left as it is, no {missing}", job.name),
+            Some(missing) if all => println!("{}: left as it is, no {missing}", job.name),
             Some(missing) => return Err(format!("{}: expected {missing}, found none", job.name)),
-            None => {
-                let bench = Bench { umbracast: umbracast.clone(), scratch: Scratch::new(job.name)? };
-                let mut book = Book::new(job.name, &commit, &digest, bench);
-                (job.make)(&mut book).map_err(|error| format!("{}: {error}", job.name))?;
-                println!("{}", book.close()?);
-            }
+            None => left.push(job),
         }
     }
-    Ok(())
+    Ok(left)
+}
+
+/// The record of a job as it stands.
+fn made(job: &Job) -> Option<String> {
+    fs::read_to_string(root().join("record").join(format!("{}.txt", job.name))).ok()
+}
+
+/// Which program the record of a job is of.
+fn state(job: &Job, digest: &str) -> &'static str {
+    match made(job) {
+        None => "not made",
+        Some(record) if quote::is_of(&record, digest) => "present",
+        Some(record) if record.lines().any(|line| line.starts_with(COMMIT)) => "earlier program",
+        Some(_) => "no commit",
+    }
+}
+
+/// How long a job takes: what its record says that it took, else what is thought.
+fn minutes(job: &Job) -> u32 {
+    let seconds = made(job).and_then(|record| took_s(&record));
+    seconds.map_or(job.minutes, |seconds| (seconds / 60.0).ceil() as u32)
 }
 
 /// Whether the program answers as `record/answers.txt` says; `write` keeps what it answers now.
@@ -212,4 +263,36 @@ fn keep(book: &Book, from: &std::path::Path, name: &str) -> Result<()> {
         Err(bytes) => bytes.into_bytes(),
     };
     fs::write(&place, bytes).map_err(|e| format!("{}: {e}", place.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A night: who changes the program sees all of its figures the next morning.
+    #[test]
+    fn all_records_together_take_at_most_eight_hours() {
+        let all = JOBS.iter().filter(|job| job.needs != Needs::Asking);
+        let minutes: u32 = all.map(minutes).sum();
+        assert!(minutes <= 8 * 60, "{minutes} min");
+    }
+
+    #[test]
+    fn a_record_of_the_present_program_is_made_again_only_if_asked() {
+        let job = JOBS.iter().find(|job| job.needs == Needs::Nothing && made(job).is_some()).unwrap();
+        let record = made(job).unwrap();
+        let digest = record.lines().find_map(|line| line.strip_prefix("# answers ")).unwrap_or("none");
+        let left = |all, again, digest| to_do(vec![job], all, again, digest).unwrap().len();
+        assert_eq!(left(true, false, digest), usize::from(digest == "none"));
+        assert_eq!((left(true, true, digest), left(false, false, digest)), (1, 1));
+        assert_eq!(left(true, false, "another program"), 1);
+    }
+
+    #[test]
+    fn every_job_is_named_once_and_says_how_long_it_takes() {
+        for (k, job) in JOBS.iter().enumerate() {
+            assert!(job.minutes > 0 && !job.what.is_empty(), "{}", job.name);
+            assert!(JOBS[..k].iter().all(|other| other.name != job.name), "{} twice", job.name);
+        }
+    }
 }

@@ -4,8 +4,15 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Instant;
 
 use crate::tools::{Result, Scratch, data, root};
+
+/// What the lines of a record's head begin with, right below its first command: the commit that it was made from, the digest
+/// of the program's answers, and the seconds that it took. Documents do not quote them.
+pub const COMMIT: &str = "# commit ";
+pub const ANSWERS: &str = "# answers ";
+pub const TOOK: &str = "# took ";
 
 /// What every job works with.
 pub struct Bench {
@@ -22,6 +29,7 @@ pub struct Book {
     answers: String,
     text: String,
     bench: Bench,
+    begun: Instant,
     /// Folders of the scores that [`Book::compare`] lays side by side.
     scored: Vec<PathBuf>,
     /// Whether the file is added to, not made anew.
@@ -30,9 +38,11 @@ pub struct Book {
 
 impl Book {
     /// Empty.
+    #[allow(clippy::disallowed_methods)] // A record says what it took.
     pub fn new(name: &'static str, commit: &str, answers: &str, bench: Bench) -> Self {
         let (commit, answers) = (commit.to_owned(), answers.to_owned());
-        Self { name, commit, answers, text: String::new(), bench, scored: Vec::new(), adds: false }
+        let (text, scored, begun) = (String::new(), Vec::new(), Instant::now());
+        Self { name, commit, answers, text, bench, begun, scored, adds: false }
     }
 
     /// A path below the scratch folder.
@@ -51,17 +61,12 @@ impl Book {
         if path.exists() { Ok(path.into()) } else { Err(format!("{}: not there", path.display())) }
     }
 
-    /// The line of a command. The first is followed by the commit and by the digest of the program's answers.
+    /// The line of a command.
     pub fn command(&mut self, line: &str) {
         if !self.text.is_empty() {
             self.text.push('\n');
         }
-        let first = self.text.is_empty();
         self.line(&format!("$ {line}"));
-        if first {
-            self.line(&format!("# commit {}", self.commit));
-            self.line(&format!("# answers {}", self.answers));
-        }
     }
 
     /// A line, or several.
@@ -132,14 +137,16 @@ impl Book {
         text.replace(&*root().to_string_lossy(), ".")
     }
 
-    /// Writes the file and tells its name.
+    /// Writes the file and tells its name and what it took.
     pub fn close(self) -> Result<String> {
         let name = format!("record/{}.txt", self.name);
         let place = root().join(&name);
         let before = if self.adds { fs::read_to_string(&place).unwrap_or_default() } else { String::new() };
         let between = if before.is_empty() { "" } else { "\n" };
-        fs::write(&place, before + between + &self.text).map_err(|e| format!("{name}: {e}"))?;
-        Ok(name)
+        let seconds = self.begun.elapsed().as_secs();
+        let text = headed(&self.text, &self.commit, &self.answers, seconds);
+        fs::write(&place, before + between + &text).map_err(|e| format!("{name}: {e}"))?;
+        Ok(format!("{name}: {seconds} s"))
     }
 
     /// Both streams. Code 3 says that data was lost, and the warning that comes with it what.
@@ -158,4 +165,30 @@ impl Book {
 /// Words as they are typed.
 pub fn spoken(words: &[OsString]) -> String {
     words.iter().map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
+}
+
+/// A record with its head below the first line, whatever that is.
+fn headed(text: &str, commit: &str, answers: &str, seconds: u64) -> String {
+    let (first, rest) = text.split_once('\n').unwrap_or((text, ""));
+    format!("{first}\n{COMMIT}{commit}\n{ANSWERS}{answers}\n{TOOK}{seconds} s\n{rest}")
+}
+
+/// Seconds that a record took; of several looks, the last.
+pub fn took_s(record: &str) -> Option<f64> {
+    let line = record.lines().filter_map(|line| line.strip_prefix(TOOK)).next_back()?;
+    line.strip_suffix(" s")?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_says_what_it_is_of_and_what_it_took() {
+        let record = headed("$ umbracast\n\nF1\n", "12ab", "99ff", 312);
+        assert_eq!(record, "$ umbracast\n# commit 12ab\n# answers 99ff\n# took 312 s\n\nF1\n");
+        assert_eq!(took_s(&record), Some(312.0));
+        assert_eq!(took_s(&(record.clone() + &record.replace("312", "4"))), Some(4.0));
+        assert_eq!(took_s("$ umbracast\nF1\n"), None);
+    }
 }

@@ -28,7 +28,7 @@ pub fn speed(book: &mut Book) -> Result<()> {
     Ok(())
 }
 
-/// A step of the default mode on one core as people and access points grow.
+/// A step of the default mode on one core as people and access points grow: the best of three tries, and the middle one.
 pub fn growth(book: &mut Book) -> Result<()> {
     let picture = book.scratch("growth.svg");
     let run = |picture: &str| {

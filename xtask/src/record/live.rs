@@ -1,6 +1,8 @@
 //! What a live run promises: it loses nothing, keeps time and flat memory, and survives faults.
 
 use std::ffi::OsString;
+use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
@@ -12,8 +14,10 @@ use crate::tools::{Result, argument, files_below};
 
 /// So long do the sensors of [`live`] send,
 const SECONDS: u64 = 600;
-/// and so long after their start everybody is followed, and every buffer there.
+/// and so long after their start everybody is followed, every buffer there, and the page open.
 const START: Duration = Duration::from_secs(10);
+/// Where the page is.
+const PAGE: &str = "127.0.0.1:8600";
 
 /// A live run in which something fails.
 pub fn faults(book: &mut Book) -> Result<()> {
@@ -47,7 +51,7 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
     book.umbracast_says(words("simulate --people 1 --stroll 1 --out", &[argument(&hall)]))?;
     // It ends by itself some seconds after the last packet.
     let listen = words(
-        &format!("live --port 24000 --json --quiet --serve 127.0.0.1:8600 --seconds {}", SECONDS + 10),
+        &format!("live --port 24000 --json --quiet --serve {PAGE} --seconds {}", SECONDS + 10),
         &["--empty".into(), argument(hall.join("empty.mcap")), "--record".into(), argument(&folder)],
     );
     let send = words(
@@ -69,21 +73,21 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
     let live = start(&listen)?;
     sleep(Duration::from_secs(1));
     let sensors = start(&send)?;
-    let page = look_on();
+    let mut page = look_on()?;
     sleep(START);
-    let mut resident_kb = Vec::new();
+    let (mut resident_kb, mut open) = (Vec::new(), Vec::new());
     while let Some(kb) = resident(live.id()) {
         resident_kb.push(kb);
+        open.extend(streams());
         sleep(Duration::from_secs(1));
     }
-    match page {
-        Some(mut page) => page.kill().and_then(|()| page.wait().map(drop)).map_err(|e| e.to_string())?,
-        None => book.line("no chromium: nobody looked at the page"),
-    }
+    page.kill().and_then(|()| page.wait()).map_err(|e| e.to_string())?;
+    let seen = seen_open(&open)?;
     for process in [live, sensors] {
         let output = process.wait_with_output().map_err(|e| e.to_string())?;
         book.line(String::from_utf8_lossy(&output.stdout).trim_end());
     }
+    book.line(&seen);
     let minute = resident_kb.len().min(60);
     let mean = |kb: &[u64]| kb.iter().sum::<u64>() as f64 / kb.len().max(1) as f64 / 1024.0;
     let (first, last) = (mean(&resident_kb[..minute]), mean(&resident_kb[resident_kb.len() - minute..]));
@@ -97,11 +101,35 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
 }
 
 /// A browser with the page. Who looks has a computer of his own: here he takes what is left.
-fn look_on() -> Option<Child> {
+fn look_on() -> Result<Child> {
     let mut browser = Command::new("nice");
     browser.args(["-n", "19", "chromium", "--headless", "--no-sandbox", "--disable-gpu"]);
-    browser.args(["--remote-debugging-port=0", "http://127.0.0.1:8600/"]);
-    browser.stdout(Stdio::null()).stderr(Stdio::null()).spawn().ok()
+    browser.args(["--remote-debugging-port=0", &format!("http://{PAGE}/")]);
+    let browser = browser.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    browser.map_err(|e| format!("expected chromium to look at the page, found none: {e}"))
+}
+
+/// How many pages and other readers of the stream the running program counts now.
+fn streams() -> Option<u32> {
+    let mut server = TcpStream::connect(PAGE).ok()?;
+    server.set_read_timeout(Some(Duration::from_secs(1))).ok()?;
+    write!(server, "GET /metrics HTTP/1.1\r\nHost: {PAGE}\r\nConnection: close\r\n\r\n").ok()?;
+    let mut said = String::new();
+    server.read_to_string(&mut said).ok()?;
+    said.lines().find_map(|line| line.strip_prefix("umbracast_streams "))?.parse().ok()
+}
+
+/// In words, at how many of the looks somebody had the page open. Fails below nine of ten: a record of a run that nobody
+/// watched must not say what a page costs.
+fn seen_open(streams: &[u32]) -> Result<String> {
+    let open = streams.iter().filter(|streams| **streams > 0).count();
+    if open == 0 || 10 * open < 9 * streams.len() {
+        return Err(format!(
+            "expected the page open all the time, found it so at {open} of {} looks",
+            streams.len()
+        ));
+    }
+    Ok(format!("page open at {open} of {} looks, one a second", streams.len()))
 }
 
 /// KiB that a process holds; `None` once it has ended.
@@ -153,4 +181,17 @@ pub fn kills(book: &mut Book) -> Result<()> {
         std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::seen_open;
+
+    #[test]
+    fn a_run_without_an_open_page_is_no_record() {
+        assert!(seen_open(&[]).is_err() && seen_open(&[0; 600]).is_err());
+        assert!(seen_open(&[vec![1; 300], vec![0; 300]].concat()).is_err(), "closed half way");
+        let missed_once = [vec![1; 599], vec![0]].concat();
+        assert_eq!(seen_open(&missed_once).unwrap(), "page open at 599 of 600 looks, one a second");
+    }
 }
