@@ -10,6 +10,7 @@ mod house;
 mod live;
 mod living;
 mod locked;
+mod logictronix;
 mod mutations;
 mod nodes;
 mod scores;
@@ -74,7 +75,7 @@ const JOBS: [Job; 43] = [
     job("walls", "site files with one wall half a metre off", 10, Needs::Nothing, walls::walls),
     job("clocks", "sensors' clocks apart, found while people walk", 5, Needs::Nothing, calibrate::clocks),
     job("tripods", "from two sensors on tripods to warnings, command by command", 2, Needs::Nothing, calibrate::tripods),
-    job("logictronix", "real people before a real VLP-16", 1, Needs::Data, crowds::logictronix),
+    job("logictronix", "real people before a real VLP-16", 1, Needs::Data, logictronix::logictronix),
     job("speed", "how long a frame takes, in every mode", 1, Needs::Nothing, house::speed),
     job("growth", "how long a step takes with more people and access points", 5, Needs::Nothing, house::growth),
     job("living", "furniture put in, people who stand, no empty scan", 15, Needs::Nothing, living::living),

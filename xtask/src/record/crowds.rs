@@ -198,30 +198,6 @@ fn losses(report: &str) -> Vec<(String, [String; 3])> {
     rows
 }
 
-/// Real people before a real VLP-16: two stretches of clouds, every mode, against boxes drawn by hand.
-pub fn logictronix(book: &mut Book) -> Result<()> {
-    let labels = book.data("logictronix_vlp16/labels.csv")?;
-    for frames in [70..=95, 117..=140] {
-        let first = *frames.start();
-        let clouds = book.scratch(&format!("clouds-{first}"));
-        fs::create_dir_all(&clouds).map_err(|e| e.to_string())?;
-        for frame in frames {
-            let from = book.data(&format!("logictronix_vlp16/pcd/{frame}.pcd"))?;
-            fs::copy(from, clouds.join(format!("{frame}.pcd"))).map_err(|e| e.to_string())?;
-        }
-        for mode in ["default", "paper", "hdl"] {
-            let out = book.scratch(&format!("lt-{first}-{mode}"));
-            let site =
-                ["--site", "config/sites/logictronix.toml", "--mode", mode, "--out"].map(OsString::from);
-            book.umbracast_says(
-                ["run".into(), argument(&clouds)].into_iter().chain(site).chain([argument(&out)]),
-            )?;
-            book.umbracast_says(["evaluate".into(), argument(&out), "--labels".into(), labels.clone()])?;
-        }
-    }
-    Ok(())
-}
-
 /// Policies of changing access points, in closed loop.
 pub fn network(book: &mut Book) -> Result<()> {
     let line =

@@ -12,6 +12,7 @@ use umbracast_eval::run::chain::{self, Spec};
 use umbracast_eval::run::pooled::{self, Scores, pool};
 use umbracast_eval::run::scene_score::{ModeRun, SceneScore, score_scene};
 use umbracast_eval::score::labels;
+use umbracast_eval::score::matching::match_scene;
 use umbracast_eval::score::scene::{SceneRun, SceneTruth};
 use umbracast_io::rows::{LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
 use umbracast_io::tables;
@@ -226,9 +227,14 @@ fn against_labels(dir: &Path, file: &Path, args: &Evaluate, common: &Common) -> 
     let score = labels::score(&labels, &tracks);
     let percent = |share: Option<f64>| share.map_or("-".to_owned(), |s| format!("{s:.3}"));
     if common.json {
+        let matched: BTreeSet<(u64, u32)> = match_scene(&labels, &tracks).into_keys().collect();
+        let missed = labels.iter().filter(|row| !matched.contains(&(row.frame, row.person)));
+        let missed: Vec<_> = missed.map(|row| [row.frame, u64::from(row.person)]).collect();
         let value = serde_json::json!({
             "labels": labels.len(), "recall": score.recall(), "precision": score.precision(),
             "position_rmse_m": score.position_rmse_m(), "mode": config.mode,
+            "mota": score.mota(), "tracks": score.tracks, "matches": score.matches, "switches": score.switches,
+            "missed": missed,
         });
         say::line(format_args!("{value:#}"));
     } else {
