@@ -59,7 +59,7 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 43] = [
+const JOBS: [Job; 44] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
@@ -99,7 +99,8 @@ const JOBS: [Job; 43] = [
     job("reproduce", "the paper's experiment whole, training first: an hour", 70, Needs::Asking, scores::reproduce),
     job("slurm", "the job files on a Slurm of this one machine", 3, Needs::Program("slurmctld"), house::slurm),
     job("kubernetes", "the job files as a cluster would read them", 3, Needs::Program("python3"), house::kubernetes),
-    job("tests", "CI on a fresh clone, nothing built", 16, Needs::Asking, house::tests),
+    job("tests", "CI on a fresh clone, nothing built, step by step", 16, Needs::Asking, house::tests),
+    job("chores", "what CI does apart: other formats, the training framework, licences, benchmarks", 40, Needs::Asking, house::chores),
     job("fresh-clone", "the first command on a fresh clone, nothing built", 4, Needs::Asking, house::fresh_clone),
     job("structure", "files, imports, circles, in words", 1, Needs::Nothing, house::structure),
     job("locked", "scenes and recordings that nothing was chosen by: every look is kept", 8, Needs::Asking, locked::look),

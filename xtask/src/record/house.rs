@@ -101,7 +101,7 @@ pub fn kubernetes(book: &mut Book) -> Result<()> {
 pub fn tests(book: &mut Book) -> Result<()> {
     let said = in_fresh_clone(book, "time bash .ci/run")?;
     let kept = |line: &&str| {
-        ["Running ", "Doc-tests ", "test result: ", "skipped: ", "real", "user", "sys"]
+        ["step: ", "Running ", "Doc-tests ", "test result: ", "skipped: ", "real", "user", "sys"]
             .iter()
             .any(|start| line.trim_start().starts_with(start))
     };
@@ -109,6 +109,29 @@ pub fn tests(book: &mut Book) -> Result<()> {
         book.line(line.trim_start());
     }
     all_passed(&said)
+}
+
+/// What CI does apart from `.ci/run`: other formats, the training framework, licences and advisories, benchmarks.
+pub fn chores(book: &mut Book) -> Result<()> {
+    let bench = "cargo bench --manifest-path bench/Cargo.toml -- --test";
+    let mut failed = Vec::new();
+    for line in [".ci/formats", ".ci/train", "cargo deny check", bench] {
+        book.command(&format!("time {line}"));
+        if line.starts_with("cargo deny") && book.bash(&root(), "command -v cargo-deny")?.is_empty() {
+            book.line("not run: cargo-deny is not on this machine");
+            continue;
+        }
+        let said = book.bash(&root(), &format!("time {line} && echo passed"))?;
+        let kept = |line: &&str| {
+            let starts = ["test result: ", "Success", "Testing ", "advisories ", "real", "passed"];
+            starts.iter().any(|start| line.trim_start().starts_with(start))
+        };
+        said.lines().filter(kept).for_each(|line| book.line(line.trim_start()));
+        if !said.lines().any(|line| line == "passed") {
+            failed.push(format!("{line}\n{said}"));
+        }
+    }
+    if failed.is_empty() { Ok(()) } else { Err(failed.join("\n")) }
 }
 
 /// The first command on a fresh clone.
