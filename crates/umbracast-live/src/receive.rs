@@ -51,7 +51,7 @@ pub struct Receivers {
     stop: Arc<AtomicBool>,
     /// Packets from addresses that no sensor has.
     strangers: Arc<AtomicU64>,
-    /// Where each sensor's socket is bound.
+    /// Where each door's socket is bound.
     bound: Vec<SocketAddr>,
 }
 
@@ -63,27 +63,24 @@ impl Receivers {
     pub fn start(doors: &[Door], clock: HostClock, packets: &Arc<Queue<Arrived>>) -> Result<Self, Error> {
         let stop = Arc::new(AtomicBool::new(false));
         let strangers = Arc::new(AtomicU64::new(0));
-        let mut of_port: BTreeMap<(u16, usize), Vec<Door>> = BTreeMap::new();
+        let mut of_port: BTreeMap<(u16, usize), Vec<usize>> = BTreeMap::new();
         for (k, door) in doors.iter().enumerate() {
             // Every free port is a port of its own.
             let key = if door.port == 0 { (0, k) } else { (door.port, 0) };
-            of_port.entry(key).or_default().push(door.clone());
+            of_port.entry(key).or_default().push(k);
         }
         let bound = vec![SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0)); doors.len()];
         let mut receivers = Self { threads: Vec::new(), stop, strangers, bound };
-        for ((port, _), doors) in of_port {
-            told_apart(port, &doors)?;
+        for ((port, _), here) in of_port {
+            let shared: Vec<Door> = here.iter().map(|&k| doors[k].clone()).collect();
+            told_apart(port, &shared)?;
             let socket = bind(port).map_err(|e| Error::new(format!("UDP port {port}: {e}")))?;
             let at = socket.local_addr().map_err(|e| Error::new(e.to_string()))?;
-            for door in &doors {
-                if let Some(bound) = receivers.bound.get_mut(door.sensor) {
-                    *bound = at;
-                }
-            }
+            here.iter().for_each(|&k| receivers.bound[k] = at);
             let (stop, strangers) = (receivers.stop.clone(), receivers.strangers.clone());
             let packets = packets.clone();
             receivers.threads.push(std::thread::spawn(move || {
-                receive(&socket, &doors, clock, &packets, &stop, &strangers);
+                receive(&socket, &shared, clock, &packets, &stop, &strangers);
             }));
         }
         Ok(receivers)
@@ -207,6 +204,15 @@ mod tests {
         while receivers.strangers() == 0 {
             std::thread::yield_now();
         }
+        receivers.stop();
+    }
+
+    #[test]
+    fn a_second_sensor_alone_tells_the_port_that_it_listens_on() {
+        let packets = Arc::new(Queue::new(1, WhenFull::DropNewest));
+        let mut receivers = Receivers::start(&[door(1, 0, None)], HostClock::start(), &packets).unwrap();
+        let [bound] = receivers.bound() else { panic!("{:?}", receivers.bound()) };
+        assert_ne!(bound.port(), 0);
         receivers.stop();
     }
 
