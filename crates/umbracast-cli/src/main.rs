@@ -14,6 +14,8 @@ mod matches;
 mod input;
 mod page;
 mod outward;
+#[cfg(feature = "node")]
+mod alive;
 mod signal;
 mod commands;
 
@@ -23,6 +25,11 @@ use clap::{CommandFactory, FromArgMatches};
 
 use args::{Cli, Command};
 use ending::Ending;
+
+/// Zenoh is 200 crates, which most users need not build.
+#[cfg(not(feature = "node"))]
+const NO_NODES: &str = "this program was built without the feature `node`, which stages on several hosts need; build it with \
+                        `cargo build --release --features node`";
 
 fn main() -> ExitCode {
     let given = Cli::command().get_matches();
@@ -39,6 +46,8 @@ fn main() -> ExitCode {
         Command::Node(args) => commands::node::run(&args, &cli.common),
         #[cfg(feature = "node")]
         Command::Fleet(args) => commands::fleet::run(&args, &cli.common),
+        #[cfg(not(feature = "node"))]
+        Command::Node(_) | Command::Fleet(_) => Err(umbracast::Error::new(NO_NODES)),
         Command::Check(args) => commands::check::run(&args, &cli.common),
         Command::Calibrate(args) => commands::calibrate::run(&args, &cli.common),
         Command::View(args) => commands::view::run(&args, &cli.common),

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use umbracast::{Error, Site};
+use umbracast_live::log::Event;
 use umbracast_live::run::Listener;
 
 /// Nobody, or those whom the site file names.
@@ -15,12 +16,16 @@ pub struct Outward {
 
 #[cfg(feature = "node")]
 impl Outward {
-    /// Opens what the site file asks for.
-    pub fn of_site_file(file: Option<&Path>, site: &Site) -> Result<Self, Error> {
+    /// Opens what the site file asks for. `told` gets what happens to a connection.
+    pub fn of_site_file(
+        file: Option<&Path>,
+        site: &Site,
+        told: impl Fn(Event) + Send + 'static,
+    ) -> Result<Self, Error> {
         use umbracast_node::network::Network;
         let Some(file) = file else { return Ok(Self::default()) };
         let network = Network::of_site_file(&crate::setup::read_text(file)?, file)?;
-        Self::of_network(&network, || network.open(), &network.hall(site).unwrap_or_default(), site)
+        Self::of_network(&network, || network.open(), &network.hall(site).unwrap_or_default(), site, told)
     }
 
     /// The same of settings that are read already.
@@ -29,10 +34,11 @@ impl Outward {
         session: impl FnOnce() -> Result<umbracast_node::Session, Error>,
         hall: &str,
         site: &Site,
+        told: impl Fn(Event) + Send + 'static,
     ) -> Result<Self, Error> {
-        let told =
-            umbracast_node::outward::Outward::open(session, hall, site, network.ros2, network.mqtt.as_ref())?;
-        Ok(Self { told })
+        use umbracast_node::outward::Outward;
+        let opened = Outward::open(session, hall, site, network.ros2, network.mqtt.as_ref(), told)?;
+        Ok(Self { told: opened })
     }
 
     /// Who tells `listener` tells them too.
@@ -50,7 +56,7 @@ impl Outward {
 
 #[cfg(not(feature = "node"))]
 impl Outward {
-    pub fn of_site_file(_: Option<&Path>, _: &Site) -> Result<Self, Error> {
+    pub fn of_site_file(_: Option<&Path>, _: &Site, _: impl Fn(Event)) -> Result<Self, Error> {
         Ok(Self {})
     }
 

@@ -1,6 +1,10 @@
 //! What goes to stdout. A reader that goes away (`| head`) ends the command quietly.
 
 use std::io::{ErrorKind, Write};
+use std::sync::{Mutex, PoisonError};
+
+use umbracast_live::HostClock;
+use umbracast_live::log::{Event, Form, Log};
 
 /// Writes text as it is.
 pub fn text(text: &str) {
@@ -20,4 +24,15 @@ pub fn note(note: &str) {
 /// Writes a line.
 pub fn line(line: impl std::fmt::Display) {
     text(&format!("{line}\n"));
+}
+
+/// Tells events of a thread to stderr, the same one not too often.
+pub fn events(form: Form, quiet: bool, clock: HostClock) -> impl Fn(Event) + Send + 'static {
+    let log = Mutex::new(Log::new(form));
+    move |event| {
+        let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(line) = log.line(&event, clock.now_ns()).filter(|_| !quiet) {
+            eprintln!("{line}");
+        }
+    }
 }

@@ -14,6 +14,8 @@ in front of the arguments does the same without installing.
 Exit codes: 0 done, 1 failed, 2 wrong arguments, 3 done but data was lost or skipped (the last line says what).
 [GLOSSARY.md](GLOSSARY.md) explains the terms. [USING.md](USING.md) goes through the commands in the order of their use.
 
+A build with `--features node` has `node` and `fleet` too. [STAGES.md](STAGES.md) and [NODES.md](NODES.md) explain them.
+
 The test `crates/umbracast-cli/tests/commands_page.rs` makes this page from the command's help.
 ";
 

@@ -146,6 +146,10 @@ pub struct NodeHealth {
     pub site: u64,
     /// What was skipped since the start.
     pub health: Health,
+    /// Whether it knows the hall without people; a front end without it learns the background while it runs.
+    pub empty_hall: bool,
+    /// What is not as it should be now, in words: only what this node knows itself.
+    pub troubles: Vec<String>,
 }
 
 /// Every definition, for who publishes them.
@@ -283,6 +287,8 @@ impl Message for NodeHealth {
         f.bool("leads", &mut self.leads);
         f.u64("site", &mut self.site);
         f.one("health", &mut self.health);
+        f.bool("empty_hall", &mut self.empty_hall);
+        f.strings("troubles", &mut self.troubles);
     }
 }
 

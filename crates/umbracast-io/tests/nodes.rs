@@ -66,7 +66,13 @@ fn every_message_survives_and_a_part_of_it_is_none() {
     survives(Priors { time_ns: TIME_NS, tracker: "a".to_owned(), leads_since_ns: 5, priors });
     survives(TrackerState { time_ns: 1, first_ns: 2, version: "0.1.0".to_owned(), tracker: vec![1, 2, 3] });
     survives(Warning { state: "blocked".to_owned(), onset_s: [0.1, 0.2, 0.3], ..Warning::default() });
-    survives(NodeHealth { stages: vec!["track".to_owned()], leads: true, ..NodeHealth::default() });
+    survives(NodeHealth {
+        stages: vec!["track".to_owned()],
+        leads: true,
+        empty_hall: true,
+        troubles: vec!["clock of east 2.0 s off".to_owned()],
+        ..NodeHealth::default()
+    });
 }
 
 #[test]

@@ -22,17 +22,19 @@ pub struct Work {
 }
 
 /// What somebody does on the network.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Kind {
     /// A node's work.
     Node(Role),
+    /// A front end's, of these sensors alone.
+    Sensors(Vec<String>),
     /// Another perception, which gives lists of objects.
     Objects,
     /// Shows the hall to ROS 2 in this domain, and brings what drivers publish there.
     Ros2(u32),
 }
 
-/// A user's works: a word or a list of them, `"sensor"`, `["hall_a/track", "hall_a/forecast"]`, `"ros2:0"`.
+/// A user's works: a word or a list of them, `"sensor:lidar_east"`, `["hall_a/track", "hall_a/forecast"]`, `"ros2:0"`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Works(pub Vec<Work>);
 
@@ -119,6 +121,24 @@ fn rules_of(user: &str, rights: &Rights) -> Vec<Value> {
 }
 
 impl Rights {
+    /// With what a node of this role sends, hears, asks and answers; `keys` makes keys of their ends.
+    fn of_node(self, role: Role, keys: impl Fn(&[&str]) -> Vec<String>) -> Self {
+        let (writes, reads, asks, answers) = of_role(role);
+        let health = format!("health/{}/*", role.name());
+        let rights = Self {
+            writes: keys(writes),
+            reads: keys(reads),
+            asks: keys(&[&["config/**"], asks].concat()),
+            answers: keys(answers),
+            ..self
+        };
+        match role {
+            // A display only looks: it writes nothing and is not seen.
+            Role::Display => Self { tokens: Vec::new(), ..rights },
+            _ => Self { writes: [rights.writes, keys(&[&health])].concat(), ..rights },
+        }
+    }
+
     fn with(mut self, other: Self) -> Self {
         self.writes.extend(other.writes);
         self.reads.extend(other.reads);
@@ -138,7 +158,7 @@ impl Work {
         let all = || vec!["**".to_owned(), "@ros2_lv/**".to_owned()];
         let settings: &[&str] = &["config/**"];
         let rights = Rights { sees: keys(&["node/**"]), ..Rights::default() };
-        match self.kind {
+        match &self.kind {
             // It passes on what others send, ask and answer, in all halls.
             Kind::Node(Role::Router) => Rights {
                 writes: all(),
@@ -149,21 +169,23 @@ impl Work {
                 sees: all(),
             },
             Kind::Node(role) => {
-                let (writes, reads, asks, answers) = of_role(role);
-                let health = format!("health/{}/*", role.name());
-                let token = format!("node/{}/*", role.name());
-                let mut writes = keys(writes);
-                // A display only looks: it writes nothing at all.
-                let speaks = role != Role::Display;
-                writes.extend(keys(&[&health]).into_iter().filter(|_| speaks));
-                let asks = [settings, asks].concat();
+                let rights = Rights { tokens: keys(&[&format!("node/{}/*", role.name())]), ..rights };
+                rights.of_node(*role, keys)
+            }
+            // As any front end, but for the names of the sensors. A front end of several is known by all their names.
+            Kind::Sensors(names) => {
+                let together = (names.len() > 1).then(|| names.join(","));
+                let front_ends = names.iter().cloned().chain(together);
+                let writes: Vec<String> =
+                    front_ends.map(|name| format!("sensor/{name}/foreground")).collect();
+                let tokens: Vec<String> = names.iter().map(|name| format!("node/sensor/{name}.$*")).collect();
+                let of_all = rights.of_node(Role::Sensor, keys);
+                let any = keys(&[ANY_FOREGROUND]);
+                let others = of_all.writes.iter().filter(|key| !any.contains(key)).cloned();
                 Rights {
-                    writes,
-                    reads: keys(reads),
-                    asks: keys(&asks),
-                    answers: keys(answers),
-                    tokens: keys(&[&token]),
-                    ..rights
+                    writes: others.chain(writes.iter().flat_map(|end| keys(&[end]))).collect(),
+                    tokens: tokens.iter().flat_map(|end| keys(&[end])).collect(),
+                    ..of_all
                 }
             }
             Kind::Objects => Rights { writes: keys(&["objects/*"]), asks: keys(&["config/site"]), ..rights },
@@ -181,20 +203,25 @@ impl Work {
 
 type Ends = &'static [&'static str];
 
-/// Keys that a role writes, reads, asks and answers, by their ends; `config/**` is asked by all.
+const ANY_FOREGROUND: &str = "sensor/*/foreground";
+
+/// Keys that a role writes, reads, asks and answers, by their ends; `config/**` is asked by all. Settings and the tracker's state
+/// come from the stages alone, and the empty hall from the tracker: a front end hangs where anybody may reach it, and whoever
+/// looks on has nothing to say.
 fn of_role(role: Role) -> (Ends, Ends, Ends, Ends) {
     match role {
-        Role::Sensor => (&["sensor/*/foreground", "sensor/*/health"], &["priors"], &[], &["config/**"]),
+        Role::Sensor => (&[ANY_FOREGROUND], &["priors"], &[], &[]),
         Role::Track => (
             &["priors", "followed", "state", "detections"],
-            &["sensor/*/foreground", "sensor/*/health", "objects/*", "state", "priors", "followed"],
+            &[ANY_FOREGROUND, "objects/*", "state", "priors", "followed"],
             &["state"],
             &["state", "config/**"],
         ),
-        Role::Forecast => (&["tracks"], &["followed", "state"], &["state"], &["state", "config/**"]),
-        Role::Cast => (&["links", "warnings/*"], &["tracks", "state"], &["state"], &["state", "config/**"]),
-        Role::Record => (&[], &["**"], &["state"], &["state", "config/**"]),
-        Role::Serve => (&[], &["**"], &["state"], &["state", "config/**"]),
+        Role::Forecast => {
+            (&["tracks"], &["followed", "state"], &["state"], &["state", "config/site", "config/weights"])
+        }
+        Role::Cast => (&["links", "warnings/*"], &["tracks", "state"], &["state"], &["state", "config/site"]),
+        Role::Record | Role::Serve => (&[], &["**"], &["state"], &[]),
         Role::Display => (&[], &["**"], &[], &[]),
         Role::Controller => (&[], &["links", "warnings/*"], &[], &[]),
         Role::Router => (&[], &[], &[], &[]), // Of no hall: see above.
@@ -209,13 +236,16 @@ impl std::str::FromStr for Work {
             Some((hall, word)) => (Some(chunk(hall)?), word),
             None => (None, text),
         };
-        let kind = match (word, word.strip_prefix("ros2:")) {
-            ("objects", _) => Kind::Objects,
-            (_, Some(domain)) => Kind::Ros2(domain.parse().map_err(|_| {
+        let kind = match word.split_once(':') {
+            None if word == "objects" => Kind::Objects,
+            Some(("sensor", names)) => Kind::Sensors(names.split(',').map(chunk).collect::<Result<_, _>>()?),
+            Some(("ros2", domain)) => Kind::Ros2(domain.parse().map_err(|_| {
                 Error::new(format!("expected a number of a domain behind ros2:, found {domain:?}"))
             })?),
             _ => Kind::Node(word.parse().map_err(|error: Error| {
-                Error::new(format!("{error}; or objects, ros2:DOMAIN; with a hall before it as HALL/..."))
+                Error::new(format!(
+                    "{error}; or sensor:NAME, objects, ros2:DOMAIN; with a hall before it as HALL/..."
+                ))
             })?),
         };
         Ok(Self { hall, kind })
@@ -287,10 +317,41 @@ mod tests {
     }
 
     #[test]
-    fn presence_is_announced_under_the_own_role_alone() {
-        let rules = access_control(&users("edge = \"sensor\""));
-        let token = |key| passes(&rules, "edge", "ingress", "liveliness_token", key);
-        assert!(token("umbracast/lab/node/sensor/1") && !token("umbracast/lab/node/track/1"));
+    fn presence_is_announced_under_the_own_role_alone_and_by_a_display_not_at_all() {
+        let rules = access_control(&users("edge = \"sensor\"\nscreen = \"display\""));
+        let token = |user, key| passes(&rules, user, "ingress", "liveliness_token", key);
+        assert!(token("edge", "umbracast/lab/node/sensor/1") && !token("edge", "umbracast/lab/node/track/1"));
+        assert!(!token("screen", "umbracast/lab/node/display/1"));
+    }
+
+    #[test]
+    fn a_front_end_of_named_sensors_writes_the_foreground_of_no_other() {
+        let rules = access_control(&users("edge = \"lab/sensor:lidar_east,door\""));
+        let may =
+            |message, key: &str| passes(&rules, "edge", "ingress", message, &format!("umbracast/lab/{key}"));
+        for own in ["lidar_east", "door", "lidar_east,door"] {
+            assert!(may("put", &format!("sensor/{own}/foreground")), "{own}");
+        }
+        for other in ["lidar_west", "lidar_east,lidar_west", "*", "lidar_east.1"] {
+            assert!(!may("put", &format!("sensor/{other}/foreground")), "{other}");
+        }
+        assert!(may("liveliness_token", "node/sensor/door.1f") && may("put", "health/sensor/1f"));
+        assert!(!may("liveliness_token", "node/sensor/lidar_west.1f"));
+    }
+
+    #[test]
+    fn the_tracker_alone_answers_for_the_empty_hall_and_nobody_beside_the_stages_for_the_state() {
+        let table =
+            ["sensor", "sensor:lidar_east", "record", "serve", "display", "controller", "objects", "track"];
+        for work in table {
+            let rules = access_control(&users(&format!("user = \"{work}\"")));
+            for key in ["config/site", "config/background/lidar_east", "config/weights", "state"] {
+                let answers = ["declare_queryable", "reply"].map(|message| {
+                    passes(&rules, "user", "ingress", message, &format!("umbracast/lab/{key}"))
+                });
+                assert_eq!(answers, [work == "track"; 2], "{work}: {key}");
+            }
+        }
     }
 
     #[test]

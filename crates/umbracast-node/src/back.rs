@@ -7,7 +7,7 @@ use std::time::Duration;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Health};
 use umbracast_io::fields;
-use umbracast_io::nodes::{Followed, Foreground, Priors, TrackerState};
+use umbracast_io::nodes::{Followed, Priors, TrackerState};
 use umbracast_io::objects;
 use umbracast_io::wire;
 use umbracast_live::HostClock;
@@ -19,6 +19,7 @@ use zenoh::pubsub::Subscriber;
 use zenoh::query::{Query, Queryable};
 
 use crate::chain::{Chain, Made, Row};
+use crate::front;
 use crate::hall::{Hall, Outlet, Urgency};
 use crate::join::{Join, Joined};
 use crate::lead::Lead;
@@ -39,7 +40,8 @@ const SILENCE_NS: i64 = 1_000_000_000;
 
 /// What comes to the thread.
 pub(crate) enum Heard {
-    Foreground(ZBytes),
+    /// A front end's message, and the key that it came with.
+    Foreground(String, ZBytes),
     Followed(ZBytes),
     Priors(ZBytes),
     /// A list of another perception, and whose.
@@ -127,7 +129,10 @@ impl Back {
             })?);
             subscribers.push(hear("priors", Heard::Priors)?);
             // What comes meanwhile waits in the queue.
-            subscribers.push(hear("sensor/*/foreground", Heard::Foreground)?);
+            let foregrounds = queue.clone();
+            subscribers.push(hall.hear(&hall.keys().of("sensor/*/foreground"), move |key, bytes| {
+                foregrounds.push((Heard::Foreground(key.to_owned(), bytes.clone()), clock.now_ns()));
+            })?);
             let lists = queue.clone();
             subscribers.push(hall.hear(&hall.keys().of("objects/*"), move |key, bytes| {
                 let source = key.rsplit('/').next().unwrap_or_default().to_owned();
@@ -246,7 +251,7 @@ impl Stages {
 
     fn hear(&mut self, heard: Heard, now_ns: i64) {
         match heard {
-            Heard::Foreground(bytes) => match fields::decode::<Foreground>(&bytes.to_bytes()) {
+            Heard::Foreground(key, bytes) => match front::heard(&key, &bytes.to_bytes()) {
                 Some(foreground) => self.join.push(foreground, now_ns),
                 None => self.broken(),
             },

@@ -9,10 +9,13 @@ use umbracast::lidar::{Assembler, Cloud, Scan, Views, sensor_model};
 use umbracast::mounting::Mountings;
 use umbracast::site::Sensor;
 use umbracast::{Config, Error, Frame, Health, STEP_NS, Site};
+use umbracast_io::fields;
 use umbracast_io::nodes::{Foreground, Priors};
 use umbracast_io::point_cloud::PointCloud;
 use umbracast_live::HostClock;
 use umbracast_live::receive::Arrived;
+
+use crate::keys::front_end;
 
 /// Without an empty scan, a front end waits so long for the priors of its frame while a tracker is there.
 const PRIORS_WAIT: Duration = Duration::from_millis(50);
@@ -87,12 +90,8 @@ impl Front {
                 own.len()
             )));
         }
-        let mut mountings = Mountings::new(&config.detect, &config.site);
-        let mut background = Background::new(&config.detect, &config.site);
         let mut health = Health::default();
-        for frame in empty {
-            background.learn_empty(&mountings.follow(frame, &mut health));
-        }
+        let (mountings, background) = learned(config, empty, &mut health);
         let knows = !empty.is_empty() || config.detect.background == BackgroundMethod::Voxels;
         Ok(Self {
             assembler: Assembler::new(&Site { sensors, ..config.site.clone() })?,
@@ -108,6 +107,13 @@ impl Front {
             priors_late: 0,
             clock,
         })
+    }
+
+    /// Takes the hall without people, which came later, in place of what was learned on the way.
+    pub fn take_empty(&mut self, config: &Config, empty: &[Frame]) {
+        // What was skipped of the empty hall was skipped by whoever recorded it.
+        (self.mountings, self.background) = learned(config, empty, &mut Health::default());
+        self.priors_wait = Duration::ZERO;
     }
 
     /// Takes a packet, whose sensor is a place in the site, and gives what it closes to `sink`.
@@ -190,6 +196,23 @@ impl Front {
         self.priors_late += u64::from(!in_time && !self.priors_wait.is_zero());
         priors
     }
+}
+
+/// A front end's message; none where it is not understood, or covers other sensors than its key names.
+pub fn heard(key: &str, bytes: &[u8]) -> Option<Foreground> {
+    let foreground = fields::decode::<Foreground>(bytes)?;
+    let named = key.rsplit('/').nth(1)?;
+    (front_end(&foreground.sensors, &foreground.covers)? == named).then_some(foreground)
+}
+
+/// How sensors hang and what they see where nobody is, as frames of the empty hall show it.
+fn learned(config: &Config, empty: &[Frame], health: &mut Health) -> (Mountings, Background) {
+    let mut mountings = Mountings::new(&config.detect, &config.site);
+    let mut background = Background::new(&config.detect, &config.site);
+    for frame in empty {
+        background.learn_empty(&mountings.follow(frame, health));
+    }
+    (mountings, background)
 }
 
 /// Whether a sensor sends no packets that are understood here, so that its driver's clouds stand for it.

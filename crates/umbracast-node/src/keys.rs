@@ -8,7 +8,7 @@ use crate::role::Role;
 ///
 /// | key | who writes | what |
 /// |---|---|---|
-/// | `sensor/NAME/foreground` | front end | new points and views of one frame |
+/// | `sensor/NAMES/foreground` | front end, by its sensors with commas between | new points and views of one frame |
 /// | `priors` | tracker that leads | where people are expected in the next frame |
 /// | `followed` | tracker that leads | everybody followed, for a forecast in another process |
 /// | `state` | tracker that leads | what a tracker needs to go on, twice a second; query: the newest that is known |
@@ -41,7 +41,7 @@ impl Keys {
         format!("umbracast/{}/{end}", self.hall)
     }
 
-    /// Foreground of a front end.
+    /// Foreground of a front end, by its name: [`front_end`].
     pub fn foreground(&self, front_end: &str) -> String {
         self.of(&format!("sensor/{front_end}/foreground"))
     }
@@ -65,6 +65,14 @@ impl Keys {
     pub fn health(&self, role: Role, id: &str) -> String {
         self.of(&format!("health/{}/{id}", role.name()))
     }
+}
+
+/// The name of a front end in its key: those of the sensors that it covers, by their places, in the site's order. What a
+/// message covers must be what its key names, because a router lets a front end write by the key. `None` where a place is none.
+pub fn front_end(sensors: &[String], covers: &[u32]) -> Option<String> {
+    let names: Option<Vec<&str>> =
+        covers.iter().map(|&place| sensors.get(place as usize).map(String::as_str)).collect();
+    names.map(|names| names.join(","))
 }
 
 /// A name as one chunk of a key: not empty, without what Zenoh gives a meaning.

@@ -2,11 +2,13 @@
 
 pub mod role;
 pub mod keys;
+pub mod secrets;
 pub mod access;
 pub mod ros2;
 pub mod mqtt;
 pub mod outward;
 pub mod network;
+pub mod meet;
 pub mod hall;
 pub mod worker;
 pub mod front;

@@ -3,6 +3,7 @@
 //! It does not use Zenoh's bridge, because the bridge passes on bytes. Warnings on Zenoh are CDR, and MQTT listeners
 //! expect JSON. `rumqttc` is maintained and small, and needs no runtime that Zenoh does not need already.
 
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
@@ -12,7 +13,10 @@ use std::time::Duration;
 use rumqttc::{Client, Connection, LastWill, MqttOptions, QoS, TlsConfiguration, Transport};
 use serde::Deserialize;
 use umbracast::Error;
+use umbracast_live::log::{self, Level};
 use umbracast_live::warnings::Event;
+
+use crate::secrets;
 
 /// Warnings that wait for the broker; more are lost, and counted.
 const WAITING: usize = 4096;
@@ -60,20 +64,25 @@ struct State {
 
 impl Sender {
     /// Begins to call the broker, and goes on until it answers. `umbracast/HALL/status` says `online` from then on, and
-    /// `offline` when this ends or is cut off.
+    /// `offline` when the last sender of the hall ends or is cut off. `told` gets what happens to the connection.
     ///
     /// # Errors
-    /// A broker's name that is none, a file that cannot be read.
-    pub fn start(settings: &Mqtt, hall: &str) -> Result<Self, Error> {
+    /// A broker's name that is none, a file that cannot be read or that others can read.
+    pub fn start(
+        settings: &Mqtt,
+        hall: &str,
+        told: impl Fn(log::Event) + Send + 'static,
+    ) -> Result<Self, Error> {
         let (host, port) = address(&settings.broker)?;
-        let mut options = MqttOptions::new(format!("umbracast-{hall}"), host, port);
+        // A name of its own: a broker throws out whoever had the same name before.
+        let client_id = format!("umbracast-{hall}-{:08x}", RandomState::new().build_hasher().finish() as u32);
+        let mut options = MqttOptions::new(&client_id, host, port);
         let status = format!("umbracast/{hall}/status");
         options.set_keep_alive(KEEP_ALIVE);
         options.set_last_will(LastWill::new(&status, "offline", QoS::AtLeastOnce, true));
         if let Some(user) = &settings.user {
-            let password = settings.password_file.as_deref().map(read).transpose()?.unwrap_or_default();
-            let password = String::from_utf8_lossy(&password);
-            options.set_credentials(user, password.lines().next().unwrap_or_default());
+            let password = settings.password_file.as_deref().map(secrets::first_line).transpose()?;
+            options.set_credentials(user, password.unwrap_or_default());
         }
         if let Some(ca) = &settings.ca {
             let tls = TlsConfiguration::Simple { ca: read(ca)?, alpn: None, client_auth: None };
@@ -81,10 +90,15 @@ impl Sender {
         }
         let (client, connection) = Client::new(options, WAITING);
         let state = Arc::new(State::default());
-        let thread = std::thread::spawn({
-            let (client, state) = (client.clone(), state.clone());
-            move || talk(connection, &client, &status, &state)
-        });
+        let mut talk = Talk {
+            client: client.clone(),
+            state: state.clone(),
+            status,
+            broker: settings.broker.clone(),
+            client_id,
+            connected: false,
+        };
+        let thread = std::thread::spawn(move || talk.run(connection, told));
         Ok(Self { client, hall: hall.to_owned(), lost: AtomicU64::new(0), state, thread: Some(thread) })
     }
 
@@ -134,22 +148,73 @@ impl State {
     }
 }
 
-/// Sends and receives until the client has said good-bye, or nobody is there to say it to.
-fn talk(mut connection: Connection, client: &Client, status: &str, state: &State) {
-    use rumqttc::{Event, Outgoing, Packet};
-    for event in connection.iter() {
-        match event {
-            Ok(Event::Incoming(Packet::ConnAck(_))) => {
-                state.publish(client, status, true, "online".to_owned());
+/// What the thread that talks to the broker knows.
+struct Talk {
+    client: Client,
+    state: Arc<State>,
+    /// The topic that says whether the hall has a sender.
+    status: String,
+    broker: String,
+    client_id: String,
+    connected: bool,
+}
+
+impl Talk {
+    /// Sends and receives until the client has said good-bye, or nobody is there to say it to.
+    fn run(&mut self, mut connection: Connection, told: impl Fn(log::Event)) {
+        use rumqttc::{Event, Outgoing, Packet};
+        for event in connection.iter() {
+            let stops = self.state.stop.load(Ordering::Acquire);
+            match event {
+                Ok(Event::Incoming(Packet::ConnAck(_))) => {
+                    let Self { broker, client_id, .. } = self;
+                    let text = format!("warnings go to the MQTT broker {broker} from {client_id}");
+                    told(log::Event::new(Level::Info, "mqtt_connected", text));
+                    self.connected = true;
+                    // Another sender of the hall that ends says `offline` for all.
+                    let _ = self.client.try_subscribe(&self.status, QoS::AtLeastOnce);
+                    self.say_online();
+                }
+                Ok(Event::Incoming(Packet::Publish(heard)))
+                    if heard.topic == self.status && heard.payload == "offline" && !stops =>
+                {
+                    self.say_online();
+                }
+                Ok(Event::Incoming(Packet::PubAck(_))) => {
+                    self.state.open.fetch_sub(1, Ordering::AcqRel);
+                }
+                Ok(Event::Outgoing(Outgoing::Disconnect)) => return,
+                Ok(_) => {}
+                Err(_) if stops => return,
+                Err(error) => {
+                    told(self.lost(&error));
+                    self.connected = false;
+                    std::thread::sleep(RETRY);
+                }
             }
-            Ok(Event::Incoming(Packet::PubAck(_))) => {
-                state.open.fetch_sub(1, Ordering::AcqRel);
-            }
-            Ok(Event::Outgoing(Outgoing::Disconnect)) => return,
-            Ok(_) => {}
-            Err(_) if state.stop.load(Ordering::Acquire) => return,
-            Err(_) => std::thread::sleep(RETRY),
         }
+    }
+
+    fn say_online(&self) {
+        self.state.publish(&self.client, &self.status, true, "online".to_owned());
+    }
+
+    /// In words. MQTT 3.1.1 does not say why a broker hangs up.
+    fn lost(&self, error: &rumqttc::ConnectionError) -> log::Event {
+        let Self { broker, client_id, .. } = self;
+        let (name, text) = match self.connected {
+            true => (
+                "mqtt_lost",
+                format!(
+                    "the MQTT broker {broker} is gone or has ended the connection of {client_id}: {error}; a broker does so, \
+                     too, when another client takes this name"
+                ),
+            ),
+            false => {
+                ("mqtt_no_answer", format!("the MQTT broker {broker} does not take {client_id}: {error}"))
+            }
+        };
+        log::Event::new(Level::Warn, name, text)
     }
 }
 
@@ -228,9 +293,7 @@ mod tests {
     #[test]
     fn a_broker_gets_every_warning_as_json_and_is_told_who_is_there() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = broker.local_addr().unwrap().to_string();
-        let settings = Mqtt { broker: address, user: None, password_file: None, ca: None, plain: false };
-        let sender = Sender::start(&settings, "lab").unwrap();
+        let sender = Sender::start(&at(&broker), "lab", drop).unwrap();
         sender.send(&event()); // Waits until the broker is there.
         let (mut stream, _) = broker.accept().unwrap();
         let (kind, hello) = packet(&mut stream);
@@ -261,6 +324,50 @@ mod tests {
         ended.join().unwrap();
     }
 
+    /// A broker that takes the next client: its connection, and the name that it gives.
+    fn taken(broker: &TcpListener) -> (TcpStream, String) {
+        let (mut stream, _) = broker.accept().unwrap();
+        let (_, hello) = packet(&mut stream);
+        // Behind the protocol's name, level and flags and the time to live.
+        let length = usize::from(u16::from_be_bytes([hello[10], hello[11]]));
+        stream.write_all(&[0x20, 2, 0, 0]).unwrap();
+        (stream, String::from_utf8(hello[12..12 + length].to_vec()).unwrap())
+    }
+
+    #[test]
+    fn two_senders_of_a_hall_have_names_of_their_own_and_the_one_that_stays_says_so() {
+        let broker = TcpListener::bind("127.0.0.1:0").unwrap();
+        let settings = at(&broker);
+        let _senders = [(); 2].map(|()| Sender::start(&settings, "lab", drop).unwrap());
+        let [(mut stays, one), (_ends, other)] = [(); 2].map(|()| taken(&broker));
+        assert_ne!(one, other);
+        assert!(one.starts_with("umbracast-lab-") && other.starts_with("umbracast-lab-"));
+        assert_eq!(publication(&mut stays), ("umbracast/lab/status".to_owned(), "online".to_owned()));
+        // The broker passes on the last will of the other: a publication without a number.
+        let topic = b"umbracast/lab/status";
+        let head = [0x30, (2 + topic.len() + 7) as u8, 0, topic.len() as u8];
+        stays.write_all(&[&head[..], topic, b"offline"].concat()).unwrap();
+        assert_eq!(publication(&mut stays).1, "online");
+    }
+
+    #[test]
+    fn a_connection_that_somebody_takes_over_is_told() {
+        let broker = TcpListener::bind("127.0.0.1:0").unwrap();
+        let (tell, told) = std::sync::mpsc::channel();
+        let sender = Sender::start(&at(&broker), "lab", move |event| drop(tell.send(event)));
+        let (stream, name) = taken(&broker);
+        drop(stream);
+        let events = [told.recv().unwrap(), told.recv().unwrap()];
+        assert_eq!(events.each_ref().map(|event| event.name), ["mqtt_connected", "mqtt_lost"]);
+        assert!(events[1].text.contains(&name) && events[1].text.contains("takes this name"));
+        drop((broker, sender));
+    }
+
+    fn at(broker: &TcpListener) -> Mqtt {
+        let broker = broker.local_addr().unwrap().to_string();
+        Mqtt { broker, user: None, password_file: None, ca: None, plain: false }
+    }
+
     #[test]
     fn a_broker_that_is_never_there_stops_nobody() {
         let settings = Mqtt {
@@ -270,10 +377,10 @@ mod tests {
             ca: None,
             plain: false,
         };
-        let sender = Sender::start(&settings, "lab").unwrap();
+        let sender = Sender::start(&settings, "lab", drop).unwrap();
         (0..WAITING + 10).for_each(|_| sender.send(&event()));
         assert!(sender.lost() >= 10);
         drop(sender);
-        assert!(Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab").is_err());
+        assert!(Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab", drop).is_err());
     }
 }

@@ -17,14 +17,24 @@ use crate::access::{self, Works};
 pub use crate::keys::chunk;
 use crate::mqtt::Mqtt;
 use crate::outward::Ros2;
+use crate::secrets;
 
 /// Where nodes of one host meet without settings: Zenoh's own port.
-const MEETING_POINT: &str = "127.0.0.1:7447";
+pub(crate) const MEETING_POINT: &str = "127.0.0.1:7447";
 /// A peer that is silent for so long is gone, and is called again. Under a loss of one packet in ten, TCP is silent for a
 /// second now and then.
 const LEASE_MS: u64 = 2000;
 /// Who is not there is called again after so long, and after twice as long each time, up to the second value.
 const RETRY_MS: [u64; 2] = [100, 800];
+
+/// Who connects has so long to say who it is, ms: a handshake of four messages, and of TLS before it. Under a loss of one packet in
+/// ten TCP needs less, and who is late calls again. Zenoh's own 10 s let whoever says nothing keep others out for as long.
+const ACCEPT_MS: u64 = 2000;
+/// So many may be about to say who they are; more are sent away at once. Zenoh's own 100 are fewer than one host opens in a moment.
+/// With all of them, and with the sessions of a region, a process stays below the 1024 files that Linux lets it open.
+const ACCEPT_PENDING: usize = 512;
+/// So many sessions are open at once: Zenoh's own number, three times those of a region of a hundred halls.
+const SESSIONS: usize = 1000;
 
 /// A visitor calls for so long, ms.
 const VISIT_MS: &str = "3000";
@@ -227,7 +237,11 @@ impl Network {
         put("connect/retry", retry)?;
         put("connect/timeout_ms", (-1).into())?;
         put("connect/exit_on_failure", false.into())?;
+        let listen: Vec<String> = listen.iter().map(|endpoint| impatient(endpoint)).collect();
         put("listen/endpoints", serde_json::json!(listen))?;
+        put("transport/unicast/accept_timeout", ACCEPT_MS.into())?;
+        put("transport/unicast/accept_pending", ACCEPT_PENDING.into())?;
+        put("transport/unicast/max_sessions", SESSIONS.into())?;
         put("scouting/multicast/enabled", false.into())?;
         put("transport/link/tx/lease", LEASE_MS.into())?;
         if !self.roles.is_empty() {
@@ -246,6 +260,8 @@ impl Network {
             let wrong = |e| Error::new(format!("network: Zenoh does not take {key}: {e}"));
             config.insert_json5(key, &serde_json::json!(file).to_string()).map_err(wrong)
         };
+        let keys = self.tls.as_ref().and_then(|tls| tls.key.as_deref());
+        [self.users_file.as_deref(), keys].into_iter().flatten().try_for_each(secrets::closed_to_others)?;
         put_file("transport/auth/usrpwd/dictionary_file", self.users_file.as_ref())?;
         if let Some(tls) = &self.tls {
             put_file("transport/link/tls/root_ca_certificate", Some(&tls.ca))?;
@@ -262,7 +278,7 @@ impl Network {
 
     /// User and password.
     fn credentials(&self, file: &Path) -> Result<(String, String), Error> {
-        let line = read_line(file)?;
+        let line = secrets::first_line(file)?;
         let pair = self.user.as_ref().map(|user| (user.as_str(), line.as_str())).or(line.split_once(':'));
         let (user, password) = pair.ok_or_else(|| {
             Error::new("expected user:password, found one word and no network.user").within(file.display())
@@ -317,10 +333,15 @@ pub fn is_loopback(endpoint: &str) -> bool {
     numbers || host == "localhost" || endpoint.starts_with("unixsock-stream/")
 }
 
-/// The first line of a file.
-fn read_line(file: &Path) -> Result<String, Error> {
-    let text = fs::read_to_string(file).map_err(|e| Error::new(e.to_string()).within(file.display()))?;
-    Ok(text.lines().next().unwrap_or_default().to_owned())
+/// A place to listen at whose TLS waits no longer than the handshake behind it.
+fn impatient(endpoint: &str) -> String {
+    match (endpoint.starts_with("tls/"), endpoint.contains('#')) {
+        (false, _) => endpoint.to_owned(),
+        (true, has_settings) => {
+            let before = if has_settings { ';' } else { '#' };
+            format!("{endpoint}{before}tls_handshake_timeout_ms={ACCEPT_MS}")
+        }
+    }
 }
 
 #[cfg(test)]
@@ -375,10 +396,38 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("password");
         fs::write(&file, "hidden\n").unwrap();
+        close(&file);
         let network =
             Network { user: Some("edge".to_owned()), password_file: Some(file), ..Network::default() };
         assert!(network.zenoh(&[]).is_ok() && !format!("{network:?}").contains("hidden"));
         let missing = Network { password_file: Some("/nowhere/password".into()), ..network };
         assert!(missing.zenoh(&[]).unwrap_err().to_string().contains("/nowhere/password"));
+    }
+
+    /// As `chmod 600` does.
+    fn close(file: &Path) {
+        #[cfg(unix)]
+        fs::set_permissions(file, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_users_file_that_others_can_read_is_refused_with_chmod_in_the_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("users.txt");
+        fs::write(&file, "edge:hidden\n").unwrap();
+        fs::set_permissions(&file, std::os::unix::fs::PermissionsExt::from_mode(0o644)).unwrap();
+        let network = Network { users_file: Some(file.clone()), ..Network::default() };
+        let error = network.zenoh(&[]).unwrap_err().to_string();
+        assert!(error.contains("chmod 600") && error.contains("users.txt"), "{error}");
+        close(&file);
+        assert!(network.zenoh(&[]).is_ok());
+    }
+
+    #[test]
+    fn who_says_nothing_is_not_waited_for_long() {
+        assert_eq!(impatient("tcp/0.0.0.0:1"), "tcp/0.0.0.0:1");
+        assert_eq!(impatient("tls/a:1"), "tls/a:1#tls_handshake_timeout_ms=2000");
+        assert_eq!(impatient("tls/a:1#so_sndbuf=9"), "tls/a:1#so_sndbuf=9;tls_handshake_timeout_ms=2000");
     }
 }

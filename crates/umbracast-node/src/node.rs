@@ -25,7 +25,7 @@ use crate::front::{Expected, Front, takes_clouds};
 use crate::hall::{Hall, Outlet, Urgency};
 use crate::role::Role;
 use crate::ros2;
-use crate::share::{Shared, Sharing, keep_state, site_number};
+use crate::share::{self, Shared, Sharing, keep_state, site_number};
 use crate::summary::{Summary, load};
 use crate::watch::Watch;
 
@@ -83,6 +83,9 @@ pub struct Node {
     packets: Option<Arc<Queue<Arrived>>>,
     clouds: Option<Arc<Queue<PointCloud>>>,
     front: Option<JoinHandle<()>>,
+    /// Asks for the empty hall until it comes.
+    asks: Option<JoinHandle<()>>,
+    empty_hall: Arc<AtomicBool>,
     fed: Option<JoinHandle<()>>,
     front_counted: Arc<FrontCounted>,
     backs: Vec<Back>,
@@ -145,6 +148,8 @@ impl Node {
             packets: None,
             clouds: None,
             front: None,
+            asks: None,
+            empty_hall: Arc::new(AtomicBool::new(!empty.is_empty())),
             fed: None,
             front_counted: Arc::default(),
             backs: Vec::new(),
@@ -226,8 +231,8 @@ impl Node {
                 expected.hear(priors, clock.now_ns());
             }
         })?);
-        let name = crate::network::chunk(&config.site.sensors[own[0]].name)
-            .map_err(|e| e.within("site.sensors: name"))?;
+        let names: Vec<&str> = own.iter().map(|&s| config.site.sensors[s].name.as_str()).collect();
+        let name = crate::network::chunk(&names.join(",")).map_err(|e| e.within("site.sensors: name"))?;
         let outlet = self.hall.outlet(&self.hall.keys().foreground(&name), Urgency::Points)?;
         let counted = self.front_counted.clone();
         let publish = move |mut foreground: Foreground| {
@@ -236,6 +241,21 @@ impl Node {
             let took = Duration::from_nanos((clock.now_ns() - foreground.closed_ns).max(0) as u64);
             lock(&counted.latency).add(took);
             *lock(&counted.health) = foreground.health;
+        };
+        let late = Arc::<Mutex<Option<Vec<Frame>>>>::default();
+        if empty.is_empty() {
+            let (late, known) = (late.clone(), self.empty_hall.clone());
+            let (hall, site, own) = (self.hall.clone(), config.site.clone(), own.to_vec());
+            self.asks = Some(share::ask_empty_until(hall, site, own, self.stop.clone(), move |frames| {
+                *lock(&late) = Some(frames);
+                known.store(true, Ordering::Relaxed);
+            }));
+        }
+        let config_of_front = config.clone();
+        let look = move |front: &mut Front| {
+            if let Some(empty) = lock(&late).take() {
+                front.take_empty(&config_of_front, &empty);
+            }
         };
         let counted = self.front_counted.clone();
         let taken = move |front: &Front| {
@@ -255,6 +275,7 @@ impl Node {
             self.clouds = Some(clouds.clone());
             self.front = Some(std::thread::spawn(move || {
                 while let Some(cloud) = clouds.pop() {
+                    look(&mut front);
                     front.push_cloud(cloud, &publish);
                     taken(&front);
                 }
@@ -265,6 +286,7 @@ impl Node {
         let (queue, recorder) = (packets.clone(), self.recorder.clone());
         self.front = Some(std::thread::spawn(move || {
             while let Some(arrived) = queue.pop() {
+                look(&mut front);
                 front.push(&arrived, &publish);
                 taken(&front);
                 if let Some(recorder) = &recorder {
@@ -359,6 +381,11 @@ impl Node {
         self.receivers.as_ref()
     }
 
+    /// Whether the hall without people is known; a front end without it asks for it, and learns the background meanwhile.
+    pub fn has_empty_hall(&self) -> bool {
+        self.empty_hall.load(Ordering::Relaxed)
+    }
+
     /// True once a replay has ended and all of it is published.
     pub fn is_done(&self) -> bool {
         self.fed.is_some() && self.front.as_ref().is_some_and(JoinHandle::is_finished)
@@ -388,6 +415,7 @@ impl Node {
             latency: lock(&front.latency).clone(),
             health: *lock(&front.health),
             recorded: lock(&self.record_status).clone(),
+            empty_hall: self.empty_hall.load(Ordering::Relaxed),
             ..Summary::default()
         };
         if let Some(watch) = &self.watch {
@@ -435,6 +463,8 @@ impl Node {
             leads: summary.leads,
             site: self.site,
             health: summary.health,
+            empty_hall: summary.empty_hall,
+            troubles: summary.troubles,
         };
         self.health.iter().for_each(|outlet| outlet.put(&mut health));
     }
@@ -452,7 +482,7 @@ impl Node {
         if let Some(clouds) = &self.clouds {
             clouds.close();
         }
-        for thread in [self.front.take(), self.fed.take()].into_iter().flatten() {
+        for thread in [self.front.take(), self.fed.take(), self.asks.take()].into_iter().flatten() {
             let _ = thread.join(); // One that panicked is a bug; the others end all the same.
         }
         self.backs.iter_mut().for_each(|back| back.worker.stop());

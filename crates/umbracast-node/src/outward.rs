@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde::Deserialize;
 use umbracast::{Error, Site};
 use umbracast_live::Published;
+use umbracast_live::log::Event;
 use umbracast_live::run::Listener;
 use zenoh::Session;
 
@@ -30,7 +31,8 @@ pub struct Outward {
 }
 
 impl Outward {
-    /// Opens what is asked for; `None` where that is nothing. Only ROS 2 needs a session.
+    /// Opens what is asked for; `None` where that is nothing. Only ROS 2 needs a session. `told` gets what happens to the
+    /// connection with a broker.
     ///
     /// # Errors
     /// A session that cannot be opened, a hall that ROS 2 cannot name, a broker's name that is none.
@@ -40,13 +42,14 @@ impl Outward {
         site: &Site,
         ros2: Option<Ros2>,
         mqtt: Option<&Mqtt>,
+        told: impl Fn(Event) + Send + 'static,
     ) -> Result<Option<Arc<Self>>, Error> {
         let face = |Ros2 { domain, namespace }| {
             let namespace = if namespace { names::namespace(hall)? } else { String::new() };
             Face::new(&session()?, domain, &namespace, site).map(Mutex::new)
         };
         let face = ros2.map(face).transpose().map_err(|e| e.within("network.ros2"))?;
-        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall)).transpose()?;
+        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall, told)).transpose()?;
         Ok((face.is_some() || sender.is_some()).then(|| Arc::new(Self { face, sender })))
     }
 

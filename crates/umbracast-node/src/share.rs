@@ -1,7 +1,9 @@
 //! What a new node asks for and other nodes answer: the site, the empty hall, the weights of the LSTM.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 use sha2::{Digest, Sha256};
@@ -18,6 +20,10 @@ use crate::hall::Hall;
 
 /// How long an answer may take: the packets of an empty hall are some megabytes.
 const WAIT: Duration = Duration::from_secs(3);
+
+/// How often the end of asking may be asked for, and after how many such looks others are asked again.
+const LOOK: Duration = Duration::from_millis(20);
+const LOOKS: usize = 50;
 
 /// What a node has to give, by the key it is asked for with.
 #[derive(Debug, Clone, Default)]
@@ -118,6 +124,31 @@ pub fn ask_empty(hall: &Hall, site: &Site, own: &[usize]) -> Option<Vec<Vec<Pack
         packets[sensor] = messages::read_sensor_packets(&bytes).filter(|packets| !packets.is_empty())?;
     }
     Some(packets)
+}
+
+/// Asks for the empty hall until somebody has it, and gives its frames to `take`. Ends when `stop` is true.
+pub fn ask_empty_until(
+    hall: Hall,
+    site: Site,
+    own: Vec<usize>,
+    stop: Arc<AtomicBool>,
+    take: impl FnOnce(Vec<Frame>) + Send + 'static,
+) -> JoinHandle<()> {
+    std::thread::spawn(move || {
+        let mut looks = 0_usize;
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(LOOK);
+            looks += 1;
+            if !looks.is_multiple_of(LOOKS) {
+                continue;
+            }
+            let packets = ask_empty(&hall, &site, &own);
+            // Packets of a model that this site has not are none of the empty hall: somebody else's answer may be right.
+            if let Some(frames) = packets.and_then(|packets| empty_frames(&site, &packets).ok()) {
+                return take(frames);
+            }
+        }
+    })
 }
 
 /// The frames of such packets, with each sensor's place in the site.

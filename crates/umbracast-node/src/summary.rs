@@ -33,6 +33,10 @@ pub struct Summary {
     pub leads: bool,
     /// What was skipped since the start.
     pub health: Health,
+    /// Whether it knows the hall without people.
+    pub empty_hall: bool,
+    /// What is not as it should be now, in words.
+    pub troubles: Vec<String>,
     /// The recorder's.
     pub recorded: RecordStatus,
 }

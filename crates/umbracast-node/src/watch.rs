@@ -17,6 +17,7 @@ use umbracast_live::{HostClock, Published, published};
 use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Subscriber;
 
+use crate::front;
 use crate::hall::Hall;
 use crate::worker::Worker;
 
@@ -43,7 +44,8 @@ pub(crate) enum Part {
     Links(ZBytes),
     Tracks(ZBytes),
     Detections(ZBytes),
-    Foreground(ZBytes),
+    /// A front end's message, and the key that it came with.
+    Foreground(String, ZBytes),
 }
 
 /// A frame's parts.
@@ -81,7 +83,10 @@ impl Watch {
             hear("detections", Part::Detections)?,
         ];
         if points {
-            subscribers.push(hear("sensor/*/foreground", Part::Foreground)?);
+            let foregrounds = queue.clone();
+            subscribers.push(hall.hear(&hall.keys().of("sensor/*/foreground"), move |key, bytes| {
+                foregrounds.push(Part::Foreground(key.to_owned(), bytes.clone()));
+            })?);
         }
         let (frames, incomplete) = (Arc::<AtomicU64>::default(), Arc::<AtomicU64>::default());
         let mut gather = Gather {
@@ -151,8 +156,8 @@ impl Gather {
                     self.parts(time_ns).tracks = Some(tracks);
                 }
             }
-            Part::Foreground(bytes) => {
-                let Some(part) = fields::decode::<Foreground>(&bytes.to_bytes()) else { return };
+            Part::Foreground(key, bytes) => {
+                let Some(part) = front::heard(&key, &bytes.to_bytes()) else { return };
                 let known = &mut self.parts(part.time_ns).foreground;
                 if known.iter().all(|other| other.covers != part.covers) {
                     known.push(part);

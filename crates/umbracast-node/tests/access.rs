@@ -1,7 +1,8 @@
 //! Rights: sessions of real users at a real router, over loopback.
 
 use std::fs;
-use std::net::TcpListener;
+use std::io::Read;
+use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -26,11 +27,18 @@ fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
+/// A file that only its owner can read.
+fn secret(file: &Path, text: &str) {
+    fs::write(file, text).unwrap();
+    #[cfg(unix)]
+    fs::set_permissions(file, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
+}
+
 fn door(works: &str) -> Door {
     let folder = tempfile::tempdir().unwrap();
     let users = ["edge", "server", "screen", "radio", "guest"];
     let lines: String = users.iter().map(|user| format!("{user}:{user}-secret\n")).collect();
-    fs::write(folder.path().join("users"), lines).unwrap();
+    secret(&folder.path().join("users"), &lines);
     let endpoint = format!("tcp/127.0.0.1:{}", free_port());
     let table = format!(
         "[network]\nmode = \"router\"\nlisten = [\"{endpoint}\"]\nusers_file = \"users\"\n[network.roles]\n{works}"
@@ -45,7 +53,7 @@ impl Door {
         let file = self.folder.path().join(format!("{:?}", user.map(|(name, _)| name)));
         let mut network = Network { connect: vec![self.endpoint.clone()], ..Network::default() };
         if let Some((name, password)) = user {
-            fs::write(&file, password).unwrap();
+            secret(&file, password);
             (network.user, network.password_file) = (Some(name.to_owned()), Some(file));
         }
         network.visit().ok()
@@ -125,6 +133,76 @@ fn whoever_has_no_credentials_gets_nothing_and_changes_nothing() {
     );
 }
 
+#[test]
+fn a_front_end_of_one_sensor_neither_sends_for_another_nor_answers_for_the_empty_hall() {
+    let door = door(&WORKS.replace("edge = \"sensor\"", "edge = \"lab/sensor:east\""));
+    let [edge, server, screen] = ["edge", "server", "screen"].map(|name| door.user(name));
+    let to_server = listen(&server, "umbracast/lab/sensor/*/foreground");
+    assert!(comes(&edge, "umbracast/lab/sensor/east/foreground", &to_server, SOON), "its own");
+    assert!(!comes(&edge, "umbracast/lab/sensor/west/foreground", &to_server, NEVER), "another's");
+
+    let key = "umbracast/lab/config/background/east";
+    let answer = |session: &Session, word: &'static str| {
+        let each = move |query: zenoh::query::Query| {
+            let _ = query.reply(key, word).wait(); // Who asked may be gone.
+        };
+        session.declare_queryable(key).callback(each).background().wait().unwrap();
+    };
+    answer(&edge, "forged");
+    answer(&server, "true");
+    let asked = |session: &Session| -> Vec<String> {
+        let replies = session.get(key).target(zenoh::query::QueryTarget::All).timeout(NEVER).wait().unwrap();
+        let word = |reply: zenoh::query::Reply| {
+            reply.result().unwrap().payload().try_to_string().unwrap().into_owned()
+        };
+        replies.into_iter().map(word).collect()
+    };
+    let first = (0..20).map(|_| asked(&screen)).find(|words| !words.is_empty());
+    assert_eq!(first.unwrap_or_default(), ["true"], "the router may need a moment to know who answers");
+    (0..5).for_each(|_| assert_eq!(asked(&screen), ["true"]));
+}
+
+/// So many connections that say nothing.
+fn idle(endpoint: &str, count: usize) -> Vec<TcpStream> {
+    let address = endpoint.split_once('/').unwrap().1;
+    (0..count).map(|_| TcpStream::connect(address).unwrap()).collect()
+}
+
+/// More than Zenoh lets wait by itself.
+const IDLE: usize = 150;
+
+#[test]
+fn connections_that_say_nothing_keep_nobody_out() {
+    let door = door(WORKS);
+    let _idle = idle(&door.endpoint, IDLE);
+    door.user("edge");
+}
+
+#[test]
+fn connections_that_say_nothing_to_tls_keep_nobody_out_when_they_are_sent_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let ours = authority();
+    fs::write(folder.path().join("ca.pem"), ours.pem()).unwrap();
+    ["door", "edge"].iter().for_each(|name| certify(folder.path(), name, &ours));
+    let endpoint = format!("tls/localhost:{}", free_port());
+    let table = format!(
+        "[network]\nmode = \"router\"\nlisten = [\"{endpoint}\"]\n\
+         tls = {{ ca = \"ca.pem\", certificate = \"door.pem\", key = \"door.key\", both = true }}\n\
+         [network.roles]\nedge = \"sensor\"\n"
+    );
+    let network = Network::of_site_file(&table, &folder.path().join("site.toml")).unwrap();
+    let _door = network.open().unwrap();
+    let mut idle = idle(&endpoint, IDLE);
+    // Zenoh rests after each that it sends away: by itself, for a tenth of a second.
+    idle[0].set_read_timeout(Some(SOON)).unwrap();
+    assert_eq!(idle[0].read(&mut [0]).unwrap(), 0, "it is sent away");
+    let file = |end: &str| Some(folder.path().join(format!("edge.{end}")));
+    let tls =
+        Tls { ca: folder.path().join("ca.pem"), certificate: file("pem"), key: file("key"), both: true };
+    let edge = Network { connect: vec![endpoint], tls: Some(tls), ..Network::default() };
+    assert!(edge.visit().is_ok(), "it calls for three seconds");
+}
+
 /// A certificate of `name`, signed by the authority, as files NAME.pem and NAME.key.
 fn certify(folder: &Path, name: &str, authority: &rcgen::CertifiedIssuer<'_, rcgen::KeyPair>) {
     let key = rcgen::KeyPair::generate().unwrap();
@@ -132,7 +210,7 @@ fn certify(folder: &Path, name: &str, authority: &rcgen::CertifiedIssuer<'_, rcg
     parameters.distinguished_name.push(rcgen::DnType::CommonName, name);
     let certificate = parameters.signed_by(&key, authority).unwrap();
     fs::write(folder.join(format!("{name}.pem")), certificate.pem()).unwrap();
-    fs::write(folder.join(format!("{name}.key")), key.serialize_pem()).unwrap();
+    secret(&folder.join(format!("{name}.key")), &key.serialize_pem());
 }
 
 fn authority() -> rcgen::CertifiedIssuer<'static, rcgen::KeyPair> {

@@ -66,6 +66,14 @@ pub enum Command {
     /// List the halls of a network with their nodes, load and faults.
     #[cfg(feature = "node")]
     Fleet(Fleet),
+    /// Not in this build.
+    #[cfg(not(feature = "node"))]
+    #[command(hide = true)]
+    Node(NotBuilt),
+    /// Not in this build.
+    #[cfg(not(feature = "node"))]
+    #[command(hide = true)]
+    Fleet(NotBuilt),
     /// Listen to the sensors of a site and report their faults, before the first person comes.
     Check(Check),
     /// Find the poses and clocks of a site's sensors from a recording of walking people.
@@ -101,6 +109,15 @@ impl Default for Command {
             out: PathBuf::from("report"),
         })
     }
+}
+
+/// Arguments of a command that this build has not.
+#[cfg(not(feature = "node"))]
+#[derive(Debug, Args)]
+#[command(disable_help_flag = true)]
+pub struct NotBuilt {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    pub arguments: Vec<String>,
 }
 
 /// Where everything stands.

@@ -1,5 +1,6 @@
 //! Arguments of a node.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -32,6 +33,9 @@ pub struct Node {
     /// Endpoints to connect to, in place of the site file's. Default: the loopback network of this host.
     #[arg(long, value_name = "ENDPOINT", value_delimiter = ',')]
     pub connect: Vec<String>,
+    /// Let anybody who reaches this node's endpoints connect, for a private network; `anyone = true` of the site file.
+    #[arg(long)]
+    pub anyone: bool,
     /// The method: hdl, paper or default.
     #[arg(long, default_value = "default")]
     pub mode: Mode,
@@ -54,8 +58,8 @@ pub struct Node {
     /// Play this many times faster than recorded.
     #[arg(long, default_value_t = 1.0, value_name = "X", requires = "from", value_parser = positive)]
     pub rate: f64,
-    /// The hall without people: a recording or captures. A front end without it asks the other nodes. If no node has
-    /// it, the background is learned while running.
+    /// The hall without people: a recording or captures. A front end without it asks the other nodes until one has it,
+    /// and learns the background meanwhile.
     #[arg(long, value_name = "PATH")]
     pub empty: Option<PathBuf>,
     /// Weights of the LSTM in place of the embedded ones. A forecast node without them asks the other nodes.
@@ -65,6 +69,10 @@ pub struct Node {
     pub page: PageArgs,
     #[command(flatten)]
     pub record: RecordArgs,
+    /// Answer HTTP at this address with 200 while the node lives, for the probes of a cluster. (A service of systemd needs
+    /// none: the node tells systemd by itself.)
+    #[arg(long, value_name = "HOST:PORT")]
+    pub probe: Option<SocketAddr>,
     /// End after this many seconds. Default: run until a signal comes.
     #[arg(long, value_name = "S", value_parser = positive)]
     pub seconds: Option<f64>,

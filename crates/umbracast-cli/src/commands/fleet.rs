@@ -11,7 +11,7 @@ use crate::args::{self, Common};
 use crate::ending::Ending;
 use crate::{say, setup};
 
-/// Lists every hall with its nodes. Something is wrong where one of them says so, or says nothing.
+/// Lists every hall with its nodes, and what is wrong with each.
 pub fn run(args: &args::Fleet, common: &Common) -> Result<Ending, Error> {
     let mut network = match &args.site.site {
         Some(path) => Network::of_site_file(&setup::read_text(path)?, path)?,
@@ -29,7 +29,6 @@ pub fn run(args: &args::Fleet, common: &Common) -> Result<Ending, Error> {
         true => say::line(format_args!("{:#}", fleet::json(&halls))),
         false => say::line(fleet::text(&halls).trim_end()),
     }
-    let is_well = |hall: &fleet::Hall| hall.nodes.values().all(|node| node.troubles(hall.site()).is_empty());
-    let well = halls.values().any(|hall| !hall.nodes.is_empty()) && halls.values().all(is_well);
+    let well = halls.values().any(|hall| !hall.nodes.is_empty()) && halls.values().all(fleet::Hall::is_well);
     Ok(if well { Ending::Done } else { Ending::Wrong })
 }

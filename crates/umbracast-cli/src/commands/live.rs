@@ -51,7 +51,9 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     };
     let title = if args.demo { format!("{}, simulated", config.site.name) } else { config.site.name.clone() };
     let page = Page::open(&args.page, &config.site, &counters, clock, &title)?;
-    let outward = Outward::of_site_file(args.site.site.as_deref(), &config.site)?;
+    let (form, quiet) = log_of(args, common);
+    let told = say::events(form, quiet, clock);
+    let outward = Outward::of_site_file(args.site.site.as_deref(), &config.site, told)?;
     let live = Live::start(settings, outward.beside(page.listener()))?;
     for (sensor, address) in config.site.sensors.iter().zip(live.receivers().bound()) {
         say::line(format_args!("{}: UDP port {}", sensor.name, address.port()));
@@ -107,6 +109,14 @@ fn reload(args: &args::Live, config: &mut Config, live: &Live, page: &Page, outw
     )
 }
 
+/// The log's form, and whether nobody reads it: whoever asks for JSON does.
+fn log_of(args: &args::Live, common: &Common) -> (Form, bool) {
+    match args.log {
+        LogForm::Json => (Form::Json, false),
+        LogForm::Text => (Form::Text, common.quiet),
+    }
+}
+
 /// What happens, told on stderr.
 struct Events {
     watch: Watch,
@@ -118,9 +128,7 @@ struct Events {
 
 impl Events {
     fn new(args: &args::Live, common: &Common, clock: HostClock, sensors: Vec<String>) -> Self {
-        let form = if args.log == LogForm::Json { Form::Json } else { Form::Text };
-        // Who asks for JSON has somebody who reads it.
-        let quiet = common.quiet && form == Form::Text;
+        let (form, quiet) = log_of(args, common);
         Self { watch: Watch::new(sensors), log: Log::new(form), clock, looked_ns: clock.now_ns(), quiet }
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -12,10 +12,12 @@ use umbracast::lidar::Packet;
 use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_live::HostClock;
 use umbracast_live::Published;
+use umbracast_live::log::Form;
 use umbracast_live::receive::{Arrived, Door};
 use umbracast_live::run::{Counters, Listener};
 use umbracast_node::hall::Hall;
 use umbracast_node::keys::Keys;
+use umbracast_node::meet::{self, Unanswered};
 use umbracast_node::network::{self, Mode, Network};
 use umbracast_node::role::Role;
 use umbracast_node::share::{self, Shared};
@@ -23,6 +25,7 @@ use umbracast_node::summary::Summary;
 use umbracast_node::{Node, Settings, Source};
 
 use super::live;
+use crate::alive::Alive;
 use crate::args::{self, Common};
 use crate::ending::Ending;
 use crate::input::{self, Input};
@@ -35,6 +38,10 @@ use crate::{say, setup, signal};
 const TICK: Duration = Duration::from_millis(20);
 /// How often the others are told how it goes.
 const TELL_S: f64 = 1.0;
+/// How often it is said that the empty hall is missing.
+const REMIND_S: f64 = 60.0;
+const EMPTY_HALL_MISSING: &str = "no node has the empty hall yet: the background is learned while running, and the others are asked \
+                                  every second";
 /// Packets that are read ahead.
 const AHEAD: usize = 4096;
 /// What a process may do; the other roles are those of other programs.
@@ -56,8 +63,14 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
         (None, Some(config)) => network.hall(&config.site)?,
         (None, None) => network.hall(&Config::for_mode(args.mode).site)?,
     };
-    let hall = Hall::new(network.open()?, Keys::new(&name));
-    let Some(config) = config(args, given, &hall, &asked)? else { return Ok(Ending::Done) };
+    let alive = Alive::open(args.probe, clock)?;
+    let ends = || {
+        alive.beat();
+        asked.load(Ordering::Relaxed)
+    };
+    let Some(session) = meet::open(&network, ends, say::note)? else { return Ok(Ending::Done) };
+    let hall = Hall::new(session, Keys::new(&name));
+    let Some(config) = config(args, given, &hall, ends)? else { return Ok(Ending::Done) };
     let sensors = sensors(args, &config.site)?;
     let shared = Shared::default().with_config(&hall, &config);
     let (empty, shared) = empty(args, &config, &sensors, &stages, &hall, shared)?;
@@ -69,7 +82,10 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     };
     let session = hall.session().clone();
     let outward = match stages.contains(&Role::Serve) {
-        true => Outward::of_network(&network, || Ok(session), &name, &config.site)?,
+        true => {
+            let told = say::events(Form::Text, common.quiet, clock);
+            Outward::of_network(&network, || Ok(session), &name, &config.site, told)?
+        }
         false => Outward::default(),
     };
     let mut record = live::recorder(&args.record);
@@ -96,17 +112,18 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     }
     let names: Vec<&str> = stages.iter().map(|stage| stage.name()).collect();
     say::line(format_args!("node {} of {name}: ready", names.join(",")));
+    alive.ready();
+    let (mut unanswered, mut empty_hall) = (Unanswered::default(), EmptyHall::of(&node, &stages));
     let watch = Stopwatch::start();
     let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let mut told_s = 0.0;
-    while !asked.load(Ordering::Relaxed)
-        && !node.is_done()
-        && args.seconds.is_none_or(|seconds| watch.seconds() < seconds)
-    {
+    while !ends() && !node.is_done() && args.seconds.is_none_or(|seconds| watch.seconds() < seconds) {
         std::thread::sleep(TICK);
+        unanswered.look(&network, meet::calls(&network) && meet::is_alone(node.hall().session()), say::note);
         if watch.seconds() - told_s >= TELL_S {
             told_s += TELL_S;
             node.tell_health(host.trim());
+            empty_hall.look(&node, watch.seconds());
         }
         if !node.is_well() {
             node.stop();
@@ -152,6 +169,7 @@ fn network(args: &args::Node) -> Result<Network, Error> {
     if !args.connect.is_empty() {
         network.connect.clone_from(&args.connect);
     }
+    network.anyone |= args.anyone;
     Ok(network)
 }
 
@@ -160,7 +178,7 @@ fn config(
     args: &args::Node,
     given: Option<Config>,
     hall: &Hall,
-    asked: &AtomicBool,
+    ends: impl Fn() -> bool,
 ) -> Result<Option<Config>, Error> {
     if given.is_some() {
         return Ok(given);
@@ -169,7 +187,7 @@ fn config(
         return Ok(Some(Config::for_mode(args.mode)));
     }
     let mut told = false;
-    while !asked.load(Ordering::Relaxed) {
+    while !ends() {
         if let Some(config) = share::ask_config(hall)? {
             return Ok(Some(config));
         }
@@ -220,9 +238,34 @@ fn empty(
     }
     match share::ask_empty(hall, site, own) {
         Some(packets) => Ok((share::empty_frames(site, &packets)?, shared.with_empty(hall, site, &packets))),
-        None => {
-            say::note("no node has the empty hall: the background is learned while running");
-            Ok((Vec::new(), shared))
+        None => Ok((Vec::new(), shared)),
+    }
+}
+
+/// Says that a front end is without the empty hall, now and again, until it comes.
+struct EmptyHall {
+    /// Whether it is without.
+    missing: bool,
+    said_s: f64,
+}
+
+impl EmptyHall {
+    fn of(node: &Node, stages: &[Role]) -> Self {
+        let missing = stages.contains(&Role::Sensor) && !node.has_empty_hall();
+        if missing {
+            say::note(EMPTY_HALL_MISSING);
+        }
+        Self { missing, said_s: 0.0 }
+    }
+
+    fn look(&mut self, node: &Node, now_s: f64) {
+        if self.missing && node.has_empty_hall() {
+            self.missing = false;
+            say::note("the empty hall came from another node: the background is known from now on");
+        }
+        if self.missing && now_s - self.said_s >= REMIND_S {
+            self.said_s = now_s;
+            say::note(EMPTY_HALL_MISSING);
         }
     }
 }
