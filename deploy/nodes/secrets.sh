@@ -23,5 +23,6 @@ openssl req -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -subj "/CN=router
 printf 'subjectAltName=%s\nbasicConstraints=CA:FALSE\n' "$alternatives" > router.ext
 openssl x509 -req -in router.csr -CA ca.pem -CAkey ca.key -CAcreateserial -days 825 -extfile router.ext -out router.pem 2>/dev/null
 rm -f router.csr router.ext ca.srl
-# The containers run as nobody and read files alone that they are given.
-chmod 644 ./*.txt ./*.pem router.key
+# All of it is for its owner alone, also what an earlier run left. Containers of Compose run as the owner, those of Kubernetes get
+# copies that their group may read.
+chmod 600 ./*
