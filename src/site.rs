@@ -62,6 +62,24 @@ impl Site {
     pub fn ue_m(&self, position_m: DVec2, heading_rad: f64, height_m: f64) -> DVec3 {
         self.ue.on_body(position_m, heading_rad, height_m) + DVec3::Z * self.hall.floor_m(position_m)
     }
+
+    /// Whether any access point has a radio, so that links have losses.
+    ///
+    /// ```
+    /// assert!(!umbracast::Config::default().site.has_radio());
+    /// ```
+    pub fn has_radio(&self) -> bool {
+        self.access_points.iter().any(|ap| ap.radio.is_some())
+    }
+
+    /// Whether devices are advised as well: the site says what changes cost.
+    ///
+    /// ```
+    /// assert!(!umbracast::Config::default().site.has_decisions());
+    /// ```
+    pub fn has_decisions(&self) -> bool {
+        self.has_radio() && self.handover.is_some()
+    }
 }
 
 /// A round pillar.

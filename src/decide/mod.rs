@@ -46,9 +46,10 @@ pub struct Decision {
 /// ```
 /// assert_eq!(umbracast::decide::Action::HandOver.name(), "hand-over");
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Action {
     /// Nothing comes that a change would help against.
+    #[default]
     Stay,
     /// The link is out, or about to be, for so short a time that it is best to sit it out: recovery timers should be held.
     Wait,
@@ -59,6 +60,9 @@ pub enum Action {
 }
 
 impl Action {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Stay, Self::Wait, Self::HandOver, Self::Prepare];
+
     /// As tables and messages write it.
     pub fn name(self) -> &'static str {
         match self {

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
-use umbracast_io::rows::TrackRow;
-use umbracast_io::wire;
+use umbracast_io::rows::{DecisionRow, LossRow, TrackRow};
+use umbracast_io::wire::{self, WireRow};
 
 mod common;
 #[path = "common/command.rs"]
@@ -23,6 +23,11 @@ use common::folder;
 const CROSSING: &str = "t_s,id,x_m,y_m,height_m\n\
     0.0,1,6.0,-2.0,1.80\n1.0,1,6.0,-0.7,1.80\n2.0,1,6.0,0.6,1.80\n3.0,1,6.0,1.9,1.80\n\
     0.0,2,1.0,0.3,1.70\n1.0,2,0.0,0.3,1.70\n2.0,2,-1.0,0.3,1.70\n3.0,2,-2.0,0.3,1.70\n";
+
+/// The access points of the default site, with radios.
+const RADIO: &str = "[[site.access_points]]\nname = \"side\"\nposition_m = [14.0, 0.0, 2.0]\nradio = {}\n\
+    [[site.access_points]]\nname = \"centre\"\nposition_m = [0.0, 0.0, 3.0]\nradio = { carrier_ghz = 60.0 }\n\
+    [site.handover]\nprocedure = \"nr-ltm\"\n";
 
 /// A node that runs until it is asked to end.
 struct Node {
@@ -89,11 +94,16 @@ struct Hall {
 
 impl Hall {
     fn new(name: &str) -> Self {
+        Self::with(name, "")
+    }
+
+    /// A hall whose site file says this besides.
+    fn with(name: &str, besides: &str) -> Self {
         let folder = folder(name);
         let port = TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).expect("a port").port();
         let site = text(&folder.join("hall.toml"));
         // A busy machine is late: no frame goes on without a front end.
-        fs::write(&site, format!("[network]\nhall = \"{name}\"\nwait_s = 5.0\n")).expect("writes");
+        fs::write(&site, format!("{besides}[network]\nhall = \"{name}\"\nwait_s = 5.0\n")).expect("writes");
         Self { folder, site, meet: format!("tcp/127.0.0.1:{port}") }
     }
 
@@ -124,7 +134,7 @@ fn simulated(hall: &Hall, run: &[&str]) -> (String, String, BTreeMap<String, Vec
     let (sim, out) = (hall.path("sim"), hall.path("one"));
     let walk = hall.path("crossing.csv");
     fs::write(&walk, CROSSING).expect("writes");
-    done(&["simulate", "--trajectories", &walk, "--seed", "7", "--out", &sim]);
+    done(&["simulate", "--trajectories", &walk, "--seed", "7", "--site", &hall.site, "--out", &sim]);
     let (scene, empty) = (format!("{sim}/scene-0000.mcap"), format!("{sim}/empty.mcap"));
     done(&[&["run", &scene, "--out", &out, "--mcap", "--points"][..], run].concat());
     (scene, empty, results_in(&Path::new(&out).join("results-0000.mcap")))
@@ -141,8 +151,12 @@ fn assert_same(found: &BTreeMap<String, Vec<Vec<u8>>>, expected: &BTreeMap<Strin
 
 #[test]
 fn two_front_ends_a_tracker_and_a_caster_give_what_one_process_gives_to_the_byte() {
-    let hall = Hall::new("nodes-empty");
+    let hall = Hall::with("nodes-empty", RADIO);
     let (scene, empty, expected) = simulated(&hall, &[]);
+    for topic in [LossRow::TOPIC, DecisionRow::TOPIC] {
+        let longest = expected[topic].iter().map(Vec::len).max();
+        assert!(longest > expected[topic].first().map(Vec::len), "{topic}: nothing is told");
+    }
     let track = hall.first(&["track,forecast", "--empty", &empty]);
     // One node is given no site: it asks for it.
     let cast = Node::start(&["cast", "--hall", "nodes-empty", "--connect", &hall.meet]);

@@ -4,7 +4,7 @@ use umbracast::Site;
 use umbracast::detect::Point;
 
 use crate::messages::{self, Schema};
-use crate::rows::{DetectionRow, LinkRow, TrackRow};
+use crate::rows::{DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use crate::viewers;
 use crate::wire::{self, WireRow};
 
@@ -23,6 +23,10 @@ pub struct Results<'a> {
     pub tracks: &'a [TrackRow],
     /// Every link.
     pub links: &'a [LinkRow],
+    /// What each of them loses; sent where the site has a radio.
+    pub losses: &'a [LossRow],
+    /// What to do about each device; sent where the site says what changes cost.
+    pub decisions: &'a [DecisionRow],
     /// Points that do not belong to the empty scene; none where nobody asked for them.
     pub foreground: Option<&'a [Point]>,
 }
@@ -41,8 +45,8 @@ pub struct Message {
     pub bytes: Vec<u8>,
 }
 
-/// The topics of [`Results::messages`] that every frame has, with their types.
-pub const TOPICS: [(&str, SchemaOf); 6] = [
+/// The topics of [`Results::messages`] that a frame of every site has, with their types.
+const OF_EVERY_SITE: [(&str, SchemaOf); 6] = [
     (DetectionRow::TOPIC, wire::schema::<DetectionRow>),
     (TrackRow::TOPIC, wire::schema::<TrackRow>),
     (LinkRow::TOPIC, wire::schema::<LinkRow>),
@@ -51,10 +55,19 @@ pub const TOPICS: [(&str, SchemaOf); 6] = [
     (viewers::PEOPLE_TOPIC, viewers::people_schema),
 ];
 
+/// The topics of [`Results::messages`] that every frame of this site has, with their types.
+pub fn topics(site: &Site) -> Vec<(&'static str, SchemaOf)> {
+    let losses = (LossRow::TOPIC, wire::schema::<LossRow> as SchemaOf);
+    let decisions = (DecisionRow::TOPIC, wire::schema::<DecisionRow> as SchemaOf);
+    let of_radio = [(site.has_radio(), losses), (site.has_decisions(), decisions)];
+    let asked_for = of_radio.into_iter().filter_map(|(has, topic)| has.then_some(topic));
+    OF_EVERY_SITE.into_iter().chain(asked_for).collect()
+}
+
 impl Results<'_> {
-    /// The frame's messages in the order of [`TOPICS`], and the foreground behind them where somebody asked for it.
+    /// The frame's messages in the order of [`topics`], and the foreground behind them where somebody asked for it.
     pub fn messages(&self, site: &Site) -> Vec<Message> {
-        let &Results { frame, time_ns, detections, tracks, links, foreground, .. } = self;
+        let &Results { frame, time_ns, detections, tracks, links, losses, decisions, foreground, .. } = self;
         let access_points: Vec<String> = site.access_points.iter().map(|ap| ap.name.clone()).collect();
         let every = [
             wire::encode(time_ns, frame, detections, &access_points),
@@ -65,8 +78,12 @@ impl Results<'_> {
             viewers::markers(time_ns, site, tracks, links),
             viewers::people(time_ns, tracks),
         ];
-        let every =
-            TOPICS.into_iter().zip(every).map(|((topic, schema), bytes)| Message { topic, schema, bytes });
+        let losses = site.has_radio().then(|| wire::encode(time_ns, frame, losses, &access_points));
+        let decisions = site.has_decisions().then(|| wire::encode(time_ns, frame, decisions, &access_points));
+        let every = topics(site)
+            .into_iter()
+            .zip(every.into_iter().chain(losses).chain(decisions))
+            .map(|((topic, schema), bytes)| Message { topic, schema, bytes });
         let points = foreground.map(|points| Message {
             topic: viewers::FOREGROUND_TOPIC,
             schema: || messages::CLOUD,

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 use umbracast::blockage::Chance;
+use umbracast::decide::Action;
 use umbracast::detect::Detection;
 use umbracast::geometry::{Aabb, Obb};
 use umbracast::track::Track;
@@ -131,6 +132,44 @@ pub struct LinkRow {
     pub p_any: [Option<f64>; 1 + STEPS],
 }
 
+/// Our answer: what one link loses to bodies in one frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LossRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    pub access_point: u32,
+    pub track: u64,
+    /// 10, 50 and 90 % quantiles of the loss now, then at steps 1..=9.
+    pub loss_db: [[f64; 3]; 1 + STEPS],
+    /// Probability that the loss is the margin or more: now, then at any step of windows 1..=9.
+    pub p_out: [f64; 1 + STEPS],
+    /// 10, 50 and 90 % quantiles of the time until the link is out; null where it is now or not within the steps.
+    pub out_onset_s: [Option<f64>; 3],
+    /// The same of the time until it is not out any more; null where that is not within the steps.
+    pub out_duration_s: [Option<f64>; 3],
+}
+
+/// Our answer: what to do about one device in one frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct DecisionRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    pub track: u64,
+    /// The access point that serves the device.
+    pub serving: u32,
+    pub action: Action,
+    /// Where a change goes to, or one that is prepared; null otherwise.
+    pub target: Option<u32>,
+    /// Until when a command must have been sent, from the frame's instant; null where nothing comes.
+    pub deadline_s: Option<f64>,
+    /// Less time in outage than without the action, as expected within the steps.
+    pub saved_s: f64,
+    /// Probability that the serving link is out now or within the steps.
+    pub p_out: f64,
+}
+
 /// The rows of one outcome.
 pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, links: &mut Vec<LinkRow>) {
     tracks.reserve(outcome.tracks.len());
@@ -158,6 +197,41 @@ pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, lin
 
 fn of_chance(chance: Option<Chance>) -> [Option<f64>; 1 + STEPS] {
     std::array::from_fn(|w| chance.map(|of| w.checked_sub(1).map_or(of.p_now, |w| of.p[w])))
+}
+
+/// The losses of one outcome.
+pub fn losses(scene: u32, outcome: &Outcome) -> impl Iterator<Item = LossRow> + '_ {
+    outcome.losses.iter().map(move |loss| LossRow {
+        scene,
+        frame: outcome.frame,
+        time_ns: outcome.time_ns,
+        access_point: loss.access_point as u32,
+        track: loss.track,
+        loss_db: with_now(loss.now_db, loss.steps_db),
+        p_out: with_now(loss.p_out_now, loss.p_out),
+        out_onset_s: loss.onset_s,
+        out_duration_s: loss.duration_s,
+    })
+}
+
+/// The decisions of one outcome.
+pub fn decisions(scene: u32, outcome: &Outcome) -> impl Iterator<Item = DecisionRow> + '_ {
+    outcome.decisions.iter().map(move |decision| DecisionRow {
+        scene,
+        frame: outcome.frame,
+        time_ns: outcome.time_ns,
+        track: decision.track,
+        serving: decision.serving as u32,
+        action: decision.action,
+        target: decision.target.map(|target| target as u32),
+        deadline_s: decision.deadline_s,
+        saved_s: decision.saved_s,
+        p_out: decision.p_out,
+    })
+}
+
+fn with_now<T: Copy>(now: T, steps: [T; STEPS]) -> [T; 1 + STEPS] {
+    std::array::from_fn(|step| step.checked_sub(1).map_or(now, |step| steps[step]))
 }
 
 /// The detections of one outcome.

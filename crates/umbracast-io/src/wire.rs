@@ -6,10 +6,11 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value};
+use umbracast::decide::Action;
 
 use crate::cdr::{Decoder, Encoder};
 use crate::messages::{HEADER_DEFINITIONS, Schema};
-use crate::rows::{DetectionRow, LinkRow, TrackRow};
+use crate::rows::{DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use crate::tables::{Cell, Row};
 
 /// The columns that the message says once for all of its rows.
@@ -50,6 +51,21 @@ impl WireRow for LinkRow {
     const TOPIC: &'static str = "/umbracast/blockages";
 }
 
+impl WireRow for LossRow {
+    const ONE: &'static str = "Loss";
+    const MANY: &'static str = "Losses";
+    const WHAT: &'static str =
+        "What every link loses to bodies at the end of a frame and in the next 900 ms, in dB.";
+    const TOPIC: &'static str = "/umbracast/losses";
+}
+
+impl WireRow for DecisionRow {
+    const ONE: &'static str = "Decision";
+    const MANY: &'static str = "Decisions";
+    const WHAT: &'static str = "What to do about the link of every device, at the end of a frame.";
+    const TOPIC: &'static str = "/umbracast/decisions";
+}
+
 /// The fields of one row, in the words of ROS 2.
 pub fn fields<R: WireRow>() -> String {
     let mut text = String::new();
@@ -61,11 +77,13 @@ pub fn fields<R: WireRow>() -> String {
             Cell::F64(_) | Cell::MaybeF64(_) => "float64",
             Cell::Bool(_) => "bool",
             Cell::MaybeBool(_) => "uint8",
-            Cell::AccessPoint(_) => "string",
+            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_) => "string",
         };
         let remark = match cell {
             Cell::MaybeF64(_) => " # NaN: none",
             Cell::MaybeBool(_) => " # 0 no, 1 yes, 2 unknown",
+            Cell::MaybeAccessPoint(_) => " # empty: none",
+            Cell::Action(_) => " # stay, wait, hand-over or prepare",
             _ => "",
         };
         text.push_str(&format!("{kind} {name}{remark}\n"));
@@ -96,6 +114,7 @@ pub fn schema<R: WireRow>() -> Schema {
 
 /// A frame's message. `access_points` are the site's names, by index.
 pub fn encode<R: WireRow>(time_ns: i64, frame: u64, rows: &[R], access_points: &[String]) -> Vec<u8> {
+    let name_of = |index: u32| access_points.get(index as usize).map_or("", String::as_str);
     let mut e = Encoder::default();
     e.header(time_ns, "site");
     e.u64(frame);
@@ -109,7 +128,9 @@ pub fn encode<R: WireRow>(time_ns: i64, frame: u64, rows: &[R], access_points: &
             Cell::Bool(v) => e.bool(*v),
             Cell::MaybeBool(v) => e.u8(v.map_or(2, u8::from)),
             Cell::MaybeF64(v) => e.f64(v.unwrap_or(f64::NAN)),
-            Cell::AccessPoint(v) => e.string(access_points.get(*v as usize).map_or("", String::as_str)),
+            Cell::AccessPoint(v) => e.string(name_of(*v)),
+            Cell::MaybeAccessPoint(v) => e.string(v.map_or("", name_of)),
+            Cell::Action(v) => e.string(v.name()),
         });
     }
     e.finish()
@@ -122,6 +143,8 @@ pub fn decode<R: WireRow>(bytes: &[u8], access_points: &[String]) -> Option<(u64
     d.string()?;
     let frame = d.u64()?;
     let count = d.u32()?;
+    let index_of =
+        |name: &str| access_points.iter().position(|known| known == name).map(|index| index as u32);
     let mut rows = Vec::new();
     for _ in 0..count {
         let mut row = R::default();
@@ -140,10 +163,14 @@ pub fn decode<R: WireRow>(bytes: &[u8], access_points: &[String]) -> Option<(u64
                     set(v, d.u8().map(|v| [Some(false), Some(true), None][usize::from(v.min(2))]))
                 }
                 (_, Cell::MaybeF64(v)) => set(v, d.f64().map(|v| (!v.is_nan()).then_some(v))),
-                (_, Cell::AccessPoint(v)) => {
-                    let index =
-                        d.string().and_then(|name| access_points.iter().position(|known| known == name));
-                    set(v, index.map(|index| index as u32))
+                (_, Cell::AccessPoint(v)) => set(v, d.string().and_then(index_of)),
+                (_, Cell::MaybeAccessPoint(v)) => match d.string() {
+                    Some("") => set(v, Some(None)),
+                    name => set(v, name.and_then(index_of).map(Some)),
+                },
+                (_, Cell::Action(v)) => {
+                    let name = d.string();
+                    set(v, Action::ALL.into_iter().find(|action| Some(action.name()) == name))
                 }
             };
         });
@@ -185,6 +212,10 @@ impl<R: WireRow> Serialize for JsonRow<'_, R> {
                 Cell::MaybeBool(v) => object.serialize_entry(name, v),
                 Cell::MaybeF64(v) => object.serialize_entry(name, v),
                 Cell::AccessPoint(v) => object.serialize_entry(name, &access_points.get(*v as usize)),
+                Cell::MaybeAccessPoint(v) => {
+                    object.serialize_entry(name, &v.and_then(|v| access_points.get(v as usize)))
+                }
+                Cell::Action(v) => object.serialize_entry(name, v.name()),
             };
         });
         written?;
@@ -201,9 +232,14 @@ pub fn json_schema<R: WireRow>() -> Value {
             Cell::F64(_) | Cell::MaybeF64(_) => vec!["number", "null"].into(),
             Cell::Bool(_) => "boolean".into(),
             Cell::MaybeBool(_) => vec!["boolean", "null"].into(),
-            Cell::AccessPoint(_) => "string".into(),
+            Cell::AccessPoint(_) | Cell::Action(_) => "string".into(),
+            Cell::MaybeAccessPoint(_) => vec!["string", "null"].into(),
         };
-        properties.insert(name.to_string(), serde_json::json!({ "type": kind }));
+        let mut schema = serde_json::json!({ "type": kind });
+        if let Cell::Action(_) = cell {
+            schema["enum"] = serde_json::json!(Action::ALL.map(Action::name));
+        }
+        properties.insert(name.to_string(), schema);
     });
     let required: Vec<&String> = properties.keys().collect();
     serde_json::json!({ "title": R::ONE, "type": "object", "required": required, "properties": properties })
@@ -264,6 +300,18 @@ mod tests {
     fn an_access_point_that_the_site_has_not_is_no_message_of_it() {
         let bytes = encode(0, 0, &[link()], &access_points());
         assert!(decode::<LinkRow>(&bytes, &["door".to_owned()]).is_none());
+    }
+
+    #[test]
+    fn a_decision_names_its_action_and_its_target_or_none() {
+        let wait = DecisionRow { track: 3, serving: 1, action: Action::Wait, ..DecisionRow::default() };
+        let leave = DecisionRow { action: Action::HandOver, target: Some(0), deadline_s: Some(0.2), ..wait };
+        let bytes = encode(0, 0, &[wait, leave], &access_points());
+        assert_eq!(decode(&bytes, &access_points()), Some((0, 0, vec![wait, leave])));
+        let value = serde_json::to_value(Json(&[wait, leave], &access_points())).unwrap();
+        assert_eq!((&value[0]["action"], &value[0]["target"]), (&"wait".into(), &Value::Null));
+        assert_eq!((&value[1]["action"], &value[1]["target"]), (&"hand-over".into(), &"side".into()));
+        assert_eq!(json_schema::<DecisionRow>()["properties"]["action"]["enum"][2], "hand-over");
     }
 
     #[test]

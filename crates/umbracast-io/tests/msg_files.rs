@@ -7,14 +7,20 @@ use std::path::Path;
 
 use umbracast_io::messages::{self, Schema};
 use umbracast_io::nodes;
-use umbracast_io::rows::{DetectionRow, LinkRow, TrackRow};
+use umbracast_io::rows::{DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use umbracast_io::wire;
 
 const OURS: &str = "umbracast_msgs/";
 
 /// The definition of each of our types, by name.
 fn definitions() -> BTreeMap<String, String> {
-    let rows = [wire::schema::<DetectionRow>(), wire::schema::<TrackRow>(), wire::schema::<LinkRow>()];
+    let rows = [
+        wire::schema::<DetectionRow>(),
+        wire::schema::<TrackRow>(),
+        wire::schema::<LinkRow>(),
+        wire::schema::<LossRow>(),
+        wire::schema::<DecisionRow>(),
+    ];
     let rest = [messages::PEOPLE, messages::LINKS, messages::SENSOR_PACKETS];
     rows.into_iter().chain(rest).chain(nodes::schemas()).flat_map(|schema| parts(&schema)).collect()
 }

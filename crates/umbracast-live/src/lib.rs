@@ -14,6 +14,7 @@ pub mod clock;
 pub mod queue;
 pub mod latency;
 pub mod warnings;
+pub mod advice;
 pub mod receive;
 pub mod published;
 pub mod record;

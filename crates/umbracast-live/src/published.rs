@@ -8,9 +8,10 @@ use serde_json::Value;
 use umbracast::detect::Point;
 use umbracast::{Frame, Health, Outcome, Site};
 use umbracast_io::results::Results;
-use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
+use umbracast_io::rows::{self, DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use umbracast_io::wire::Json;
 
+use crate::advice::Advice;
 use crate::warnings::Event;
 
 /// Points beyond this are drawn by nobody: every n-th is kept.
@@ -35,8 +36,14 @@ pub struct Published {
     pub tracks: Vec<TrackRow>,
     /// Every link.
     pub links: Vec<LinkRow>,
+    /// What each of them loses; empty where no access point has a radio.
+    pub losses: Vec<LossRow>,
+    /// What to do about each device; empty where the site does not say what changes cost.
+    pub decisions: Vec<DecisionRow>,
     /// What changed of the links.
     pub events: Vec<Event>,
+    /// What changed of the decisions.
+    pub advice: Vec<Advice>,
     /// New points, site frame, centimetres.
     pub points_cm: Vec<[i32; 3]>,
     /// All of them as they are, where they are recorded.
@@ -64,6 +71,8 @@ impl Published {
             detections: rows::detections(0, outcome).collect(),
             tracks,
             links,
+            losses: rows::losses(0, outcome).collect(),
+            decisions: rows::decisions(0, outcome).collect(),
             points_cm: points_cm(&outcome.foreground),
             health: outcome.health,
             sensors: (0..sensors).map(|s| frame.scans.iter().any(|scan| scan.sensor == s)).collect(),
@@ -81,6 +90,8 @@ impl Published {
             detections: &self.detections,
             tracks: &self.tracks,
             links: &self.links,
+            losses: &self.losses,
+            decisions: &self.decisions,
             foreground: self.foreground.as_deref(),
         }
     }
@@ -101,7 +112,9 @@ impl Published {
             health: &self.health,
             tracks: Json(&self.tracks, &self.access_points),
             blockages: Json(&self.links, &self.access_points),
-            events: self.events.iter().map(Event::json).collect(),
+            losses: (!self.losses.is_empty()).then(|| Json(&self.losses, &self.access_points)),
+            decisions: (!self.decisions.is_empty()).then(|| Json(&self.decisions, &self.access_points)),
+            events: self.events.iter().map(Event::json).chain(self.advice.iter().map(Advice::json)).collect(),
             points_cm: with_points.then(|| self.points_cm.as_flattened()),
         }
     }
@@ -122,6 +135,10 @@ struct FrameJson<'a> {
     health: &'a Health,
     tracks: Json<'a, TrackRow>,
     blockages: Json<'a, LinkRow>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    losses: Option<Json<'a, LossRow>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    decisions: Option<Json<'a, DecisionRow>>,
     events: Vec<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     points_cm: Option<&'a [i32]>,

@@ -9,6 +9,7 @@ use umbracast::forecast::Weights;
 use umbracast::lidar::Assembler;
 use umbracast::{Config, Error, Frame, Health, Pipeline};
 
+use crate::advice::Advised;
 use crate::clock::HostClock;
 use crate::latency::Latencies;
 use crate::published::{self, Published};
@@ -166,6 +167,7 @@ impl Live {
                 counters,
                 listener,
                 warnings: Warnings::default(),
+                advised: Advised::default(),
                 access_points: published::access_points(&config.site),
                 reloads: 0,
                 next: next.clone(),
@@ -303,6 +305,7 @@ struct Publish {
     counters: Arc<Counters>,
     listener: Listener,
     warnings: Warnings,
+    advised: Advised,
     access_points: Arc<[String]>,
     reloads: u64,
     next: Arc<Mutex<Option<Config>>>,
@@ -323,6 +326,7 @@ fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
         published.reloads = publish.reloads;
         published.events = std::mem::take(&mut publish.left);
         published.events.extend(publish.warnings.changes(&published.links, &publish.access_points));
+        published.advice = publish.advised.changes(&published.decisions, &publish.access_points);
         published.step = Duration::from_nanos((stepped_ns - begun_ns).max(0) as u64);
         published.published_ns = publish.clock.now_ns();
         published.latency = Duration::from_nanos((published.published_ns - arrived_ns).max(0) as u64);
@@ -338,6 +342,7 @@ impl Publish {
         let after = published::access_points(&config.site);
         self.left = self.warnings.rename(&self.access_points, &after);
         self.access_points = after;
+        self.advised = Advised::default(); // Indices may now mean others.
         self.reloads += 1;
         if let Some(recorder) = &self.recorder {
             recorder.take_over(&config);

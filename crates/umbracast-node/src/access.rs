@@ -220,10 +220,15 @@ fn of_role(role: Role) -> (Ends, Ends, Ends, Ends) {
         Role::Forecast => {
             (&["tracks"], &["followed", "state"], &["state"], &["state", "config/site", "config/weights"])
         }
-        Role::Cast => (&["links", "warnings/*"], &["tracks", "state"], &["state"], &["state", "config/site"]),
+        Role::Cast => (
+            &["links", "losses", "decisions", "warnings/*"],
+            &["tracks", "state"],
+            &["state"],
+            &["state", "config/site"],
+        ),
         Role::Record | Role::Serve => (&[], &["**"], &["state"], &[]),
         Role::Display => (&[], &["**"], &[], &[]),
-        Role::Controller => (&[], &["links", "warnings/*"], &[], &[]),
+        Role::Controller => (&[], &["links", "losses", "decisions", "warnings/*"], &[], &[]),
         Role::Router => (&[], &[], &[], &[]), // Of no hall: see above.
     }
 }
@@ -310,6 +315,7 @@ mod tests {
             assert!(!put("screen", &format!("umbracast/lab/{key}")), "{key}");
         }
         assert!(gets("radio", "umbracast/lab/warnings/door") && !gets("radio", "umbracast/lab/tracks"));
+        assert!(gets("radio", "umbracast/lab/decisions") && !put("radio", "umbracast/lab/decisions"));
         assert!(!gets("radio", "umbracast/other/warnings/door"), "another hall");
         assert!(put("server", "umbracast/lab/state") && put("server", "umbracast/lab/warnings/door"));
         assert!(!put("server", "umbracast/lab/tracks"), "no forecast");

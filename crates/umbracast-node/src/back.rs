@@ -161,6 +161,10 @@ struct Outlets {
     detections: Option<Outlet>,
     followed: Option<Outlet>,
     links: Option<Outlet>,
+    /// Where the site has a radio.
+    losses: Option<Outlet>,
+    /// Where it says what changes cost.
+    decisions: Option<Outlet>,
     /// Of each access point.
     warnings: Vec<(String, Outlet)>,
     access_points: Vec<String>,
@@ -185,18 +189,24 @@ impl Outlets {
             detections: outlet(row.track, "detections", Urgency::Rest)?,
             followed: outlet(row.track || row.forecast, tracks, Urgency::Stage)?,
             links: outlet(row.cast, "links", Urgency::Result)?,
+            losses: outlet(row.cast && config.site.has_radio(), "losses", Urgency::Result)?,
+            decisions: outlet(row.cast && config.site.has_decisions(), "decisions", Urgency::Warning)?,
             warnings: warnings.collect::<Result<_, Error>>()?,
             access_points,
             tracker: hall.id(),
         })
     }
 
-    /// Warnings first, then what other stages wait for, then what is looked at.
+    /// Warnings and decisions first, then what other stages wait for, then what is looked at.
     fn put(&self, mut made: Made, leads_since_ns: i64) {
         for warning in &mut made.warnings {
             if let Some((_, outlet)) = self.warnings.iter().find(|(name, _)| *name == warning.access_point) {
                 outlet.put(warning);
             }
+        }
+        let names = &self.access_points;
+        if let (Some(outlet), Some(_)) = (&self.decisions, &made.links) {
+            outlet.put_bytes(wire::encode(made.time_ns, made.frame, &made.decisions, names));
         }
         if let (Some(outlet), Some(followed)) = (&self.followed, &mut made.followed) {
             outlet.put(followed);
@@ -206,10 +216,13 @@ impl Outlets {
             outlet.put(priors);
         }
         if let (Some(outlet), Some(links)) = (&self.links, &made.links) {
-            outlet.put_bytes(wire::encode(made.time_ns, made.frame, links, &self.access_points));
+            outlet.put_bytes(wire::encode(made.time_ns, made.frame, links, names));
+            if let Some(outlet) = &self.losses {
+                outlet.put_bytes(wire::encode(made.time_ns, made.frame, &made.losses, names));
+            }
         }
         if let (Some(outlet), Some(detections)) = (&self.detections, &made.detections) {
-            outlet.put_bytes(wire::encode(made.time_ns, made.frame, detections, &self.access_points));
+            outlet.put_bytes(wire::encode(made.time_ns, made.frame, detections, names));
         }
     }
 }

@@ -2,13 +2,15 @@
 //! [`umbracast::Pipeline::step`], with network messages at the ends.
 
 use umbracast::blockage::Caster;
+use umbracast::decide::Decider;
 use umbracast::detect::{self, Clocks, Clusterer, Measurer, Prior};
 use umbracast::forecast::{Forecaster, Weights};
+use umbracast::radio::Fader;
 use umbracast::track::Tracker;
 use umbracast::{Config, Error, Outcome, STEP_NS};
 use umbracast_io::nodes::{Followed, Priors, TrackerState, Warning};
 use umbracast_io::rows;
-use umbracast_io::rows::{DetectionRow, LinkRow};
+use umbracast_io::rows::{DecisionRow, DetectionRow, LinkRow, LossRow};
 use umbracast_live::warnings::{Event, Warnings};
 
 use crate::join::Joined;
@@ -53,6 +55,8 @@ pub struct Chain {
     tracker: Option<Tracker>,
     forecaster: Option<Forecaster>,
     caster: Option<Caster>,
+    fader: Fader,
+    decider: Decider,
     access_points: Vec<String>,
     warnings: Warnings,
     priors: Vec<Prior>,
@@ -79,6 +83,10 @@ pub struct Made {
     pub followed: Option<Followed>,
     /// Every link.
     pub links: Option<Vec<LinkRow>>,
+    /// What each of them loses.
+    pub losses: Vec<LossRow>,
+    /// What to do about each device.
+    pub decisions: Vec<DecisionRow>,
     /// What changed of the links.
     pub warnings: Vec<Warning>,
     /// When the last front end closed the frame, time of its host.
@@ -98,6 +106,8 @@ impl Chain {
             tracker: row.track.then(|| Tracker::new(&config.track, &config.site)),
             forecaster: row.forecast.then(|| Forecaster::new(&config.forecast, weights)).transpose()?,
             caster: row.cast.then(|| Caster::new(&config.blockage, &config.site)),
+            fader: Fader::new(&config.site),
+            decider: Decider::new(&config.site),
             access_points: config.site.access_points.iter().map(|ap| ap.name.clone()).collect(),
             warnings: Warnings::default(),
             priors: Vec::new(),
@@ -228,6 +238,8 @@ impl Chain {
         }
         if let Some(caster) = &mut self.caster {
             caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
+            self.fader.fade(caster, &mut o.losses);
+            self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
             self.fewer_samples += u64::from(caster.took_fewer_samples());
             o.health.frames_with_fewer_samples += self.fewer_samples;
             let (mut tracks, mut links) = (Vec::new(), Vec::new());
@@ -236,6 +248,8 @@ impl Chain {
             let warning = |event: &Event| warning(event, o.time_ns, o.frame, made.closed_ns);
             made.warnings = events.iter().map(warning).collect();
             made.links = Some(links);
+            made.losses = rows::losses(0, o).collect();
+            made.decisions = rows::decisions(0, o).collect();
         }
         made.took_ns = took_ns + now_ns() - begun_ns;
         if publish_tracks || self.forecaster.is_some() {

@@ -1,4 +1,4 @@
-//! Warnings as JSON over MQTT for clients without Zenoh, sent to an existing broker.
+//! Warnings and decisions as JSON over MQTT for clients without Zenoh, sent to an existing broker.
 //!
 //! It does not use Zenoh's bridge, because the bridge passes on bytes. Warnings on Zenoh are CDR, and MQTT listeners
 //! expect JSON. `rumqttc` is maintained and small, and needs no runtime that Zenoh does not need already.
@@ -13,6 +13,7 @@ use std::time::Duration;
 use rumqttc::{Client, Connection, LastWill, MqttOptions, QoS, TlsConfiguration, Transport};
 use serde::Deserialize;
 use umbracast::Error;
+use umbracast_live::advice::Advice;
 use umbracast_live::log::{self, Level};
 use umbracast_live::warnings::Event;
 
@@ -108,12 +109,23 @@ impl Sender {
         // What separates levels and patterns of MQTT is in no name that can be subscribed to.
         let access_point = event.access_point.replace(['/', '+', '#'], "_");
         let topic = format!("umbracast/{}/warnings/{access_point}", self.hall);
-        if !self.state.publish(&self.client, &topic, false, event.json().to_string()) {
+        self.publish(&topic, event.json().to_string());
+    }
+
+    /// Sends what is to be done about a device, as the page's events say it, to `umbracast/HALL/decisions/TRACK`, at least once.
+    /// Waits for nobody.
+    pub fn advise(&self, advice: &Advice) {
+        let topic = format!("umbracast/{}/decisions/{}", self.hall, advice.decision.track);
+        self.publish(&topic, advice.json().to_string());
+    }
+
+    fn publish(&self, topic: &str, text: String) {
+        if !self.state.publish(&self.client, topic, false, text) {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Warnings that found the queue full.
+    /// Warnings and decisions that found the queue full.
     pub fn lost(&self) -> u64 {
         self.lost.load(Ordering::Relaxed)
     }

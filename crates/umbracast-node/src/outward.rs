@@ -1,4 +1,4 @@
-//! What a hall sends to other systems: topics of ROS 2, warnings over MQTT.
+//! What a hall sends to other systems: topics of ROS 2, warnings and decisions over MQTT.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -75,6 +75,7 @@ impl Outward {
     fn tell(&self, published: &Published) {
         if let Some(sender) = &self.sender {
             published.events.iter().for_each(|event| sender.send(event));
+            published.advice.iter().for_each(|advice| sender.advise(advice));
         }
         let Some(face) = &self.face else { return };
         let mut face = face.lock().unwrap_or_else(PoisonError::into_inner);

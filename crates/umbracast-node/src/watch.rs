@@ -8,8 +8,9 @@ use std::time::Duration;
 use umbracast::detect::Point;
 use umbracast::{Config, Error, Outcome};
 use umbracast_io::nodes::{Followed, Foreground};
-use umbracast_io::rows::{self, DetectionRow, LinkRow};
+use umbracast_io::rows::{self, DecisionRow, DetectionRow, LinkRow, LossRow};
 use umbracast_io::{fields, wire};
+use umbracast_live::advice::Advised;
 use umbracast_live::queue::{Popped, Queue, WhenFull};
 use umbracast_live::run::Listener;
 use umbracast_live::warnings::Warnings;
@@ -42,6 +43,8 @@ pub struct Watch {
 
 pub(crate) enum Part {
     Links(ZBytes),
+    Losses(ZBytes),
+    Decisions(ZBytes),
     Tracks(ZBytes),
     Detections(ZBytes),
     /// A front end's message, and the key that it came with.
@@ -55,6 +58,8 @@ struct Parts {
     since_ns: Option<i64>,
     frame: u64,
     links: Option<Vec<LinkRow>>,
+    losses: Option<Vec<LossRow>>,
+    decisions: Option<Vec<DecisionRow>>,
     tracks: Option<Followed>,
     detections: Option<Vec<DetectionRow>>,
     foreground: Vec<Foreground>,
@@ -82,6 +87,13 @@ impl Watch {
             hear("tracks", Part::Tracks)?,
             hear("detections", Part::Detections)?,
         ];
+        let (has_radio, has_decisions) = (config.site.has_radio(), config.site.has_decisions());
+        if has_radio {
+            subscribers.push(hear("losses", Part::Losses)?);
+        }
+        if has_decisions {
+            subscribers.push(hear("decisions", Part::Decisions)?);
+        }
         if points {
             let foregrounds = queue.clone();
             subscribers.push(hall.hear(&hall.keys().of("sensor/*/foreground"), move |key, bytes| {
@@ -93,7 +105,10 @@ impl Watch {
             names: published::access_points(&config.site),
             sensors: config.site.sensors.len(),
             points,
+            has_radio,
+            has_decisions,
             warnings: Warnings::default(),
+            advised: Advised::default(),
             open: BTreeMap::new(),
             clock,
             listener,
@@ -109,7 +124,10 @@ struct Gather {
     names: Arc<[String]>,
     sensors: usize,
     points: bool,
+    has_radio: bool,
+    has_decisions: bool,
     warnings: Warnings,
+    advised: Advised,
     open: BTreeMap<i64, Parts>,
     clock: HostClock,
     listener: Listener,
@@ -145,6 +163,14 @@ impl Gather {
                 let parts = self.parts(time_ns);
                 (parts.frame, parts.since_ns, parts.links) = (frame, Some(now_ns), Some(rows));
             }
+            Part::Losses(bytes) => {
+                let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
+                self.parts(time_ns).losses = Some(rows);
+            }
+            Part::Decisions(bytes) => {
+                let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
+                self.parts(time_ns).decisions = Some(rows);
+            }
             Part::Detections(bytes) => {
                 let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
                 self.parts(time_ns).detections = Some(rows);
@@ -176,12 +202,15 @@ impl Gather {
     /// Every frame whose parts are all there, or have been waited for; with what never came, the frames before.
     fn tell(&mut self, ended: bool) {
         let (now_ns, points_wanted) = (self.clock.now_ns(), self.points);
+        let (has_radio, has_decisions) = (self.has_radio, self.has_decisions);
         let whole = |parts: &Parts| {
             let seen = parts.tracks.as_ref().map_or(0, |tracks| tracks.sensors.len());
             let points: usize = parts.foreground.iter().map(|part| part.views.len()).sum();
             parts.links.is_some()
                 && parts.tracks.is_some()
                 && parts.detections.is_some()
+                && (!has_radio || parts.losses.is_some())
+                && (!has_decisions || parts.decisions.is_some())
                 && (!points_wanted || points >= seen)
         };
         let waited = |parts: &Parts| parts.since_ns.is_some_and(|since_ns| now_ns - since_ns >= PATIENCE_NS);
@@ -213,6 +242,8 @@ impl Gather {
         let mut tracks = Vec::new();
         rows::of_outcome(0, &outcome, &mut tracks, &mut Vec::new());
         let events = self.warnings.changes(&links, &self.names);
+        let decisions = parts.decisions.unwrap_or_default();
+        let advice = self.advised.changes(&decisions, &self.names);
         let now_ns = self.clock.now_ns();
         let time = |ns: i64| Duration::from_nanos(ns.max(0) as u64);
         Some(Published {
@@ -224,7 +255,10 @@ impl Gather {
             detections: parts.detections.unwrap_or_default(),
             tracks,
             links,
+            losses: parts.losses.unwrap_or_default(),
+            decisions,
             events,
+            advice,
             points_cm: published::points_cm(&foreground),
             foreground: self.points.then_some(foreground),
             health: followed.health,

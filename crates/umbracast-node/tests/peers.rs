@@ -13,9 +13,10 @@ use serde_json::Value;
 use umbracast::Config;
 use umbracast::detect::Point;
 use umbracast::geometry::DVec3;
+use umbracast::site::{Handover, Radio};
 use umbracast_io::nodes::Warning;
 use umbracast_io::results::Results;
-use umbracast_io::rows::{DetectionRow, LinkRow, TrackRow};
+use umbracast_io::rows::{DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use umbracast_node::hall::{Hall, Urgency};
 use umbracast_node::keys::Keys;
 use umbracast_node::ros2::{self, Face, Node};
@@ -36,7 +37,9 @@ fn router() -> (zenoh::Session, u16) {
 #[test]
 fn clients_of_others_list_decode_and_send() {
     let (session, port) = router();
-    let site = Config::default().site;
+    let mut site = Config::default().site;
+    site.access_points[0].radio = Some(Radio::default());
+    site.handover = Some(Handover::default());
     let mut face = Face::new(&session, DOMAIN, "", &site).unwrap();
     let node = Node::new(&session, DOMAIN, "", "umbracast_sensor").unwrap();
     let clouds = Arc::new(Mutex::new(Vec::new()));
@@ -76,6 +79,8 @@ fn clients_of_others_list_decode_and_send() {
                     detections: &[DetectionRow::default()],
                     tracks: &tracks,
                     links: &[link],
+                    losses: &[LossRow { track: 17, ..LossRow::default() }],
+                    decisions: &[DecisionRow { track: 17, ..DecisionRow::default() }],
                     foreground: Some(&points),
                 };
                 face.publish(&results).unwrap();
@@ -110,7 +115,8 @@ fn clients_of_others_list_decode_and_send() {
     assert_eq!((&found["complete"], &found["answered"]), (&true.into(), &true.into()), "{found}");
     assert_eq!(found["warning"], serde_json::json!(["umbracast/lab/warnings/side", "warning", 0.75]));
     let topics = found["topics"].as_object().unwrap();
-    let expected = ["blockages", "detections", "foreground", "markers", "people", "tracks"];
+    let expected =
+        ["blockages", "decisions", "detections", "foreground", "losses", "markers", "people", "tracks"];
     let mut expected: Vec<String> = expected.iter().map(|name| format!("/umbracast/{name}")).collect();
     expected.insert(0, "/tf".to_owned());
     assert_eq!(topics.keys().cloned().collect::<Vec<_>>(), expected);

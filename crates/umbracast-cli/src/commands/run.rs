@@ -10,9 +10,9 @@ use std::time::Duration;
 use umbracast::detect::doubled;
 use umbracast::forecast::Weights;
 use umbracast::site::Sensor;
-use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline};
+use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline, Site};
 use umbracast_io::recording::{RecordingWriter, Results};
-use umbracast_io::rows::{self, DetectionRow, LinkRow, TrackRow};
+use umbracast_io::rows::{self, DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use umbracast_io::tables::TableWriter;
 use umbracast_live::latency::Latencies;
 
@@ -36,6 +36,8 @@ struct Step {
     detections: Vec<DetectionRow>,
     tracks: Vec<TrackRow>,
     links: Vec<LinkRow>,
+    losses: Vec<LossRow>,
+    decisions: Vec<DecisionRow>,
     doubled: usize,
 }
 
@@ -48,32 +50,41 @@ struct Method<'a> {
     recordings: Option<(&'a Path, bool)>,
 }
 
-/// The tables of a run.
+/// The tables of a run; those of the radio where the site has one.
 struct Tables {
     detections: TableWriter<DetectionRow>,
     tracks: TableWriter<TrackRow>,
     links: TableWriter<LinkRow>,
+    losses: Option<TableWriter<LossRow>>,
+    decisions: Option<TableWriter<DecisionRow>>,
 }
 
 impl Tables {
-    fn create(folder: &Path, access_points: &[String], csv: bool) -> Result<Self, Error> {
+    fn create(folder: &Path, site: &Site, csv: bool) -> Result<Self, Error> {
+        let names: Vec<String> = site.access_points.iter().map(|ap| ap.name.clone()).collect();
         Ok(Self {
-            detections: TableWriter::create(folder, access_points, csv)?,
-            tracks: TableWriter::create(folder, access_points, csv)?,
-            links: TableWriter::create(folder, access_points, csv)?,
+            detections: TableWriter::create(folder, &names, csv)?,
+            tracks: TableWriter::create(folder, &names, csv)?,
+            links: TableWriter::create(folder, &names, csv)?,
+            losses: site.has_radio().then(|| TableWriter::create(folder, &names, csv)).transpose()?,
+            decisions: site.has_decisions().then(|| TableWriter::create(folder, &names, csv)).transpose()?,
         })
     }
 
     fn write(&mut self, step: &Step) -> Result<(), Error> {
         self.detections.write(&step.detections)?;
         self.tracks.write(&step.tracks)?;
-        self.links.write(&step.links)
+        self.links.write(&step.links)?;
+        self.losses.as_mut().map_or(Ok(()), |table| table.write(&step.losses))?;
+        self.decisions.as_mut().map_or(Ok(()), |table| table.write(&step.decisions))
     }
 
     fn finish(self) -> Result<(), Error> {
         self.detections.finish()?;
         self.tracks.finish()?;
-        self.links.finish()
+        self.links.finish()?;
+        self.losses.map_or(Ok(()), TableWriter::finish)?;
+        self.decisions.map_or(Ok(()), TableWriter::finish)
     }
 }
 
@@ -99,8 +110,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let recordings = args.mcap.then_some((args.out.as_path(), args.points));
     let method = Method { config: &config, weights: &weights, empty: &empty, recordings };
     let watch = Stopwatch::start();
-    let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
-    let mut tables = Tables::create(&args.out, &names, args.csv)?;
+    let mut tables = Tables::create(&args.out, &config.site, args.csv)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
     let (mut steps, mut frames) = (Latencies::default(), Vec::new());
     let (mut detected, mut doubled) = (0, 0);
@@ -226,8 +236,10 @@ fn run_scene(
         let (mut tracks, mut links) = (Vec::new(), Vec::new());
         rows::of_outcome(scene, outcome, &mut tracks, &mut links);
         let detections = rows::detections(scene, outcome).collect();
+        let (losses, decisions) =
+            (rows::losses(scene, outcome).collect(), rows::decisions(scene, outcome).collect());
         let doubled = doubled(&outcome.foreground, &outcome.clusters);
-        let step = Step { frame: frame.index, took, detections, tracks, links, doubled };
+        let step = Step { frame: frame.index, took, detections, tracks, links, losses, decisions, doubled };
         stage_health = outcome.health;
         if let Some(recording) = &mut recording {
             recording.write(&step, outcome)?;
@@ -283,6 +295,8 @@ impl<'a> Recording<'a> {
             detections: &step.detections,
             tracks: &step.tracks,
             links: &step.links,
+            losses: &step.losses,
+            decisions: &step.decisions,
             foreground: self.points.then_some(&outcome.foreground),
         })
     }

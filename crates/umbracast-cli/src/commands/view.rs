@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use umbracast::{Error, Health, Pipeline};
+use umbracast_live::advice::Advised;
 use umbracast_live::published;
 use umbracast_live::run::Counters;
 use umbracast_live::warnings::Warnings;
@@ -38,12 +39,13 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
                 let (frames, _) = input::empty_frames(&empty, &config, &mut Health::default())?;
                 frames.iter().for_each(|frame| pipeline.learn_empty(frame));
             }
-            let (mut warnings, mut first) = (Warnings::default(), None);
+            let (mut warnings, mut advised, mut first) = (Warnings::default(), Advised::default(), None);
             let told = input.frames(&config.site, &mut Health::default(), |frame| {
                 let (host_ns, frame_ns) = *first.get_or_insert((clock.now_ns(), frame.time_ns));
                 let outcome = pipeline.step(frame);
                 let mut published = Published::of(outcome, frame, config.site.sensors.len(), &names);
                 published.events = warnings.changes(&published.links, &names);
+                published.advice = advised.changes(&published.decisions, &names);
                 clock.sleep_until(host_ns + ((frame.time_ns - frame_ns) as f64 / args.rate) as i64);
                 published.published_ns = clock.now_ns();
                 counters.frames.fetch_add(1, Ordering::Relaxed);

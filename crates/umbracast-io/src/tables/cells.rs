@@ -3,8 +3,11 @@
 use std::fmt;
 
 use umbracast::STEPS;
+use umbracast::decide::Action;
 
-use crate::rows::{DetectionRow, LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
+use crate::rows::{
+    DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow,
+};
 
 /// A row of a table.
 pub trait Row: Copy + Default {
@@ -38,6 +41,17 @@ pub enum Cell<'a> {
     MaybeF64(&'a mut Option<f64>),
     /// Index of an access point; its name in the file.
     AccessPoint(&'a mut u32),
+    /// The same or null.
+    MaybeAccessPoint(&'a mut Option<u32>),
+    /// What to do; its name in the file.
+    Action(&'a mut Action),
+}
+
+impl Cell<'_> {
+    /// Whether a table may leave the value empty.
+    pub fn may_be_null(&self) -> bool {
+        matches!(self, Self::MaybeBool(_) | Self::MaybeF64(_) | Self::MaybeAccessPoint(_))
+    }
 }
 
 impl fmt::Display for Name {
@@ -228,5 +242,57 @@ impl Row for LinkRow {
                 see(name, Cell::MaybeF64(value));
             }
         }
+    }
+}
+
+const LOSS: [(&str, &str, &str); 3] = [
+    ("loss_now_p10_db", "loss_s", "_p10_db"),
+    ("loss_now_p50_db", "loss_s", "_p50_db"),
+    ("loss_now_p90_db", "loss_s", "_p90_db"),
+];
+
+impl Row for LossRow {
+    const TABLE: &'static str = "links_db";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("access_point"), Cell::AccessPoint(&mut self.access_point));
+        see(plain("track"), Cell::U64(&mut self.track));
+        for (h, quantiles) in self.loss_db.iter_mut().enumerate() {
+            for ((now, before, after), value) in LOSS.into_iter().zip(quantiles) {
+                let name = if h == 0 { plain(now) } else { Name(before, Some(h), after) };
+                see(name, Cell::F64(value));
+            }
+        }
+        for (w, value) in self.p_out.iter_mut().enumerate() {
+            let name = if w == 0 { plain("p_out_now") } else { Name("p_out_w", Some(w), "") };
+            see(name, Cell::F64(value));
+        }
+        for (name, quantiles) in
+            [("out_onset_p", &mut self.out_onset_s), ("out_duration_p", &mut self.out_duration_s)]
+        {
+            for (percent, value) in [10, 50, 90].into_iter().zip(quantiles) {
+                see(Name(name, Some(percent), "_s"), Cell::MaybeF64(value));
+            }
+        }
+    }
+}
+
+impl Row for DecisionRow {
+    const TABLE: &'static str = "decisions";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("track"), Cell::U64(&mut self.track));
+        see(plain("serving"), Cell::AccessPoint(&mut self.serving));
+        see(plain("action"), Cell::Action(&mut self.action));
+        see(plain("target"), Cell::MaybeAccessPoint(&mut self.target));
+        see(plain("deadline_s"), Cell::MaybeF64(&mut self.deadline_s));
+        see(plain("saved_s"), Cell::F64(&mut self.saved_s));
+        see(plain("p_out"), Cell::F64(&mut self.p_out));
     }
 }

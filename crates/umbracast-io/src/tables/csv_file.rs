@@ -43,8 +43,11 @@ impl CsvFile {
                     Cell::I64(v) => write!(text, "{v}"),
                     Cell::F64(v) | Cell::MaybeF64(Some(v)) => write!(text, "{v}"),
                     Cell::Bool(v) | Cell::MaybeBool(Some(v)) => write!(text, "{v}"),
-                    Cell::MaybeBool(None) | Cell::MaybeF64(None) => Ok(()),
-                    Cell::AccessPoint(v) => write!(text, "{}", self.access_points[*v as usize]),
+                    Cell::MaybeBool(None) | Cell::MaybeF64(None) | Cell::MaybeAccessPoint(None) => Ok(()),
+                    Cell::AccessPoint(v) | Cell::MaybeAccessPoint(Some(v)) => {
+                        write!(text, "{}", self.access_points[*v as usize])
+                    }
+                    Cell::Action(v) => write!(text, "{}", v.name()),
                 };
                 if written.is_ok() {
                     written = self.writer.write_field(&text);

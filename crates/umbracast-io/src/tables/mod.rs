@@ -144,8 +144,11 @@ pub fn describe(path: &Path) -> Result<TableSummary, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rows::{DetectionRow, LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
+    use crate::rows::{
+        DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow,
+    };
     use umbracast::STEPS;
+    use umbracast::decide::Action;
 
     fn access_points() -> Vec<String> {
         vec!["side".into(), "centre, north".into()]
@@ -220,6 +223,8 @@ mod tests {
                 Cell::MaybeBool(v) => *v = [None, Some(false), Some(true)][counter as usize % 3],
                 Cell::MaybeF64(v) => *v = (!counter.is_multiple_of(3)).then(|| f64::from(counter) / 3.0),
                 Cell::AccessPoint(v) => *v = counter % 2,
+                Cell::MaybeAccessPoint(v) => *v = [None, Some(0), Some(1)][counter as usize % 3],
+                Cell::Action(v) => *v = Action::ALL[counter as usize % 4],
             }
         };
         let mut rows = vec![R::default(); count];
@@ -242,6 +247,8 @@ mod tests {
         survives::<LinkRow>(50);
         survives::<DetectionRow>(50);
         survives::<MatchRow>(50);
+        survives::<LossRow>(50);
+        survives::<DecisionRow>(50);
     }
 
     #[test]
@@ -262,6 +269,13 @@ mod tests {
             ["blocked_now", "blocked_w1", "blocked_w9", "p_now", "p_w9", "onset_p10_s", "duration_p90_s"]
                 .iter()
                 .all(|c| links.contains(&(*c).into()))
+        );
+        let losses = columns::<LossRow>();
+        assert_eq!(losses.len(), 3 + 2 + (3 + 1) * (1 + STEPS) + 2 * 3);
+        assert!(
+            ["loss_now_p10_db", "loss_s9_p90_db", "p_out_now", "p_out_w9", "out_onset_p50_s"]
+                .iter()
+                .all(|c| losses.contains(&(*c).into()))
         );
         let tracks = columns::<TrackRow>();
         assert!(
@@ -326,7 +340,7 @@ mod tests {
             const TABLE: &'static str = LinkRow::TABLE;
             fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
                 self.0.visit(&mut |name, cell| {
-                    if !matches!(cell, Cell::MaybeF64(_)) {
+                    if !cell.may_be_null() {
                         see(name, cell);
                     }
                 });

@@ -15,6 +15,7 @@ use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use umbracast::Error;
+use umbracast::decide::Action;
 
 use super::cells::{Cell, Row};
 use super::values::Values;
@@ -65,6 +66,9 @@ impl ParquetFile {
                 (ColumnWriter::Int64ColumnWriter(w), Column::Int64(v)) => w.write_batch(v, None, None)?,
                 (ColumnWriter::DoubleColumnWriter(w), Column::Double(v)) => w.write_batch(v, None, None)?,
                 (ColumnWriter::ByteArrayColumnWriter(w), Column::Text(v)) => w.write_batch(v, None, None)?,
+                (ColumnWriter::ByteArrayColumnWriter(w), Column::MaybeText(v, there)) => {
+                    w.write_batch(v, Some(there), None)?
+                }
                 (ColumnWriter::BoolColumnWriter(w), Column::Bool(v)) => w.write_batch(v, None, None)?,
                 (ColumnWriter::BoolColumnWriter(w), Column::MaybeBool(v, there)) => {
                     w.write_batch(v, Some(there), None)?
@@ -122,6 +126,8 @@ enum Column {
     MaybeBool(Vec<bool>, Vec<i16>),
     /// The same.
     MaybeDouble(Vec<f64>, Vec<i16>),
+    /// The same.
+    MaybeText(Vec<ByteArray>, Vec<i16>),
 }
 
 /// Writes a whole table whose columns are known at run time only.
@@ -166,12 +172,11 @@ fn fields_of<R: Row>() -> Vec<Field> {
             Cell::I64(_) => (Physical::INT64, None),
             Cell::F64(_) | Cell::MaybeF64(_) => (Physical::DOUBLE, None),
             Cell::Bool(_) | Cell::MaybeBool(_) => (Physical::BOOLEAN, None),
-            Cell::AccessPoint(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_) => {
+                (Physical::BYTE_ARRAY, Some(LogicalType::String))
+            }
         };
-        let needed = match cell {
-            Cell::MaybeBool(_) | Cell::MaybeF64(_) => Repetition::OPTIONAL,
-            _ => Repetition::REQUIRED,
-        };
+        let needed = if cell.may_be_null() { Repetition::OPTIONAL } else { Repetition::REQUIRED };
         fields.push((name.to_string(), physical, logical, needed));
     });
     fields
@@ -209,14 +214,15 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
             Cell::Bool(_) => Column::Bool(Vec::new()),
             Cell::MaybeBool(_) => Column::MaybeBool(Vec::new(), Vec::new()),
             Cell::MaybeF64(_) => Column::MaybeDouble(Vec::new(), Vec::new()),
-            Cell::AccessPoint(_) => Column::Text(Vec::new()),
+            Cell::AccessPoint(_) | Cell::Action(_) => Column::Text(Vec::new()),
+            Cell::MaybeAccessPoint(_) => Column::MaybeText(Vec::new(), Vec::new()),
         });
     });
     let names: Vec<ByteArray> = access_points.iter().map(|name| name.as_str().into()).collect();
     let mut unknown = None;
     for row in rows {
         let mut column = columns.iter_mut();
-        row.visit(&mut |_, cell| match (column.next(), cell) {
+        row.visit(&mut |column_name, cell| match (column.next(), cell) {
             (Some(Column::Int32(values)), Cell::U32(v)) => values.push(v.cast_signed()),
             (Some(Column::Int64(values)), Cell::U64(v)) => values.push(v.cast_signed()),
             (Some(Column::Int64(values)), Cell::I64(v)) => values.push(*v),
@@ -232,15 +238,24 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
             }
             (Some(Column::Text(values)), Cell::AccessPoint(v)) => match names.get(*v as usize) {
                 Some(name) => values.push(name.clone()),
-                None => unknown = Some(*v),
+                None => unknown = Some((column_name, *v)),
             },
+            (Some(Column::MaybeText(values, there)), Cell::MaybeAccessPoint(v)) => {
+                there.push(i16::from(v.is_some()));
+                match v.map(|v| (v, names.get(v as usize))) {
+                    Some((_, Some(name))) => values.push(name.clone()),
+                    Some((v, None)) => unknown = Some((column_name, v)),
+                    None => {}
+                }
+            }
+            (Some(Column::Text(values)), Cell::Action(v)) => values.push(v.name().into()),
             _ => {}
         });
     }
     match unknown {
         None => Ok(columns),
-        Some(index) => Err(Error::new(format!(
-            "column access_point: expected an index below {}, found {index}",
+        Some((column, index)) => Err(Error::new(format!(
+            "column {column}: expected an index below {}, found {index}",
             access_points.len()
         ))),
     }
@@ -332,6 +347,9 @@ impl Value {
             (Cell::MaybeBool(to), _) => *to = None,
             (Cell::MaybeF64(to), Self::Real(v)) => *to = Some(v),
             (Cell::MaybeF64(to), _) => *to = None,
+            (Cell::MaybeAccessPoint(to), Self::Whole(v)) => *to = Some(v as u32),
+            (Cell::MaybeAccessPoint(to), _) => *to = None,
+            (Cell::Action(to), Self::Whole(v)) => *to = Action::ALL[v as usize],
             _ => {}
         }
     }
@@ -347,14 +365,15 @@ fn read_column(
     let columns = group.metadata().columns();
     let at = columns.iter().position(|c| c.column_path().string() == name);
     // Tables of older versions lack columns that came later: those may be empty.
-    if at.is_none() && matches!(cell, Cell::MaybeBool(_) | Cell::MaybeF64(_)) {
+    if at.is_none() && cell.may_be_null() {
         return Ok(vec![Value::Null; count]);
     }
     let expected = match cell {
         Cell::U32(_) | Cell::U64(_) | Cell::I64(_) => "whole numbers",
         Cell::F64(_) | Cell::MaybeF64(_) => "real numbers",
         Cell::Bool(_) | Cell::MaybeBool(_) => "true or false",
-        Cell::AccessPoint(_) => "names of access points",
+        Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) => "names of access points",
+        Cell::Action(_) => "names of actions",
     };
     let at = at.ok_or_else(|| Error::new(format!("expected {expected}, found no such column")))?;
     refuse_codec(columns[at].compression())?;
@@ -379,17 +398,24 @@ fn read_column(
         (ColumnReader::BoolColumnReader(r), Cell::Bool(_) | Cell::MaybeBool(_)) => {
             values(r, count, |&v: &bool| Value::Truth(v))
         }
-        (ColumnReader::ByteArrayColumnReader(r), Cell::AccessPoint(_)) => {
+        (
+            ColumnReader::ByteArrayColumnReader(r),
+            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_),
+        ) => {
+            let known: Vec<&str> = match cell {
+                Cell::Action(_) => Action::ALL.iter().map(|action| action.name()).collect(),
+                _ => access_points.iter().map(String::as_str).collect(),
+            };
             let mut unknown = None;
             let found = values(r, count, |name: &ByteArray| {
-                let index = access_points.iter().position(|known| known.as_bytes() == name.data());
+                let index = known.iter().position(|known| known.as_bytes() == name.data());
                 if index.is_none() {
                     unknown = Some(String::from_utf8_lossy(name.data()).into_owned());
                 }
                 whole(index.unwrap_or(0) as i64)
             });
             if let Some(name) = unknown {
-                let known = access_points.join(", ");
+                let known = known.join(", ");
                 return Err(Error::new(format!("expected one of {known}, found {name:?}")));
             }
             found
@@ -404,10 +430,7 @@ fn read_column(
     if let Some(row) = values.iter().position(|value| !fits(value)) {
         return Err(Error::new(format!("row {row}: expected 0 to {}, found {}", u32::MAX, values[row])));
     }
-    if let (Some(row), false) = (
-        values.iter().position(|v| matches!(v, Value::Null)),
-        matches!(cell, Cell::MaybeBool(_) | Cell::MaybeF64(_)),
-    ) {
+    if let (Some(row), false) = (values.iter().position(|v| matches!(v, Value::Null)), cell.may_be_null()) {
         return Err(Error::new(format!("row {row}: expected {expected}, found null")));
     }
     if values.len() != count {

@@ -6,7 +6,7 @@
 //! | `/api/site` | hall, sensors, access points |
 //! | `/api/frame` | the newest frame |
 //! | `/api/live` | WebSocket: every frame, or the newest that a slow client can take |
-//! | `/api/events` | server-sent events: warnings, blockages, clear links |
+//! | `/api/events` | server-sent events: warnings, blockages, clear links, decisions |
 //! | `/api/openapi.json` | this interface, with the JSON Schema of every row |
 //! | `/health` | 200 while frames come, 503 while they do not |
 //! | `/metrics` | for Prometheus |
@@ -44,7 +44,6 @@ use umbracast::{Error, Site};
 
 use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
-use crate::warnings::Event;
 use doors::Doors;
 use tls::Tls;
 pub use watched::Watched;
@@ -63,23 +62,28 @@ pub struct Server {
     address: SocketAddr,
     site: Arc<RwLock<Site>>,
     newest: watch::Sender<Arc<Published>>,
-    events: broadcast::Sender<Event>,
+    events: broadcast::Sender<Said>,
     stop: oneshot::Sender<()>,
     thread: std::thread::JoinHandle<()>,
 }
+
+/// The name of an event and its JSON.
+type Said = (&'static str, Arc<str>);
 
 /// Hands frames to the server, from any thread, without waiting.
 #[derive(Clone)]
 pub struct Publisher {
     newest: watch::Sender<Arc<Published>>,
-    events: broadcast::Sender<Event>,
+    events: broadcast::Sender<Said>,
 }
 
 impl Publisher {
     /// The newest frame.
     pub fn publish(&self, published: &Arc<Published>) {
-        for event in &published.events {
-            let _ = self.events.send(event.clone()); // Nobody listens: nobody misses it.
+        let of_links = published.events.iter().map(|event| (event.state.name(), event.json()));
+        let of_devices = published.advice.iter().map(|advice| ("decision", advice.json()));
+        for (name, json) in of_links.chain(of_devices) {
+            let _ = self.events.send((name, json.to_string().into())); // Nobody listens: nobody misses it.
         }
         self.newest.send_replace(published.clone());
     }
@@ -90,7 +94,7 @@ struct Shared {
     /// As the site file was last read.
     site: Arc<RwLock<Site>>,
     newest: watch::Sender<Arc<Published>>,
-    events: broadcast::Sender<Event>,
+    events: broadcast::Sender<Said>,
     token: Option<String>,
     doors: Mutex<Doors>,
     connections: Arc<Connections>,
@@ -339,7 +343,7 @@ async fn events(State(shared): State<Arc<Shared>>, Extension(guest): Extension<G
     let stream = BroadcastStream::new(shared.events.subscribe()).map(move |event| {
         let _held = &place;
         Ok::<_, std::convert::Infallible>(match event {
-            Ok(event) => Sent::default().event(event.state.name()).data(event.json().to_string()),
+            Ok((name, json)) => Sent::default().event(name).data(&*json),
             Err(BroadcastStreamRecvError::Lagged(missed)) => {
                 Sent::default().event("missed").data(missed.to_string())
             }

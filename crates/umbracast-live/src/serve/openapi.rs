@@ -1,7 +1,7 @@
 //! The interface as OpenAPI 3.1, with the rows' schemas made from their columns.
 
 use serde_json::{Value, json};
-use umbracast_io::rows::{LinkRow, TrackRow};
+use umbracast_io::rows::{DecisionRow, LinkRow, LossRow, TrackRow};
 use umbracast_io::wire;
 
 /// The document.
@@ -22,15 +22,18 @@ pub fn document() -> Value {
             "/api/site": json_of("Hall, sensors, access points", json!({ "type": "object" })),
             "/api/frame": json_of("The newest frame; ?points=0 leaves the points out", frame),
             "/api/live": text_of("WebSocket: a Frame as JSON text, each time there is a newer one", "application/json"),
-            "/api/events": text_of("Server-sent events: warning, blocked, clear, gone; an Event as JSON each", "text/event-stream"),
+            "/api/events": text_of("Server-sent events: warning, blocked, clear, gone, an Event as JSON each; decision, a DecisionEvent", "text/event-stream"),
             "/health": json_of("200 while frames come, 503 while they do not", json!({ "type": "object" })),
             "/metrics": text_of("Counters and histograms for Prometheus", "text/plain"),
         },
         "components": { "schemas": {
             "Track": wire::json_schema::<TrackRow>(),
             "Blockage": wire::json_schema::<LinkRow>(),
+            "Loss": wire::json_schema::<LossRow>(),
+            "Decision": wire::json_schema::<DecisionRow>(),
             "Frame": frame_schema(),
             "Event": event_schema(),
+            "DecisionEvent": decision_event_schema(),
         } }
     })
 }
@@ -54,7 +57,10 @@ fn frame_schema() -> Value {
             "health": { "type": "object", "description": "What was skipped since the start." },
             "tracks": list("Track"),
             "blockages": list("Blockage"),
-            "events": list("Event"),
+            "losses": list("Loss"),
+            "decisions": list("Decision"),
+            "events": { "type": "array", "items": { "oneOf": [
+                { "$ref": "#/components/schemas/Event" }, { "$ref": "#/components/schemas/DecisionEvent" } ] } },
             "points_cm": { "type": "array", "items": { "type": "integer" }, "description": "x y z, x y z, ... of new points." },
         }
     })
@@ -77,4 +83,13 @@ fn event_schema() -> Value {
             "onset_p90_s": { "type": ["number", "null"] },
         }
     })
+}
+
+fn decision_event_schema() -> Value {
+    let mut schema = wire::json_schema::<DecisionRow>();
+    schema["title"] = "DecisionEvent".into();
+    schema["properties"]["event"] = json!({ "enum": ["decision"] });
+    schema["properties"]["frame"] = json!({ "type": "integer" });
+    schema["properties"]["time_ns"] = json!({ "type": "integer" });
+    schema
 }

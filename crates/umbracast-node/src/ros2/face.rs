@@ -1,8 +1,11 @@
 //! A hall as ROS 2 sees it: the topics of a recording, sent with each frame.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
 use umbracast::{Error, Site};
 use umbracast_io::messages::CLOUD;
-use umbracast_io::results::{Results, TOPICS};
+use umbracast_io::results::{Results, topics};
 use umbracast_io::viewers::FOREGROUND_TOPIC;
 use zenoh::Session;
 
@@ -11,9 +14,9 @@ use super::topics::{Node, Publisher};
 /// Sends the topics of one hall.
 pub struct Face {
     site: Site,
-    /// In the order of [`TOPICS`], the foreground's last.
-    publishers: Vec<Publisher>,
-    _node: Node,
+    /// By topic: those of the site, and the foreground's.
+    publishers: BTreeMap<&'static str, Publisher>,
+    node: Node,
 }
 
 impl Face {
@@ -23,9 +26,12 @@ impl Face {
     /// A session that is closed.
     pub fn new(session: &Session, domain: u32, namespace: &str, site: &Site) -> Result<Self, Error> {
         let node = Node::new(session, domain, namespace, "umbracast")?;
-        let every = TOPICS.iter().map(|(topic, schema)| node.publisher(topic, &schema()));
-        let publishers = every.chain([node.publisher(FOREGROUND_TOPIC, &CLOUD)]).collect::<Result<_, _>>()?;
-        Ok(Self { site: site.clone(), publishers, _node: node })
+        let foreground = node.publisher(FOREGROUND_TOPIC, &CLOUD)?;
+        let mut publishers = BTreeMap::from([(FOREGROUND_TOPIC, foreground)]);
+        for (topic, schema) in topics(site) {
+            publishers.insert(topic, node.publisher(topic, &schema())?);
+        }
+        Ok(Self { site: site.clone(), publishers, node })
     }
 
     /// Another site with the same sensors from the next frame on.
@@ -39,7 +45,14 @@ impl Face {
     /// A session that is closed.
     pub fn publish(&mut self, results: &Results) -> Result<(), Error> {
         let messages = results.messages(&self.site);
-        for (publisher, message) in self.publishers.iter_mut().zip(messages) {
+        for message in messages {
+            // A site that was taken over may have topics that the one before had not.
+            let publisher = match self.publishers.entry(message.topic) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(place) => {
+                    place.insert(self.node.publisher(message.topic, &(message.schema)())?)
+                }
+            };
             publisher.publish(results.logged_ns, message.bytes)?;
         }
         Ok(())
