@@ -85,6 +85,11 @@ fn simulation(site: &Site) -> Result<(), Error> {
     let lost = lost.iter().map(of("lost_after_s", 0.0, f64::INFINITY));
     let slips = site.simulation.slip.iter().map(|(name, slip)| (name, &slip.after_s));
     let lost = lost.chain(slips.map(of("slip", 0.0, f64::INFINITY)));
+    for (name, slip) in &site.simulation.slip {
+        let key = |key: &str| format!("site.simulation.slip.{name}.{key}");
+        slip.turned_deg.iter().try_for_each(|deg| within(&key("turned_deg"), *deg, -360.0, 360.0))?;
+        slip.shifted_m.iter().try_for_each(|m| within(&key("shifted_m"), *m, -HALL_MAX_M, HALL_MAX_M))?;
+    }
     let bias = site.simulation.range_bias_m.iter().map(of("range_bias_m", -1.0, 1.0));
     for (key, name, value, least, most) in
         lost.chain(ahead.iter().map(of("clock_ahead_ms", -CLOCK_MS, CLOCK_MS))).chain(bias)
@@ -208,7 +213,7 @@ fn size_m(site: &Site) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::site::{DarkCloth, Pane, Surface};
+    use crate::site::{DarkCloth, Pane, Slip, Surface};
     use crate::{Config, Mode};
 
     const SITES: [&str; 10] = [
@@ -343,6 +348,23 @@ mod tests {
             change(&mut site);
             let found = check_site(&site).unwrap_err().to_string();
             assert!(found.starts_with(story), "{found}");
+        }
+    }
+
+    /// A sensor of the simulation turned by what is no number.
+    #[test]
+    fn a_slip_is_a_turn_and_a_shift() {
+        for (turned_deg, shifted_m, key) in
+            [([f64::NAN; 3], [0.0; 3], "turned_deg"), ([0.0; 3], [2e3; 3], "shifted_m")]
+        {
+            let mut site = Config::default().site;
+            let slip = Slip { after_s: 1.0, turned_deg, shifted_m };
+            site.simulation.slip = [("lidar_west".to_owned(), slip)].into();
+            let found = check_site(&site).unwrap_err().to_string();
+            assert!(
+                found.starts_with(&format!("site.simulation.slip.lidar_west.{key}: expected")),
+                "{found}"
+            );
         }
     }
 

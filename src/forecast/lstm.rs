@@ -24,6 +24,8 @@ pub const HEAD: usize = 5;
 pub const SIGMA_FLOOR_M: f32 = 0.001;
 /// Displacements at 10 Hz are about this long, so that the head starts near the right spread.
 pub const SIGMA_SCALE_M: f32 = 0.1;
+/// No network of people's walks has more hidden units; the paper's has 512.
+const UNITS_MAX: usize = 1 << 16;
 /// Keeps the covariance invertible.
 pub const RHO_LIMIT: f32 = 0.95;
 
@@ -69,9 +71,9 @@ impl Weights {
         let columns_of = |name| file.tensor(name).ok().and_then(|t| t.shape().get(1).copied());
         let embedded = rows_of("emb.weight").unwrap_or(64);
         let units = columns_of("enc.weight_hh").unwrap_or(512);
-        if units == 0 || units % LANES != 0 {
+        if units == 0 || units % LANES != 0 || units > UNITS_MAX {
             return Err(Error::new(format!(
-                "weights: enc.weight_hh: expected a multiple of {LANES} hidden units, found {units}"
+                "weights: enc.weight_hh: expected a multiple of {LANES} hidden units up to {UNITS_MAX}, found {units}"
             )));
         }
         let [emb_weight, emb_bias] =
@@ -238,7 +240,19 @@ pub(super) mod tests {
         let message = refused(&|tensors| tensors[7].2[3] = f32::NAN);
         assert_eq!(message, "weights: dec.bias: expected f32 of shape [5], found NaN at place 3");
         let message = refused(&|tensors| tensors[3] = ("enc.weight_hh", vec![40, 10], vec![0.0; 400]));
-        assert!(message.contains("expected a multiple of 16 hidden units, found 10"), "{message}");
+        assert!(
+            message.contains("expected a multiple of 16 hidden units up to 65536, found 10"),
+            "{message}"
+        );
         assert!(Weights::from_safetensors(b"not a file").is_err());
+    }
+
+    /// Four times 2^62 units were none, and the shapes of empty tensors fitted.
+    #[test]
+    fn a_shape_without_values_is_no_number_of_units() {
+        let mut tensors = small_tensors();
+        tensors[3] = ("enc.weight_hh", vec![0, 1 << 62], Vec::new());
+        let message = Weights::from_safetensors(&file(&tensors)).unwrap_err().to_string();
+        assert!(message.contains("hidden units up to 65536, found 4611686018427387904"), "{message}");
     }
 }

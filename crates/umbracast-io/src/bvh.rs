@@ -164,7 +164,12 @@ fn pose(joints: &[Joint], words: &mut Words) -> Result<Vec<[f64; 3]>, Error> {
         }
         let (origin, parent) = joint.parent.map_or(([0.0; 3], IDENTITY), |parent| placed[parent]);
         let shift = times(&parent, shift);
-        placed.push((std::array::from_fn(|i| origin[i] + shift[i]), product(&parent, &turn)));
+        let place: [f64; 3] = std::array::from_fn(|i| origin[i] + shift[i]);
+        if !place.iter().all(|value| value.is_finite()) {
+            let name = &joint.name;
+            return Err(Error::new(format!("{name}: expected a place, found lengths too large to add up")));
+        }
+        placed.push((place, product(&parent, &turn)));
     }
     Ok(placed.into_iter().map(|(position, _)| position).collect())
 }
@@ -226,5 +231,9 @@ mod tests {
         assert!(refused("0.01", "0").contains("frame time: expected more than 0 s"));
         assert!(refused("5 0 0 90", "5 0 0 nan").contains("frame 1: Hips: expected a number, found \"nan\""));
         assert!(parse("").unwrap_err().to_string().contains("HIERARCHY"));
+        let endless = ARM
+            .replace("OFFSET 0 2 0", "OFFSET 1e308 1e308 1e308")
+            .replace("OFFSET 1 0 0", "OFFSET 1e308 1e308 1e308");
+        assert!(parse(&endless).unwrap_err().to_string().contains("frame 0: Wrist: expected a place"));
     }
 }

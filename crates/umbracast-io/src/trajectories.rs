@@ -28,6 +28,10 @@ const MOST_MPS: f64 = 12.0;
 const JUMP_M: f64 = 1.5;
 /// Nobody is taller: a height in centimetres.
 const TALLEST_M: f64 = 3.0;
+/// Nobody is farther from the origin, metres: that of the far end of a map in UTM.
+const FARTHEST_M: f64 = 1e7;
+/// No time is later, seconds: three thousand years. Farther from 0 neighbours of a millisecond are no longer told apart.
+const LATEST_S: f64 = 1e11;
 /// Values of z that can be somebody's height; others are not read as such.
 const HEIGHTS_M: std::ops::RangeInclusive<f64> = 1.0..=2.3;
 
@@ -273,8 +277,19 @@ pub fn keep_middle(people: &mut Vec<RecordedPerson>, seconds: f64) {
     people.retain(|person| !person.samples.is_empty());
 }
 
-/// A wrong unit or rate shows in heights and speeds.
+/// A wrong unit or rate shows in heights and speeds, places and times.
 fn plausible(of_person: &[Row]) -> Result<(), Error> {
+    let is_near = |value: f64, most: f64| value.abs() <= most;
+    let is_here = |row: &&Row| {
+        is_near(row.x_m, FARTHEST_M) && is_near(row.y_m, FARTHEST_M) && is_near(row.time, LATEST_S)
+    };
+    if let Some(row) = of_person.iter().find(|row| !is_here(row)) {
+        let Row { line, time, x_m, y_m, .. } = *row;
+        let story = format!(
+            "expected places up to {FARTHEST_M} m and times up to {LATEST_S} s from 0, found {x_m} m, {y_m} m at {time} s"
+        );
+        return Err(at_line(line, story));
+    }
     let giant = |row: &Row| row.height_m.filter(|height_m| *height_m > TALLEST_M).map(|h| (row.line, h));
     if let Some((line, height_m)) = of_person.iter().find_map(giant) {
         let story = format!(

@@ -185,6 +185,21 @@ fn what_is_wrong_is_told_with_file_line_expected_and_found() {
     assert!(missing.starts_with("no/such/file: "), "{missing}");
 }
 
+/// Numbers that are finite add up to some that are not: the middle of such people, the times of such rows.
+#[test]
+fn places_and_times_that_nothing_has_are_refused() {
+    let told = refused("t_s,id,x_m,y_m\n0.0,1,1e308,0\n0.1,1,1e308,0\n");
+    assert!(
+        told.contains("file: line 2: expected places up to 10000000 m") && told.contains("found 1"),
+        "{told}"
+    );
+    let told = refused("t_s,id,x_m,y_m\n1e300,1,0,0\n");
+    assert!(told.contains("line 2") && told.contains("times up to 100000000000 s"), "{told}");
+    let told =
+        refused("{\"scene\": {\"fps\": 1e-300}}\n{\"track\": {\"f\": 9, \"p\": 1, \"x\": 0, \"y\": 0}}\n");
+    assert!(told.contains("line 2") && told.contains("times up to"), "{told}");
+}
+
 #[test]
 fn real_files_hold_the_people_their_readmes_count() {
     let Some(root) = real_data("trajnetpp").map(|folder| folder.join("..")) else { return };

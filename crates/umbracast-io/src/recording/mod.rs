@@ -12,9 +12,8 @@
 //! | `/umbracast/detections`, `/umbracast/tracks`, `/umbracast/blockages` | what a run made of them: see [`crate::wire`] |
 //! | `/tf`, `/umbracast/markers`, `/umbracast/people`, `/umbracast/foreground` | the same for viewers: see [`crate::viewers`] |
 
-use std::borrow::Cow;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
 use umbracast::Error;
@@ -25,6 +24,7 @@ use crate::seam::guarded;
 
 #[cfg(feature = "db3")]
 mod db3;
+mod mcap_file;
 mod writer;
 
 pub use writer::RecordingWriter;
@@ -34,8 +34,11 @@ pub use crate::results::Results;
 const CONFIG_TOPIC: &str = "/umbracast/config";
 /// How every SQLite file begins.
 const SQLITE_MAGIC: &[u8; 16] = b"SQLite format 3\0";
-/// A record is believed to be no longer than the file, or than this where it comes out of a compressed chunk.
-const RECORD_BYTES: u64 = 64 << 20;
+/// A record is believed to be no longer than the file, or than this where it may come out of a compressed chunk.
+const UNPACKED_BYTES: u64 = 64 << 20;
+/// Nor is it believed to be longer than this, however long the file: a chunk has some megabytes, and room is made for a record
+/// before it is read.
+const RECORD_MAX_BYTES: u64 = 1 << 30;
 
 /// What a reader finds in a recording, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +63,7 @@ pub struct RecordingReader {
 }
 
 enum Source {
-    Mcap(Box<mcap::io::MessageReader<BufReader<File>>>),
+    Mcap(Box<mcap_file::Messages>),
     #[cfg(feature = "db3")]
     Db3(db3::Messages),
 }
@@ -78,11 +81,9 @@ impl RecordingReader {
         file.rewind().map_err(fail)?;
         let source = match is_sqlite {
             false => {
-                let longest = file.metadata().map_err(fail)?.len().max(RECORD_BYTES);
-                let options =
-                    mcap::sans_io::LinearReaderOptions::default().with_record_length_limit(longest as usize);
-                let messages = mcap::io::MessageReader::new_with_options(BufReader::new(file), options);
-                Source::Mcap(Box::new(messages))
+                let unpacked = if cfg!(feature = "compression") { UNPACKED_BYTES } else { 0 };
+                let longest = file.metadata().map_err(fail)?.len().clamp(unpacked, RECORD_MAX_BYTES);
+                Source::Mcap(Box::new(mcap_file::Messages::new(file, longest as usize)))
             }
             #[cfg(feature = "db3")]
             true => Source::Db3(db3::Messages::open(path)?),
@@ -104,18 +105,13 @@ impl RecordingReader {
     /// A file that is no recording at all.
     pub fn next_entry(&mut self) -> Result<Option<Entry>, Error> {
         let next = match &mut self.source {
-            Source::Mcap(messages) => match guarded(|| messages.next()) {
-                Ok(None) => Ok(None),
-                Ok(Some(Ok(message))) => {
-                    let kind = message.channel.schema.as_ref().map_or("", |schema| &schema.name);
-                    Ok(Some(understand(&message.channel.topic, kind, message.data)))
-                }
-                Ok(Some(Err(error))) => Err(("an MCAP recording", plain(&error))),
-                Err(panicked) => Err(("an MCAP recording", panicked)),
+            Source::Mcap(messages) => match guarded(|| messages.next(understand)) {
+                Ok(Ok(next)) => Ok(next),
+                Ok(Err(found)) | Err(found) => Err(("an MCAP recording", found)),
             },
             #[cfg(feature = "db3")]
             Source::Db3(messages) => match messages.next() {
-                Ok(next) => Ok(next.map(|(topic, kind, data)| understand(&topic, &kind, data.into()))),
+                Ok(next) => Ok(next.map(|(topic, kind, data)| understand(&topic, &kind, &data))),
                 Err(error) => Err(("a recording of rosbag2", error.to_string())),
             },
         };
@@ -140,16 +136,16 @@ impl RecordingReader {
     }
 }
 
-fn understand(topic: &str, kind: &str, data: Cow<[u8]>) -> Entry {
+fn understand(topic: &str, kind: &str, data: &[u8]) -> Entry {
     if topic == CONFIG_TOPIC {
-        let text = crate::cdr::Decoder::new(&data).and_then(|mut d| d.string());
+        let text = crate::cdr::Decoder::new(data).and_then(|mut d| d.string());
         if let Some(text) = text {
             return Entry::Config(text.to_owned());
         }
     }
     let packets = match kind {
-        name if name == messages::SCAN.name => messages::read_scan(&data),
-        name if name == messages::SENSOR_PACKETS.name => messages::read_sensor_packets(&data),
+        name if name == messages::SCAN.name => messages::read_scan(data),
+        name if name == messages::SENSOR_PACKETS.name => messages::read_sensor_packets(data),
         _ => None,
     };
     if let Some(packets) = packets {
@@ -157,21 +153,9 @@ fn understand(topic: &str, kind: &str, data: Cow<[u8]>) -> Entry {
         return Entry::Packets(sensor.to_owned(), packets);
     }
     if kind == messages::CLOUD.name {
-        return Entry::Cloud(topic.to_owned(), data.into_owned());
+        return Entry::Cloud(topic.to_owned(), data.to_vec());
     }
-    Entry::Other(topic.to_owned(), kind.to_owned(), data.into_owned())
-}
-
-fn plain(error: &mcap::McapError) -> String {
-    match error {
-        mcap::McapError::BadMagic => "other bytes at its beginning".to_owned(),
-        mcap::McapError::UnexpectedEof => "its end before the first message".to_owned(),
-        mcap::McapError::UnsupportedCompression(codec) => format!(
-            "chunks in {codec}, which this program reads if it is built with `--features compression`; `mcap \
-             decompress` writes the recording without"
-        ),
-        other => other.to_string(),
-    }
+    Entry::Other(topic.to_owned(), kind.to_owned(), data.to_vec())
 }
 
 #[cfg(test)]
@@ -278,6 +262,21 @@ mod tests {
             at += 9 + length as usize;
         }
         assert!(damaged > 40, "{damaged}");
+    }
+
+    /// In a file of 6 GB and more a length of 6 GB was believed.
+    #[test]
+    fn a_length_in_a_long_file_is_not_believed_either() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.mcap");
+        record(&path);
+        let mut bytes = std::fs::read(&path).unwrap();
+        bytes[9..17].copy_from_slice(&(2 * RECORD_MAX_BYTES).to_le_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        // A file with a hole: it takes no room on the disk.
+        File::options().write(true).open(&path).unwrap().set_len(7 << 30).unwrap();
+        let error = read(&path).unwrap_err().to_string();
+        assert!(error.contains("a.mcap: expected an MCAP recording") && error.contains("exceeds"), "{error}");
     }
 
     #[test]

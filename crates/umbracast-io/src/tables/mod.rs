@@ -6,6 +6,7 @@
 
 mod cells;
 mod values;
+mod pages;
 mod parquet_file;
 mod csv_file;
 

@@ -10,14 +10,16 @@ use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
+use parquet::file::reader::{FileReader, Length, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use umbracast::Error;
 use umbracast::decide::Action;
 
 use super::cells::{Cell, Row};
+use super::pages::column_reader;
 use super::values::Values;
 use crate::seam::guarded;
 
@@ -85,7 +87,9 @@ impl ParquetFile {
 }
 
 /// A row group that says it has more rows is not believed: ours have a scene's, about 10^5.
-const ROWS_MAX: usize = 1 << 24;
+const ROWS_MAX: u64 = 1 << 24;
+/// Nor is one believed that says it has more than so many a byte of the file: a row takes a bit at least, all columns together.
+const ROWS_A_BYTE: u64 = 8;
 
 /// What a Parquet file holds, whoever wrote it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -263,11 +267,13 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
 
 /// Reads the table row group by row group.
 pub fn read<R: Row>(path: &Path, access_points: &[String], mut sink: impl FnMut(&[R])) -> Result<(), Error> {
-    let file = File::open(path).map_err(|e| Error::new(format!("cannot be opened: {e}")))?;
+    let open = || File::open(path).map_err(|e| Error::new(format!("cannot be opened: {e}")));
+    let (file, pages) = (open()?, Arc::new(open()?));
     let reader = guarded(|| SerializedFileReader::new(file)).map_err(not_parquet)?.map_err(not_parquet)?;
     let mut rows = Vec::new();
     for i in 0..reader.num_row_groups() {
-        guarded(|| read_group(&reader, i, access_points, &mut rows)).map_err(not_parquet)??;
+        let group = reader.metadata().row_group(i);
+        guarded(|| read_group(group, &pages, access_points, &mut rows)).map_err(not_parquet)??;
         sink(&rows);
     }
     Ok(())
@@ -279,22 +285,22 @@ fn not_parquet(found: impl std::fmt::Display) -> Error {
 
 /// One row group in place of `rows`.
 fn read_group<R: Row>(
-    reader: &SerializedFileReader<File>,
-    index: usize,
+    group: &RowGroupMetaData,
+    file: &Arc<File>,
     access_points: &[String],
     rows: &mut Vec<R>,
 ) -> Result<(), Error> {
-    let group = reader.get_row_group(index).map_err(not_parquet)?;
-    let told = group.metadata().num_rows();
-    let count = usize::try_from(told).ok().filter(|count| *count <= ROWS_MAX);
-    let count = count.ok_or_else(|| not_parquet(format!("{told} rows in a group")))?;
+    let told = group.num_rows();
+    let most = file.len().saturating_mul(ROWS_A_BYTE).min(ROWS_MAX);
+    let count = u64::try_from(told).ok().filter(|count| *count <= most);
+    let count = count.ok_or_else(|| not_parquet(format!("{told} rows in a group")))? as usize;
     let mut columns = Vec::new();
     let mut failed = None;
     R::default().visit(&mut |name, cell| {
         if failed.is_some() {
             return;
         }
-        match read_column(group.as_ref(), &name.to_string(), count, &cell, access_points) {
+        match read_column(group, file, &name.to_string(), count, &cell, access_points) {
             Ok(column) => columns.push(column.into_iter()),
             Err(error) => failed = Some(error.within(format!("column {name}"))),
         }
@@ -356,13 +362,14 @@ impl Value {
 }
 
 fn read_column(
-    group: &dyn RowGroupReader,
+    group: &RowGroupMetaData,
+    file: &Arc<File>,
     name: &str,
     count: usize,
     cell: &Cell,
     access_points: &[String],
 ) -> Result<Vec<Value>, Error> {
-    let columns = group.metadata().columns();
+    let columns = group.columns();
     let at = columns.iter().position(|c| c.column_path().string() == name);
     // Tables of older versions lack columns that came later: those may be empty.
     if at.is_none() && cell.may_be_null() {
@@ -379,7 +386,7 @@ fn read_column(
     refuse_codec(columns[at].compression())?;
     let broken = |e: ParquetError| Error::new(format!("expected {expected}, found: {e}"));
     let whole = |v: i64| Value::Whole(v);
-    let values = match (group.get_column_reader(at).map_err(broken)?, cell) {
+    let values = match (column_reader(file, &columns[at], count).map_err(broken)?, cell) {
         (ColumnReader::Int32ColumnReader(r), Cell::U32(_)) => {
             values(r, count, |&v: &i32| whole(i64::from(v.cast_unsigned())))
         }
