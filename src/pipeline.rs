@@ -4,7 +4,7 @@ use crate::blockage::{Blockage, Caster};
 use crate::decide::{Decider, Decision};
 use crate::detect::{Background, Clocks, Cluster, Clusterer, Detection, Measurer, Point, Prior};
 use crate::forecast::{Forecast, Forecaster, Weights};
-use crate::lidar::Views;
+use crate::lidar::{Views, is_time};
 use crate::mounting::Mountings;
 use crate::radio::{Fader, Loss, Outages};
 use crate::track::{Track, Tracker};
@@ -54,9 +54,9 @@ pub struct Outcome {
 
 impl Outcome {
     /// Takes the frame's number and time. False, counted, and everything emptied for a frame that does not lie
-    /// after the last one.
+    /// after the last one, or at no time that a clock shows.
     fn begin(&mut self, frame: &Frame) -> bool {
-        let later = self.last_ns.is_none_or(|last_ns| frame.time_ns > last_ns);
+        let later = is_time(frame.time_ns) && self.last_ns.is_none_or(|last_ns| frame.time_ns > last_ns);
         if later {
             self.last_ns = Some(frame.time_ns);
         } else {
@@ -147,7 +147,8 @@ impl Pipeline {
     /// # Ok::<(), umbracast::Error>(())
     /// ```
     pub fn learn_empty(&mut self, frame: &Frame) {
-        self.background.learn_empty(&self.mountings.follow(frame, &mut self.outcome.health));
+        let health = &mut self.outcome.health;
+        self.background.learn_empty(&self.mountings.follow(&frame.usable(health), health));
     }
 
     /// One frame through all stages.
@@ -169,6 +170,7 @@ impl Pipeline {
         if !o.begin(frame) {
             return o;
         }
+        let frame = &*frame.usable(&mut o.health);
         let frame = &*self.mountings.follow(frame, &mut o.health);
         self.mountings.moved().iter().for_each(|&sensor| self.background.forget(sensor));
         self.tracker.priors(frame.time_ns, &mut self.priors);

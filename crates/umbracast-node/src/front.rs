@@ -174,6 +174,7 @@ impl Front {
         let closed_ns = self.clock.now_ns();
         let priors = self.priors(frame.time_ns);
         let begun_ns = self.clock.now_ns();
+        let frame = &*frame.usable(&mut self.health);
         let frame = &*self.mountings.follow(frame, &mut self.health);
         self.mountings.moved().iter().for_each(|&sensor| self.background.forget(sensor));
         let mut points = Vec::new();
