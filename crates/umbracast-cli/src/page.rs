@@ -19,7 +19,7 @@ impl Page {
     /// Begins to serve, unless asked not to.
     ///
     /// # Errors
-    /// An address that is taken, or that needs a token.
+    /// An address that is taken, or that needs a token; a host that is no name.
     #[cfg(feature = "serve")]
     pub fn open(
         args: &PageArgs,
@@ -40,7 +40,7 @@ impl Page {
         let token = std::env::var("UMBRACAST_TOKEN").ok().filter(|token| !token.is_empty());
         let tls = args.tls_cert.clone().zip(args.tls_key.clone());
         let scheme = if tls.is_some() { "https" } else { "http" };
-        let door = umbracast_live::serve::Door { address: args.serve, token, tls };
+        let door = umbracast_live::serve::Door { address: args.serve, hosts: args.hosts.clone(), token, tls };
         let server = umbracast_live::serve::start(door, watched)?;
         crate::say::line(format_args!("page: {scheme}://{}/", server.address()));
         Ok(Self { server: Some(server) })

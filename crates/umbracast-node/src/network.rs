@@ -24,6 +24,8 @@ pub(crate) const MEETING_POINT: &str = "127.0.0.1:7447";
 /// A peer that is silent for so long is gone, and is called again. Under a loss of one packet in ten, TCP is silent for a
 /// second now and then.
 const LEASE_MS: u64 = 2000;
+/// No message is longer: the clouds of the finest sensors have 12 MB. Zenoh would gather a gigabyte before it gave up.
+const MESSAGE_BYTES: u64 = 32 << 20;
 /// Who is not there is called again after so long, and after twice as long each time, up to the second value.
 const RETRY_MS: [u64; 2] = [100, 800];
 
@@ -244,6 +246,7 @@ impl Network {
         put("transport/unicast/max_sessions", SESSIONS.into())?;
         put("scouting/multicast/enabled", false.into())?;
         put("transport/link/tx/lease", LEASE_MS.into())?;
+        put("transport/link/rx/max_message_size", MESSAGE_BYTES.into())?;
         if !self.roles.is_empty() {
             put("access_control", access::access_control(&self.roles))?;
         }
@@ -379,6 +382,12 @@ mod tests {
         let mut site = umbracast::Config::default().site;
         site.name = "hall 3/east".to_owned();
         assert!(Network::default().hall(&site).unwrap_err().to_string().contains("network.hall"));
+    }
+
+    #[test]
+    fn nobody_is_listened_to_for_a_gigabyte() {
+        let config = Network::default().zenoh(&[]).unwrap();
+        assert_eq!(config.get_json("transport/link/rx/max_message_size").unwrap(), "33554432");
     }
 
     #[test]

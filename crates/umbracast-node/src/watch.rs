@@ -135,6 +135,13 @@ struct Gather {
     incomplete: Arc<AtomicU64>,
 }
 
+/// Whether a front end covers sensors of the site, none of which was covered before: so a frame has as many parts as there are
+/// sensors, whatever is sent.
+fn is_another(part: &Foreground, known: &[Foreground], sensors: usize) -> bool {
+    let is_new = |sensor: &u32| known.iter().all(|other| !other.covers.contains(sensor));
+    !part.covers.is_empty() && part.covers.iter().all(|sensor| (*sensor as usize) < sensors && is_new(sensor))
+}
+
 impl Gather {
     fn run(&mut self, queue: &Queue<Part>) {
         loop {
@@ -184,8 +191,8 @@ impl Gather {
             }
             Part::Foreground(key, bytes) => {
                 let Some(part) = front::heard(&key, &bytes.to_bytes()) else { return };
-                let known = &mut self.parts(part.time_ns).foreground;
-                if known.iter().all(|other| other.covers != part.covers) {
+                let (sensors, known) = (self.sensors, &mut self.parts(part.time_ns).foreground);
+                if is_another(&part, known, sensors) {
                     known.push(part);
                 }
             }
@@ -266,5 +273,25 @@ impl Gather {
             access_points: self.names.clone(),
             ..Published::default()
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every part that covered other sensors was kept until its frame was told, and that of a far future never is.
+    #[test]
+    fn a_frame_has_no_more_parts_than_the_site_has_sensors() {
+        let mut known = Vec::new();
+        for covers in
+            [vec![], vec![2], vec![0], vec![0], vec![0, 1], vec![7, 1], vec![1], vec![1, 1], vec![u32::MAX]]
+        {
+            let part = Foreground { covers, ..Foreground::default() };
+            if is_another(&part, &known, 2) {
+                known.push(part);
+            }
+        }
+        assert_eq!(known.iter().map(|part| part.covers.clone()).collect::<Vec<_>>(), [[0], [1]]);
     }
 }

@@ -138,6 +138,10 @@ pub struct PageArgs {
     /// variable UMBRACAST_TOKEN.
     #[arg(long, default_value = "127.0.0.1:8600", value_name = "HOST:PORT")]
     pub serve: SocketAddr,
+    /// Names by which browsers may ask for the page, beside localhost and the address of --serve: that of this host, or
+    /// of a proxy before it. Separate several with commas. Requests under other names are refused.
+    #[arg(long = "host", value_name = "NAME", value_delimiter = ',')]
+    pub hosts: Vec<String>,
     /// Serve the page over TLS with this certificate (PEM, followed by its issuers). Needs a build with the feature
     /// `tls`.
     #[arg(long, value_name = "FILE", requires = "tls_key")]

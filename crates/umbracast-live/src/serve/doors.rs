@@ -1,9 +1,11 @@
-//! Tokens: which may be chosen, and what comes of guessing them.
+//! Who is let in. Names by which the server may be asked for; tokens, which of them may be chosen, and what comes of guessing
+//! them.
 
 use std::collections::BTreeMap;
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use axum::http::uri::Authority;
 use umbracast::Error;
 
 /// A shorter token is guessed too soon.
@@ -28,6 +30,48 @@ pub(super) fn check_token(token: &str) -> Result<(), Error> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// Names under which the server may be asked for. A page of elsewhere whose name was made to lead here asks under that name.
+#[derive(Debug)]
+pub(super) struct Names {
+    listens: IpAddr,
+    given: Vec<String>,
+}
+
+impl Names {
+    /// Loopback, the address that is listened on, and the names that somebody gave.
+    ///
+    /// # Errors
+    /// A name that no `Host` can be: with a port, a path, or nothing.
+    pub(super) fn new(listens: SocketAddr, given: &[String]) -> Result<Self, Error> {
+        let is_name =
+            |name: &&String| authority(name).is_some_and(|found| found == name.to_ascii_lowercase());
+        if let Some(wrong) = given.iter().find(|name| !is_name(name)) {
+            let story = format!("--host: expected a name or an address without a port, found {wrong:?}");
+            return Err(Error::new(story));
+        }
+        let given = given.iter().map(|name| name.to_ascii_lowercase()).collect();
+        Ok(Self { listens: listens.ip(), given })
+    }
+
+    /// Whether a `Host`, with or without a port, is one of them. Where all addresses are listened on, each of them is: a name
+    /// can be made to lead here by whoever owns it, an address cannot.
+    pub(super) fn hold(&self, host: &str) -> bool {
+        let Some(name) = authority(host) else { return false };
+        let address: Option<IpAddr> = name.parse().ok();
+        let is_own = |address: IpAddr| {
+            address.is_loopback() || self.listens.is_unspecified() || address == self.listens
+        };
+        name == "localhost" || address.is_some_and(is_own) || self.given.contains(&name)
+    }
+}
+
+/// The name of a `Host`, in small letters, without its port and the brackets of an address.
+fn authority(host: &str) -> Option<String> {
+    let authority: Authority = host.parse().ok()?;
+    let name = authority.host().trim_start_matches('[').trim_end_matches(']');
+    (!name.is_empty()).then(|| name.to_ascii_lowercase())
 }
 
 /// Who guessed, and when, by the host's clock.
@@ -80,6 +124,31 @@ mod tests {
         for k in 0..40 {
             doors.note_wrong(other, k * 7_000_000_000);
             assert!(!doors.is_closed(other, k * 7_000_000_000), "one in seven seconds is nobody who guesses");
+        }
+    }
+
+    #[test]
+    fn a_host_is_loopback_the_address_that_is_listened_on_or_a_name_that_was_given() {
+        let names = |listens: &str, given: &[&str]| {
+            Names::new(
+                listens.parse().unwrap(),
+                &given.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>(),
+            )
+        };
+        let [own, all] =
+            ["10.0.0.5:8600", "0.0.0.0:8600"].map(|at| names(at, &["Hall.example.org"]).unwrap());
+        for host in ["localhost:8600", "127.0.0.1", "[::1]:8600", "10.0.0.5:8600", "hall.example.ORG:443"] {
+            assert!(own.hold(host) && all.hold(host), "{host}");
+        }
+        assert!(all.hold("10.0.0.9:8600") && !own.hold("10.0.0.9:8600"));
+        for host in
+            ["", "evil.example", "hall.example.org.evil.example", "localhost.evil.example", "a b", "user@"]
+        {
+            assert!(!own.hold(host) && !all.hold(host), "{host}");
+        }
+        for wrong in ["hall:8600", "http://hall", "", "a/b", "user@hall"] {
+            let told = names("10.0.0.5:8600", &[wrong]).unwrap_err().to_string();
+            assert!(told.starts_with("--host: expected a name or an address without a port"), "{told}");
         }
     }
 

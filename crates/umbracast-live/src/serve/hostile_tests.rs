@@ -22,8 +22,7 @@ fn server(limits: Limits) -> Server {
         clock: HostClock::start(),
         title: "a test".to_owned(),
     };
-    let door = Door { address: SocketAddr::from(([127, 0, 0, 1], 0)), token: None, tls: None };
-    start_with(limits, door, watched).unwrap()
+    start_with(limits, Door::at(SocketAddr::from(([127, 0, 0, 1], 0))), watched).unwrap()
 }
 
 fn brief() -> Limits {
@@ -171,5 +170,22 @@ fn one_address_takes_half_of_the_streams_at_most() {
     let mut answer = [0; 12];
     third.read_exact(&mut answer).unwrap();
     assert_eq!(&answer, b"HTTP/1.1 503");
+    server.stop();
+}
+
+/// Room for 16 MB was made, 64 times, for frames that never came.
+#[test]
+fn a_frame_of_a_websocket_is_refused_by_its_length_before_it_comes() {
+    let server = server(Limits::default());
+    let mut stream = BufReader::new(ask(&server, "/api/live", UPGRADE));
+    let mut line = String::new();
+    while line != "\r\n" {
+        line.clear();
+        assert!(stream.read_line(&mut line).unwrap() > 0, "closed");
+    }
+    // A text of 8 MB, of which the first bytes are sent.
+    let mut stream = stream.into_inner();
+    stream.write_all(&[0x81, 0xff, 0, 0, 0, 0, 0, 0x80, 0, 0, 1, 2, 3, 4, 5, 6]).unwrap();
+    assert!(is_closed(stream));
     server.stop();
 }

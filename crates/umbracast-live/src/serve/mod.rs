@@ -21,14 +21,13 @@ mod doors;
 mod metrics;
 mod openapi;
 
-use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Query, Request, State};
-use axum::http::uri::Authority;
 use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
@@ -44,7 +43,7 @@ use umbracast::{Error, Site};
 
 use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
-use doors::Doors;
+use doors::{Doors, Names};
 use tls::Tls;
 pub use watched::Watched;
 
@@ -54,6 +53,8 @@ const PAGE: &str = include_str!("page.html");
 const COOKIE: &str = "umbracast_token";
 /// Events that wait for a slow client; beyond it is told how many it missed.
 const EVENTS_WAITING: usize = 1024;
+/// What a client may say over a WebSocket at once.
+const SAID_BYTES: usize = 4096;
 /// Without a frame for so long, something is wrong.
 const STALE: Duration = Duration::from_secs(1);
 
@@ -96,6 +97,7 @@ struct Shared {
     newest: watch::Sender<Arc<Published>>,
     events: broadcast::Sender<Said>,
     token: Option<String>,
+    names: Names,
     doors: Mutex<Doors>,
     connections: Arc<Connections>,
 }
@@ -105,28 +107,40 @@ struct Shared {
 pub struct Door {
     /// Where it listens.
     pub address: SocketAddr,
+    /// Names by which clients ask for it, beside loopback's and the address that it listens on: that of a proxy, or of this
+    /// host.
+    pub hosts: Vec<String>,
     /// What clients must know.
     pub token: Option<String>,
     /// Files with the certificate and its key, PEM; without them it is served as it is.
     pub tls: Option<(PathBuf, PathBuf)>,
 }
 
+impl Door {
+    /// At an address, under its own name, to everybody who reaches it.
+    pub fn at(address: SocketAddr) -> Self {
+        Self { address, hosts: Vec::new(), token: None, tls: None }
+    }
+}
+
 /// Listens on an address. Others than loopback need a token: what is seen here is where people are.
 ///
 /// # Errors
-/// An address that is taken, or that others can reach without a token; files that hold no certificate and its key.
+/// An address that is taken, or that others can reach without a token; a host that is no name; files that hold no certificate
+/// and its key.
 pub fn start(door: Door, watched: Watched) -> Result<Server, Error> {
     start_with(Limits::default(), door, watched)
 }
 
 fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Error> {
-    let Door { address, token, tls } = door;
+    let Door { address, hosts, token, tls } = door;
     if !address.ip().is_loopback() && token.is_none() {
         return Err(Error::new(format!(
             "{address}: expected a token (UMBRACAST_TOKEN) for an address that other hosts can reach, found none"
         )));
     }
     token.as_deref().map_or(Ok(()), doors::check_token)?;
+    let names = Names::new(address, &hosts)?;
     let tls = tls.map(|(cert, key)| Tls::open(&cert, &key)).transpose()?;
     let listener = TcpListener::bind(address).map_err(|e| Error::new(e.to_string()).within(address))?;
     let failed = |e: std::io::Error| Error::new(e.to_string()).within(address);
@@ -147,6 +161,7 @@ fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Er
         newest: sender,
         events: event_sender,
         token,
+        names,
         doors,
         connections,
     };
@@ -208,7 +223,7 @@ async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) 
         return (StatusCode::TOO_MANY_REQUESTS, "too many wrong tokens: try again in a minute\n")
             .into_response();
     }
-    match refused(shared.token.as_deref(), &request) {
+    match refused(&shared.names, shared.token.as_deref(), &request) {
         Some(refusal) => {
             if let Some(guest) =
                 guest.filter(|_| refusal.0 == StatusCode::UNAUTHORIZED && given(&request).is_some())
@@ -237,27 +252,22 @@ fn given(request: &Request) -> Option<&str> {
         .or_else(|| cookies.find_map(|cookie| cookie.strip_prefix(COOKIE)?.strip_prefix('=')))
 }
 
-/// A request without the token is refused, and so is what a browser sends for a page from elsewhere: it carries that page's origin.
-/// Without a token, only loopback is listened to; there a name that leads here and is not this host's is refused as well.
-fn refused(token: Option<&str>, request: &Request) -> Option<(StatusCode, &'static str)> {
+/// A request under a name that is not this server's is refused, and so is what a browser sends for a page from elsewhere: it
+/// carries that page's origin. Then the token is asked for, where there is one.
+fn refused(names: &Names, token: Option<&str>, request: &Request) -> Option<(StatusCode, &'static str)> {
     let head = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
     let host = head(header::HOST).unwrap_or_default();
-    let foreign_origin = head(header::ORIGIN)
-        .is_some_and(|origin| origin.split_once("://").is_none_or(|(_, name)| name != host));
-    if foreign_origin || (token.is_none() && !is_loopback(host)) {
+    if !names.hold(host) {
+        let refusal = "expected the Host to be localhost, the address that is served (--serve), or a name given with --host\n";
+        return Some((StatusCode::FORBIDDEN, refusal));
+    }
+    let is_foreign = |origin: &str| origin.split_once("://").is_none_or(|(_, name)| name != host);
+    // An origin that is no text is nobody's.
+    if request.headers().contains_key(header::ORIGIN) && head(header::ORIGIN).is_none_or(is_foreign) {
         return Some((StatusCode::FORBIDDEN, "expected a request of this page's own\n"));
     }
     let refusal = (StatusCode::UNAUTHORIZED, "expected a token: Authorization: Bearer, or ?token=\n");
     token.filter(|token| !given(request).is_some_and(|given| same(given, token))).map(|_| refusal)
-}
-
-/// Whether a `Host` names this host alone, with or without a port.
-fn is_loopback(host: &str) -> bool {
-    let authority: Result<Authority, _> = host.parse();
-    authority.is_ok_and(|authority| {
-        let name = authority.host().trim_start_matches('[').trim_end_matches(']');
-        name == "localhost" || name.parse().is_ok_and(|address: IpAddr| address.is_loopback())
-    })
 }
 
 /// Compares in a time that tells nothing of where they differ.
@@ -305,8 +315,8 @@ async fn live(
     upgrade: WebSocketUpgrade,
 ) -> Response {
     let Some(place) = guest.stream() else { return full() };
-    // Nothing is expected from a client but that it closes.
-    let upgrade = upgrade.max_message_size(4096);
+    // Nothing is expected from a client but that it closes. Room is made for a frame before it comes.
+    let upgrade = upgrade.max_message_size(SAID_BYTES).max_frame_size(SAID_BYTES);
     upgrade.on_upgrade(move |socket| stream(socket, shared, place, query.with_points()))
 }
 

@@ -18,8 +18,8 @@ mod with {
     }
 
     fn door(cert: &str, key: &str) -> Door {
-        let address = SocketAddr::from(([127, 0, 0, 1], 0));
-        Door { address, token: None, tls: Some((file(cert), file(key))) }
+        let door = Door::at(SocketAddr::from(([127, 0, 0, 1], 0)));
+        Door { tls: Some((file(cert), file(key))), ..door }
     }
 
     fn watched() -> Watched {

@@ -17,6 +17,9 @@ use zenoh::{Session, Wait};
 
 pub use show::{json, text};
 
+/// More words than a thousand nodes say in a minute are not listened to.
+const WORDS_MAX: usize = 1 << 16;
+
 /// How long nodes may take to say what their site is.
 const ANSWER: Duration = Duration::from_secs(2);
 
@@ -109,7 +112,9 @@ pub fn look(
     let subscriber = subscriber.callback(move |sample| {
         if let Some(health) = fields::decode::<NodeHealth>(&sample.payload().to_bytes()) {
             let mut heard = heard.lock().unwrap_or_else(PoisonError::into_inner);
-            heard.push((sample.key_expr().to_string(), health, clock.now_ns()));
+            if heard.len() < WORDS_MAX {
+                heard.push((sample.key_expr().to_string(), health, clock.now_ns()));
+            }
         }
     });
     let subscriber = subscriber.wait().map_err(failed)?;
