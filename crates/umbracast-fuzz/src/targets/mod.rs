@@ -1,0 +1,53 @@
+//! The targets. Each has a promise, a check of it, and small whole inputs to begin from.
+//!
+//! A new target is a `Target` beside the others of its kind and a line in [`TARGETS`].
+
+mod files;
+mod tables;
+mod settings;
+mod packets;
+mod messages;
+mod requests;
+mod step;
+
+/// Where bytes come in.
+#[derive(Debug, Clone, Copy)]
+pub struct Target {
+    /// Its name on the command line and in `fuzz/`.
+    pub name: &'static str,
+    /// Whole inputs, small ones.
+    pub corpus: fn() -> Vec<Vec<u8>>,
+    /// Gives an input to what reads it, and panics where the target's promise is broken. True where the input was
+    /// understood.
+    pub check: fn(&[u8]) -> bool,
+}
+
+/// Every target.
+pub const TARGETS: [Target; 21] = [
+    files::MCAP,
+    tables::PARQUET,
+    files::CSV,
+    files::NDJSON,
+    files::PETRACK,
+    files::BVH,
+    files::PCAP,
+    files::PCD,
+    settings::TOML,
+    settings::NETWORKS,
+    settings::CALIBRATION,
+    packets::VELODYNE,
+    packets::OUSTER,
+    packets::HESAI,
+    packets::ASSEMBLE,
+    messages::NODES,
+    messages::ROWS,
+    messages::CLOUDS,
+    messages::OBJECTS,
+    requests::HTTP,
+    step::STEP,
+];
+
+/// The target of a name.
+pub fn target(name: &str) -> Option<&'static Target> {
+    TARGETS.iter().find(|target| target.name == name)
+}
