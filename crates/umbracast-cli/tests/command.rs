@@ -458,6 +458,33 @@ fn a_truncated_recording_gives_what_is_whole_and_code_3() {
 }
 
 #[test]
+fn inspect_tells_of_all_files_also_where_one_is_not_understood() {
+    let folder = folder("inspect_several");
+    let file = |name: &str, text: &str| {
+        let file = folder.join(name);
+        fs::write(&file, text).expect("writes");
+        file
+    };
+    let walk = file("walk.csv", "t_s,id,x_m,y_m\n0.0,7,1.0,0.5\n0.1,7,1.1,0.5\n");
+    let table = file("table.csv", "scene,frame\n0,1\n");
+    let petrack = file("walk.txt", "7 1 1.0 0.5 1.7\n7 2 1.1 0.5 1.7\n");
+    let wrong = file("wrong.bvh", "HIERARCHY ROOT");
+    let told = done(&["inspect", text(&walk), text(&table), text(&petrack)]);
+    assert!(
+        told.contains("recorded people") && told.contains("1 to 1.1") && told.contains("scene frame"),
+        "{told}"
+    );
+    assert!(told.contains("no rate in the file: --fps"), "{told}");
+    let output = umbracast(&["inspect", text(&wrong), text(&walk)]);
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(out.contains("not understood") && out.contains("recorded people"), "{out}");
+    assert!(
+        output.status.code() == Some(1) && err.contains("1 of 2 files") && err.contains("wrong.bvh"),
+        "{err}"
+    );
+}
+
+#[test]
 fn an_empty_and_a_wrong_file_are_named() {
     let folder = folder("wrong_files");
     for (name, bytes) in [("empty.mcap", &b""[..]), ("wrong.mcap", b"not a recording"), ("empty.pcd", b"")] {

@@ -12,11 +12,16 @@ use umbracast::{Config, Error};
 use umbracast_io::pcap::PcapReader;
 use umbracast_io::pcd::read_pcd;
 use umbracast_io::recording::{Entry, RecordingReader};
-use umbracast_io::tables;
+use umbracast_io::trajectories::{self, Options};
+use umbracast_io::{bvh, tables};
 
 use crate::args::{Common, Inspect};
 use crate::ending::Ending;
 use crate::{say, setup};
+
+/// The names of what is told of a damaged file.
+const LOST: &str = "lost";
+const REFUSED: &str = "not understood";
 
 /// What was found in a file: lines of name and value, and what was lost.
 #[derive(Default)]
@@ -31,23 +36,45 @@ impl Findings {
     }
 }
 
-/// Tells of every file.
+/// Tells of every file. One that cannot be read does not hide the others.
 pub fn run(args: &Inspect, common: &Common) -> Result<Ending, Error> {
-    let mut lost = Vec::new();
-    let mut all = Vec::new();
+    let (mut lost, mut refused, mut all) = (Vec::new(), Vec::new(), Vec::new());
     for file in &args.files {
-        let findings = look(file)?;
-        let pairs: serde_json::Map<String, serde_json::Value> =
-            findings.lines.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
-        all.push(json!({ "file": file.display().to_string(), "found": pairs, "lost": findings.lost }));
+        let findings = look(file);
         if !common.json {
             say::line(file.display());
-            findings.lines.iter().for_each(|(name, value)| say::line(format_args!("  {name:28} {value}")));
         }
-        lost.extend(findings.lost);
+        let named = file.display().to_string();
+        match findings {
+            Ok(findings) => {
+                let pairs: serde_json::Map<String, serde_json::Value> =
+                    findings.lines.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
+                all.push(json!({ "file": named, "found": pairs, "lost": findings.lost }));
+                let lines = findings.lines.iter().map(|(name, value)| (name.as_str(), value));
+                let lines = lines.chain(findings.lost.iter().map(|lost| (LOST, lost)));
+                lines
+                    .filter(|_| !common.json)
+                    .for_each(|(name, value)| say::line(format_args!("  {name:28} {value}")));
+                lost.extend(findings.lost);
+            }
+            Err(error) if args.files.len() == 1 => return Err(error),
+            Err(error) => {
+                all.push(json!({ "file": named, "refused": error.to_string() }));
+                if !common.json {
+                    say::line(format_args!("  {REFUSED:28} {error}"));
+                }
+                refused.push(error);
+            }
+        }
     }
     if common.json {
         say::line(format_args!("{:#}", serde_json::Value::Array(all)));
+    }
+    if let Some(first) = refused.first() {
+        let (refused, files) = (refused.len(), args.files.len());
+        return Err(Error::new(format!(
+            "{refused} of {files} files were not understood, the first: {first}"
+        )));
     }
     Ok(if lost.is_empty() { Ending::Done } else { Ending::DataLost(lost.join("; ")) })
 }
@@ -92,6 +119,15 @@ fn look(file: &Path) -> Result<Findings, Error> {
             found.say("sensors", config.site.sensors.len());
             found.say("access points", config.site.access_points.len());
         }
+        "ndjson" | "txt" => people(file, &mut found)?,
+        "bvh" => {
+            let motion = bvh::read(file)?;
+            found.say("kind", "motion capture");
+            found.say("joints", motion.joints.len());
+            found.say("frames", motion.positions.len());
+            found.say("duration_s", motion.frame_s * motion.positions.len() as f64);
+        }
+        "csv" if is_of_people(file)? => people(file, &mut found)?,
         "csv" => {
             let text = setup::read_text(file)?;
             let header = text.lines().next().filter(|line| line.contains(','));
@@ -116,12 +152,46 @@ fn look(file: &Path) -> Result<Findings, Error> {
         }
         other => {
             return Err(Error::new(format!(
-                "expected .mcap, .db3, .parquet, .csv, .pcd, .pcap, .safetensors, .toml or .json, found {other:?}"
+                "expected .mcap, .db3, .parquet, .csv, .ndjson, .txt, .bvh, .pcd, .pcap, .safetensors, .toml or .json, found \
+                 {other:?}"
             ))
             .within(file.display()));
         }
     }
     Ok(found)
+}
+
+/// Whether a table is one of recorded people: somebody's number, and where they were.
+fn is_of_people(file: &Path) -> Result<bool, Error> {
+    let bytes = setup::read(file)?;
+    let text = String::from_utf8_lossy(&bytes); // Headers may hold Latin-1.
+    let header = text.lines().find(|line| !line.is_empty() && !line.starts_with('#')).unwrap_or_default();
+    let has = |names: &[&str]| header.split(',').any(|column| names.contains(&column.trim()));
+    Ok(has(&["id"]) && has(&["x_m", "x/m"]))
+}
+
+fn people(file: &Path, found: &mut Findings) -> Result<(), Error> {
+    let known = trajectories::read(file, Options::default());
+    // Without a rate the rows are still there to be counted.
+    let counted = || trajectories::read(file, Options { fps: Some(1.0), ..Options::default() }).ok();
+    let (people, has_rate) = match known {
+        Ok(people) => (people, true),
+        Err(error) => (counted().ok_or(error)?, false),
+    };
+    let samples = || people.iter().flat_map(|person| &person.samples);
+    let span = |axis: usize| {
+        let all = samples().map(|sample| sample[axis]);
+        let (low, high) =
+            all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        format!("{low} to {high}")
+    };
+    found.say("kind", "recorded people");
+    found.say("people", people.len());
+    found.say("samples", samples().count());
+    found.say("time_s", if has_rate { span(0) } else { "no rate in the file: --fps gives one".to_owned() });
+    found.say("x_m", span(1));
+    found.say("y_m", span(2));
+    Ok(())
 }
 
 fn recording(file: &Path, found: &mut Findings) -> Result<(), Error> {
