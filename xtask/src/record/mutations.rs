@@ -1,4 +1,5 @@
-//! Damaged files given to the command, thousands a format: each must end with one of its exit codes.
+//! Damaged input, thousands a format: to the command, which must end with one of its exit codes, and in one process to all that
+//! reads bytes, whose promises must be kept (`crates/umbracast-fuzz`).
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,22 +9,33 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use super::book::Book;
-use crate::tools::{Result, root};
+use crate::tools::{self, Result, root};
+
+#[path = "../../../crates/umbracast-fuzz/src/mutate.rs"]
+mod mutate;
+
+use mutate::{Random, damage};
 
 /// Address space of a command, kilobytes.
 const MEMORY_KB: u64 = 6 << 20;
 /// A command that takes longer hangs.
 const LONGEST: Duration = Duration::from_secs(60);
-/// Damaged files of a format that is read within milliseconds, and of one that a simulation or a network reads.
+/// Damaged files of a format that the command is only asked to read, and of one behind which it simulates or runs all stages.
 const FILES: u64 = 100_000;
-const FILES_OF_SLOW: u64 = 10_000;
+const FILES_OF_SLOW: u64 = 500;
+/// So many are read by one process, which would else take longer to begin than to read.
+const BATCH: u64 = 50;
+/// Inputs in one process: packets of a family, frames through all stages in sixes, anything else.
+const PACKETS: u64 = 100_000_000;
+const SIXES: u64 = 170_000;
+const INPUTS: u64 = 100_000;
 
-/// One format: a whole file, and the words that read it; `{}` stands for the damaged one, `{out}` for a folder.
+/// One format: whole files, and the words that read a damaged one; `{}` stands for it, `{out}` for a folder.
 struct Format {
     name: &'static str,
-    whole: PathBuf,
-    words: Vec<String>,
-    files: u64,
+    wholes: Vec<Vec<u8>>,
+    ending: &'static str,
+    words: &'static str,
 }
 
 /// What became of the files of a format.
@@ -37,22 +49,21 @@ struct Tally {
     first: Mutex<Option<String>>,
 }
 
-/// Damages a file of every format in every way and lets the command read it. `MUTATIONS` in the environment is the share of the
-/// usual counts.
+/// Damages files of every format in every way. `MUTATIONS` in the environment is the share of the usual counts.
 pub fn mutations(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record mutations");
     let share: f64 = std::env::var("MUTATIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(1.0);
-    book.line(&format!(
-        "a few bytes changed, cut, inserted, or numbers made extreme; {} GB each",
-        MEMORY_KB >> 20
-    ));
-    book.line("format        files   read  refused  data lost  ended the program  hung");
-    for format in formats(book)? {
-        let files = ((format.files as f64 * share) as u64).max(1);
-        let tally = damage(book, &format, files)?;
+    let of = |count: u64| ((count as f64 * share) as u64).max(1);
+    book.line("a few bytes changed, cut, inserted, repeated, or numbers made extreme");
+    book.line(&format!("files to the command, {} GB of memory each:", MEMORY_KB >> 20));
+    book.line("format            files     read  refused  data lost  ended the program  hung");
+    let mutator = mutator()?;
+    for format in formats(book, &mutator)? {
+        let files = of(if format.words == INSPECT { FILES } else { FILES_OF_SLOW });
+        let tally = damaged_files(book, &format, files)?;
         let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
         book.line(&format!(
-            "{:10} {files:8} {:6} {:8} {:10} {:18} {:5}",
+            "{:16} {files:6} {:8} {:8} {:10} {:18} {:5}",
             format.name,
             count(&tally.done),
             count(&tally.refused),
@@ -64,120 +75,102 @@ pub fn mutations(book: &mut Book) -> Result<()> {
             book.line(&format!("  the first: {first}"));
         }
     }
+    book.line("in one process (`step`: six frames an input):");
+    let names = tools::output(&root(), &mutator.to_string_lossy(), &["--list"])?;
+    for (number, name) in names.lines().enumerate() {
+        let inputs = match name {
+            "step" => SIXES,
+            name if name.starts_with("packets") => PACKETS,
+            _ => INPUTS,
+        };
+        // A promise that was broken belongs in the record, so what the program ends with is not looked at.
+        let said = book.bash(&root(), &format!("'{}' {name} --inputs {}", mutator.display(), of(inputs)))?;
+        said.lines().skip(usize::from(number > 0)).for_each(|line| book.line(line));
+    }
     Ok(())
 }
 
-/// Whole files, made small.
-fn formats(book: &Book) -> Result<Vec<Format>> {
+/// The mutator of one process.
+fn mutator() -> Result<PathBuf> {
+    let words = ["build", "--release", "--quiet", "--package", "umbracast-fuzz"];
+    tools::output(&root(), "cargo", &words)?;
+    Ok(tools::target().join("release").join(format!("umbracast-fuzz{}", std::env::consts::EXE_SUFFIX)))
+}
+
+/// What reads a file and no more.
+const INSPECT: &str = "inspect {}";
+
+/// Whole files: those of the mutator, and tables and a recording of a simulated scene.
+fn formats(book: &Book, mutator: &Path) -> Result<Vec<Format>> {
     let made = book.scratch("whole");
     fs::create_dir_all(&made).map_err(|e| e.to_string())?;
     let at = |name: &str| made.join(name);
-    let save = |name: &str, text: &str| fs::write(at(name), text).map_err(|e| format!("{name}: {e}"));
-    let sim = at("sim").display().to_string();
-    let run = at("run").display().to_string();
+    let read = |file: PathBuf| fs::read(&file).map_err(|e| format!("{}: {e}", file.display()));
+    let (sim, run) = (at("sim").display().to_string(), at("run").display().to_string());
     book.quietly(&["simulate", "--people", "2", "--stroll", "1", "--out", &sim].map(Into::into))?;
     book.quietly(&["run", &sim, "--out", &run].map(Into::into))?;
-    let recording = fs::read(at("sim/scene-0000.mcap")).map_err(|e| e.to_string())?;
-    // As a recorder leaves it that was killed: the first chunk and the beginning of the next.
-    fs::write(at("cut.mcap"), &recording[..recording.len().min(200_000)]).map_err(|e| e.to_string())?;
-    let steps = || (0..25).map(|i| (f64::from(i) * 0.1, f64::from(i) * 0.1));
-    save(
-        "walk.csv",
-        &steps().fold("t_s,id,x_m,y_m\n".to_owned(), |text, (t, x)| text + &format!("{t:.1},1,{x:.2},0.5\n")),
-    )?;
-    let track =
-        |i: usize, x: f64| format!("{{\"track\": {{\"f\": {i}, \"p\": 1, \"x\": {x:.2}, \"y\": 0.5}}}}\n");
-    let scene = "{\"scene\": {\"id\": 0, \"p\": 1, \"s\": 0, \"e\": 24, \"fps\": 10}}\n".to_owned();
-    save("walk.ndjson", &steps().enumerate().fold(scene, |text, (i, (_, x))| text + &track(i, x)))?;
-    save(
-        "walk.txt",
-        &steps().enumerate().fold("# framerate: 10\n".to_owned(), |text, (i, (_, x))| {
-            text + &format!("1 {i} {x:.2} 0.5 1.7\n")
-        }),
-    )?;
-    let points = (0..64).fold(String::new(), |text, i| text + &format!("{}.5 {} 1.25\n", i % 8, i / 8));
-    save(
-        "cloud.pcd",
-        &format!(
-            "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 64\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 64\nDATA ascii\n{points}"
-        ),
-    )?;
-    fs::write(at("capture.pcap"), capture()).map_err(|e| e.to_string())?;
-    let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
-    let format = |name, whole: PathBuf, line: &str, files| Format { name, whole, words: words(line), files };
+    tools::output(&root(), &mutator.to_string_lossy(), &["--corpus", &made.display().to_string()])?;
+    let corpus = |target: &str| {
+        tools::files_below(&at(target), "").into_iter().map(read).collect::<Result<Vec<Vec<u8>>>>()
+    };
+    let format = |name, wholes, ending, words| Format { name, wholes, ending, words };
+    // The last of the weights is no weights' file, but one of another network.
+    let mut weights = corpus("weights")?;
+    weights.truncate(2);
+    let simulated = read(at("sim/scene-0000.mcap"))?;
+    let tables = |names: &[&str]| {
+        names.iter().map(|name| read(at(&format!("run/{name}.parquet")))).collect::<Result<_>>()
+    };
+    let simulate = "simulate --trajectories {} --out {out}";
     Ok(vec![
-        format("mcap", at("cut.mcap"), "inspect {}", FILES),
-        format("mcap, run", at("cut.mcap"), "run {} --out {out}", FILES_OF_SLOW),
-        format("parquet", at("run/links.parquet"), "inspect {}", FILES),
-        format("tables", at("run/tracks.parquet"), "evaluate {out} --truth SIM", FILES_OF_SLOW),
-        format("pcap", at("capture.pcap"), "inspect {}", FILES),
-        format("pcd", at("cloud.pcd"), "inspect {}", FILES),
-        format("toml", root().join("config/sites/glass.toml"), "config --check {}", FILES),
-        format("csv", at("walk.csv"), "simulate --trajectories {} --out {out}", FILES_OF_SLOW),
-        format("ndjson", at("walk.ndjson"), "simulate --trajectories {} --out {out}", FILES_OF_SLOW),
-        format("petrack", at("walk.txt"), "simulate --trajectories {} --out {out}", FILES_OF_SLOW),
+        format("mcap", corpus("mcap")?, "mcap", INSPECT),
+        format("parquet", tables(&["detections", "links", "tracks"])?, "parquet", INSPECT),
+        format("csv", corpus("csv")?, "csv", INSPECT),
+        format("ndjson", corpus("ndjson")?, "ndjson", INSPECT),
+        format("petrack", corpus("petrack")?, "txt", INSPECT),
+        format("bvh", corpus("bvh")?, "bvh", INSPECT),
+        format("pcap", corpus("pcap")?, "pcap", INSPECT),
+        format("pcd", corpus("pcd")?, "pcd", INSPECT),
+        format("toml", corpus("toml")?, "toml", INSPECT),
+        format("weights", weights.clone(), "safetensors", INSPECT),
+        // As a recorder leaves it that was killed: the first chunk and the beginning of the next.
         format(
-            "weights",
-            root().join("models/paper_lstm.safetensors"),
-            "run SIM --mode paper --weights {} --out {out}",
-            FILES_OF_SLOW,
+            "mcap, run",
+            vec![simulated[..simulated.len().min(200_000)].to_vec()],
+            "mcap",
+            "run {} --out {out}",
         ),
+        format("tables, evaluate", tables(&["tracks"])?, "parquet", "evaluate {out} --truth SIM"),
+        format("csv, simulate", corpus("csv")?, "csv", simulate),
+        format("ndjson, simulate", corpus("ndjson")?, "ndjson", simulate),
+        format("petrack, simulate", corpus("petrack")?, "txt", simulate),
+        format("weights, run", weights, "safetensors", "run SIM --mode paper --weights {} --out {out}"),
     ])
 }
 
-/// A capture of three packets of an HDL-32E.
-fn capture() -> Vec<u8> {
-    let mut bytes =
-        vec![0xd4, 0xc3, 0xb2, 0xa1, 2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0, 0, 1, 0, 0, 0];
-    for k in 0..3_u8 {
-        let mut datagram = vec![9_u8, 64, 9, 64]; // Ports 2368.
-        datagram.extend(1214_u16.to_be_bytes());
-        datagram.extend([0, 0]);
-        for block in 0..12_u16 {
-            datagram.extend([0xff, 0xee]);
-            datagram.extend((block * 20 + u16::from(k) * 240).to_le_bytes());
-            datagram.extend([0x10, 0x27, 9].repeat(32));
-        }
-        datagram.extend([k, 0, 0, 0, 0x37, 0x21]);
-        let mut packet = [[2_u8; 12].as_slice(), &[8, 0, 0x45, 0]].concat();
-        packet.extend((20 + datagram.len() as u16).to_be_bytes());
-        packet.extend([0, 0, 0, 0, 64, 17, 0, 0, 192, 168, 1, 201, 255, 255, 255, 255]);
-        packet.extend(datagram);
-        let length = (packet.len() as u32).to_le_bytes();
-        bytes.extend([0, 0, 0, 0, k, 0, 0, 0]);
-        bytes.extend([length, length].concat());
-        bytes.extend(packet);
-    }
-    bytes
-}
-
-fn damage(book: &Book, format: &Format, files: u64) -> Result<Tally> {
-    let whole = fs::read(&format.whole).map_err(|e| format!("{}: {e}", format.whole.display()))?;
-    let ending = format.whole.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
-    let folder = book.scratch("undamaged");
-    fs::create_dir_all(folder.join("out")).map_err(|e| e.to_string())?;
-    match read(book, format, &folder, &format.whole)? {
-        Some((Some(0 | 3), _)) => {}
-        other => return Err(format!("{}: expected the whole file to be read, found {other:?}", format.name)),
-    }
+fn damaged_files(book: &Book, format: &Format, files: u64) -> Result<Tally> {
     let (tally, next) = (Tally::default(), AtomicU64::new(0));
     let threads = std::thread::available_parallelism().map_or(2, usize::from);
+    let batch = if format.words == INSPECT { BATCH } else { 1 };
     std::thread::scope(|scope| {
         let worker = |thread: usize| {
-            let (tally, next, whole, ending) = (&tally, &next, &whole, &ending);
+            let (tally, next) = (&tally, &next);
             move || -> Result<()> {
                 let folder = book.scratch(&format!("worker-{thread}"));
                 fs::create_dir_all(folder.join("out")).map_err(|e| e.to_string())?;
                 loop {
-                    let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed >= files {
+                    let from = next.fetch_add(batch, Ordering::Relaxed);
+                    if from >= files {
                         return Ok(());
                     }
-                    let bytes = damaged(whole, &mut Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1));
-                    let file = folder.join(format!("damaged.{ending}"));
-                    fs::write(&file, &bytes).map_err(|e| e.to_string())?;
-                    let told = read(book, format, &folder, &file)?;
-                    tally.note(seed, told);
+                    let seeds: Vec<u64> = (from..files.min(from + batch)).collect();
+                    let damaged = written(format, &folder, &seeds)?;
+                    // Where a process ends or hangs, each file is given to one of its own.
+                    if batch == 1 || !tally.note_batch(&told(book, format, &folder, &damaged)?) {
+                        for (seed, file) in seeds.iter().zip(&damaged) {
+                            tally.note(*seed, &told(book, format, &folder, std::slice::from_ref(file))?);
+                        }
+                    }
                 }
             }
         };
@@ -189,45 +182,60 @@ fn damage(book: &Book, format: &Format, files: u64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// The exit code and what was said last; no code where a signal ended the command, no answer where it hung.
-fn read(book: &Book, format: &Format, folder: &Path, file: &Path) -> Result<Option<(Option<i32>, String)>> {
-    let whole = book.scratch("whole");
-    let out = folder.join("out");
-    if format.name == "tables" {
+/// The damaged files of these seeds.
+fn written(format: &Format, folder: &Path, seeds: &[u64]) -> Result<Vec<PathBuf>> {
+    let mut bytes = Vec::new();
+    let write = |(place, seed): (usize, &u64)| {
+        let whole = &format.wholes[*seed as usize % format.wholes.len()];
+        damage(whole, &mut Random::new(*seed), &mut bytes);
+        let file = folder.join(format!("damaged-{place}.{}", format.ending));
+        fs::write(&file, &bytes).map_err(|e| e.to_string())?;
+        Ok(file)
+    };
+    seeds.iter().enumerate().map(write).collect()
+}
+
+/// What a process came to: its exit code, none where a signal ended it; what it said.
+struct Told {
+    hung: bool,
+    code: Option<i32>,
+    out: String,
+    err: String,
+}
+
+fn told(book: &Book, format: &Format, folder: &Path, files: &[PathBuf]) -> Result<Told> {
+    let (whole, out) = (book.scratch("whole"), folder.join("out"));
+    if format.words.starts_with("evaluate") {
         for entry in fs::read_dir(whole.join("run")).map_err(|e| e.to_string())?.flatten() {
             let _ = fs::copy(entry.path(), out.join(entry.file_name()));
         }
-        fs::copy(file, out.join("tracks.parquet")).map_err(|e| e.to_string())?;
+        fs::copy(&files[0], out.join("tracks.parquet")).map_err(|e| e.to_string())?;
     }
-    let sim = whole.join("sim");
-    let words = format.words.iter().map(|word| match word.as_str() {
-        "{}" => file.to_path_buf(),
-        "{out}" => out.clone(),
-        "SIM" => sim.clone(),
-        other => other.into(),
+    let words = format.words.split(' ').flat_map(|word| match word {
+        "{}" => files.to_vec(),
+        "{out}" => vec![out.clone()],
+        "SIM" => vec![whole.join("sim")],
+        other => vec![other.into()],
     });
     let mut command = Command::new("sh");
-    command
-        .args(["-c", &format!("ulimit -v {MEMORY_KB}; exec \"$0\" \"$@\"")])
-        .arg(book.umbracast())
-        .args(words);
-    let quiet = !matches!(format.name, "toml");
-    let said = folder.join("said");
-    let stderr = fs::File::create(&said).map_err(|e| e.to_string())?;
-    command.args(quiet.then_some("--quiet")).current_dir(root()).stdin(Stdio::null()).stdout(Stdio::null());
-    let mut child = command.stderr(stderr).spawn().map_err(|e| format!("sh: {e}"))?;
+    command.args(["-c", &format!("ulimit -v {MEMORY_KB}; exec \"$0\" \"$@\"")]).arg(book.umbracast());
+    let [said_out, said_err] = ["out.txt", "err.txt"].map(|name| folder.join(name));
+    let create = |file: &Path| fs::File::create(file).map_err(|e| e.to_string());
+    command.args(words).arg("--quiet").current_dir(root()).stdin(Stdio::null());
+    command.stdout(create(&said_out)?).stderr(create(&said_err)?);
+    let mut child = command.spawn().map_err(|e| format!("sh: {e}"))?;
+    let text = |file: &Path| String::from_utf8_lossy(&fs::read(file).unwrap_or_default()).into_owned();
     #[allow(clippy::disallowed_methods)] // Nothing but the clock of this machine tells that a command hangs.
     let begun = Instant::now();
     let mut pause = Duration::from_micros(500);
     loop {
         if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
-            let said = fs::read(&said).unwrap_or_default();
-            return Ok(Some((status.code(), String::from_utf8_lossy(&said).trim().to_owned())));
+            return Ok(Told { hung: false, code: status.code(), out: text(&said_out), err: text(&said_err) });
         }
         if begun.elapsed() > LONGEST {
             let _ = child.kill();
             let _ = child.wait();
-            return Ok(None);
+            return Ok(Told { hung: true, code: None, out: String::new(), err: String::new() });
         }
         std::thread::sleep(pause);
         pause = (pause * 5 / 4).min(Duration::from_millis(50));
@@ -235,68 +243,35 @@ fn read(book: &Book, format: &Format, folder: &Path, file: &Path) -> Result<Opti
 }
 
 impl Tally {
-    fn note(&self, seed: u64, told: Option<(Option<i32>, String)>) {
-        let of = match &told {
-            None => &self.hung,
-            Some((Some(0), _)) => &self.done,
-            Some((Some(1 | 2), _)) => &self.refused,
-            Some((Some(3), _)) => &self.lost,
-            Some(_) => &self.ended,
+    /// Counts the files of a process that read several; false where it ended before it was through.
+    fn note_batch(&self, told: &Told) -> bool {
+        if !matches!(told.code, Some(0 | 1 | 3)) {
+            return false;
+        }
+        let count = |what: &str| told.out.lines().filter(|line| line.starts_with(what)).count() as u64;
+        let (refused, lost) = (count("  not understood  "), count("  lost  "));
+        let files = told.out.lines().filter(|line| !line.starts_with("  ")).count() as u64;
+        self.refused.fetch_add(refused, Ordering::Relaxed);
+        self.lost.fetch_add(lost, Ordering::Relaxed);
+        self.done.fetch_add(files - refused - lost, Ordering::Relaxed);
+        true
+    }
+
+    /// Counts the file of a process of its own.
+    fn note(&self, seed: u64, told: &Told) {
+        let of = match told.code {
+            _ if told.hung => &self.hung,
+            Some(0) => &self.done,
+            Some(1 | 2) => &self.refused,
+            Some(3) => &self.lost,
+            _ => &self.ended,
         };
         of.fetch_add(1, Ordering::Relaxed);
-        if let (true, Some((code, said))) = (std::ptr::eq(of, &self.ended), told)
+        if (std::ptr::eq(of, &self.ended) || told.hung)
             && let Ok(mut first) = self.first.lock()
         {
-            let last = said.lines().rev().take(2).collect::<Vec<_>>().join(" | ");
-            first.get_or_insert_with(|| format!("seed {seed}, code {code:?}: {last}"));
+            let last = told.err.trim().lines().rev().take(2).collect::<Vec<_>>().join(" | ");
+            first.get_or_insert_with(|| format!("seed {seed}, code {:?}: {last}", told.code));
         }
-    }
-}
-
-/// A file with one to four damages.
-fn damaged(whole: &[u8], random: &mut Random) -> Vec<u8> {
-    const EXTREME: [u64; 8] = [0, 1, 0x7f, 0xff, 0x7fff_ffff, 0xffff_ffff, 1 << 62, u64::MAX];
-    let mut bytes = whole.to_vec();
-    for _ in 0..=random.below(4) {
-        if bytes.is_empty() {
-            break;
-        }
-        // Heads and tails hold the lengths: half of the damage is done there.
-        let at = match random.below(4) {
-            0 => random.below(bytes.len().min(512)),
-            1 => bytes.len() - 1 - random.below(bytes.len().min(512)),
-            _ => random.below(bytes.len()),
-        };
-        match random.below(6) {
-            0 => bytes[at] ^= 1 << random.below(8),
-            1 => bytes[at] = random.next() as u8,
-            2 => bytes.truncate(at),
-            3 => drop(
-                bytes.splice(at..at, (0..random.below(16)).map(|_| random.next() as u8).collect::<Vec<_>>()),
-            ),
-            4 => drop(bytes.drain(at..(at + random.below(16)).min(bytes.len()))),
-            _ => {
-                let width = [1, 2, 4, 8][random.below(4)].min(bytes.len() - at);
-                let number = EXTREME[random.below(EXTREME.len())].to_le_bytes();
-                bytes[at..at + width].copy_from_slice(&number[..width]);
-            }
-        }
-    }
-    bytes
-}
-
-/// Marsaglia's xorshift. The same seed gives the same damage.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0
-    }
-
-    fn below(&mut self, most: usize) -> usize {
-        (self.next() >> 16) as usize % most.max(1)
     }
 }
