@@ -10,7 +10,7 @@ use umbracast_io::rows::LinkRow;
 use super::*;
 use crate::clock::HostClock;
 use crate::run::Counters;
-use crate::warnings::State as LinkState;
+use crate::warnings::{Event, State as LinkState};
 
 const UPGRADE: &str = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
                        Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
