@@ -2,7 +2,10 @@
 
 use std::fs;
 
-use umbracast_io::rows::{DetectionRow, LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
+use umbracast::decide::Action;
+use umbracast_io::rows::{
+    DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow,
+};
 use umbracast_io::tables::{self, Cell, Row, describe, path_in};
 
 use super::Target;
@@ -27,6 +30,8 @@ fn written() -> Vec<Vec<u8>> {
         table_of::<MatchRow>(3),
         table_of::<TrackRow>(4),
         table_of::<LinkRow>(5),
+        table_of::<LossRow>(6),
+        table_of::<DecisionRow>(7),
     ]
 }
 
@@ -46,6 +51,8 @@ fn table_of<R: Row>(kind: u8) -> Vec<u8> {
                 Cell::MaybeBool(value) => *value = [None, Some(false), Some(true)][counter as usize % 3],
                 Cell::MaybeF64(value) => *value = (!counter.is_multiple_of(3)).then_some(0.5),
                 Cell::AccessPoint(value) => *value = counter % 2,
+                Cell::MaybeAccessPoint(value) => *value = (!counter.is_multiple_of(3)).then_some(counter % 2),
+                Cell::Action(value) => *value = Action::ALL[counter as usize % Action::ALL.len()],
             }
         });
     }
@@ -56,13 +63,15 @@ fn table_of<R: Row>(kind: u8) -> Vec<u8> {
 
 fn table(input: &[u8]) -> bool {
     let Some((kind, bytes)) = input.split_first() else { return false };
-    match kind % 6 {
+    match kind % 8 {
         0 => rows_of::<PeopleRow>(bytes),
         1 => rows_of::<PeopleLinkRow>(bytes),
         2 => rows_of::<DetectionRow>(bytes),
         3 => rows_of::<MatchRow>(bytes),
         4 => rows_of::<TrackRow>(bytes),
-        _ => rows_of::<LinkRow>(bytes),
+        5 => rows_of::<LinkRow>(bytes),
+        6 => rows_of::<LossRow>(bytes),
+        _ => rows_of::<DecisionRow>(bytes),
     }
 }
 
@@ -74,7 +83,9 @@ fn rows_of<R: Row>(bytes: &[u8]) -> bool {
             rows += group.len();
             for mut row in group.iter().copied() {
                 row.visit(&mut |_, cell| match cell {
-                    Cell::AccessPoint(index) => assert!((*index as usize) < known.len()),
+                    Cell::AccessPoint(index) | Cell::MaybeAccessPoint(Some(index)) => {
+                        assert!((*index as usize) < known.len());
+                    }
                     _ => {}
                 });
             }
