@@ -104,7 +104,7 @@ pub fn logictronix(book: &mut Book) -> Result<()> {
         let (it, others) = (&boxes[place], boxes.iter().enumerate().filter(|(k, _)| *k != place));
         let hidden = others.map(|(_, other)| other).any(|other| it.is_behind(other));
         book.line(&format!(
-            "frame {frame:3}, the {:2}. of its stretch: label {label} at {:.1} m, {:3} returns in the box, {}",
+            "frame {frame:3}, number {:2} of its stretch: label {label} at {:.1} m, {:3} returns in the box, {}",
             frame - f64::from(first) + 1.0,
             it.centre_m[0].hypot(it.centre_m[1]),
             points.iter().filter(|point| it.holds(point)).count(),

@@ -1,5 +1,6 @@
-//! ROS 2 without an installation of ROS: topics as `rmw_zenoh` puts them on Zenoh, so that `ros2 topic list` and `echo`
-//! see ours, and the packets and clouds of existing drivers are read.
+//! ROS 2 without an installation of ROS: topics as `rmw_zenoh` puts them on Zenoh, made so that `ros2 topic list` and `echo`
+//! see ours, and the packets and clouds of existing drivers are read. Tried with clients in Python (`tests/peers.rs`), not with a
+//! C++ `rmw_zenoh`.
 //!
 //! What `rmw_zenoh` 0.2 and later (Jazzy, Kilted, Rolling) agree on, and what is here for it:
 //!
