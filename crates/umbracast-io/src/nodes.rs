@@ -94,11 +94,11 @@ pub struct Warning {
     pub track: u64,
     /// `warning`, `blocked`, `clear`, or `gone` where nobody is followed any more.
     pub state: String,
-    /// Probability that the link is blocked now,
+    /// Probability that anything blocks the link now,
     pub p_now: f64,
     /// and within 900 ms.
     pub p_w9: f64,
-    /// 10, 50 and 90 % quantiles of the time until it is; NaN: none.
+    /// 10, 50 and 90 % quantiles of the time until somebody else does; NaN: none.
     pub onset_s: [f64; 3],
     /// When the last front end closed the frame, time of its host.
     pub closed_ns: i64,

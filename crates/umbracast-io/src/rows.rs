@@ -132,6 +132,42 @@ pub struct LinkRow {
     pub p_any: [Option<f64>; 1 + STEPS],
 }
 
+/// A link is taken for blocked by any cause from this probability on.
+const LIKELY: f64 = 0.5;
+
+impl LinkRow {
+    /// The probability that anything blocks the link: now, then within window `window`; that of others alone where the method
+    /// knows no other cause.
+    pub fn p_of_any(&self, window: usize) -> f64 {
+        self.p_any[window].unwrap_or_else(|| self.p_of_others(window))
+    }
+
+    /// Whether anything blocks the link now.
+    pub fn is_blocked(&self) -> bool {
+        self.blocked_now || self.p_of_any(0) >= LIKELY
+    }
+
+    /// Whether it is free now, but anything is likely to block it within the last window.
+    pub fn is_warned_of(&self) -> bool {
+        !self.is_blocked() && (self.blocked[STEPS - 1] || self.p_of_any(STEPS) >= LIKELY)
+    }
+
+    /// What is the likeliest to block it, now where it is blocked, else within the last window: `others`, `owner` or `hall`.
+    pub fn cause(&self) -> &'static str {
+        let window = if self.is_blocked() { 0 } else { STEPS };
+        let others = ("others", self.p_of_others(window));
+        [("owner", self.p_own[window]), ("hall", self.p_hall[window])]
+            .into_iter()
+            .filter_map(|(name, p)| Some((name, p?)))
+            .fold(others, |likeliest, cause| if cause.1 > likeliest.1 { cause } else { likeliest })
+            .0
+    }
+
+    fn p_of_others(&self, window: usize) -> f64 {
+        window.checked_sub(1).map_or(self.p_now, |window| self.p[window])
+    }
+}
+
 /// Our answer: what one link loses to bodies in one frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LossRow {

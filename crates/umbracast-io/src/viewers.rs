@@ -48,8 +48,8 @@ pub fn markers(time_ns: i64, site: &Site, tracks: &[TrackRow], links: &[LinkRow]
         };
         let ue_m = site.ue_m(DVec2::new(track.x_m, track.y_m), track.heading_rad, track.height_m).to_array();
         rays.points_m.extend([ap.position_m, ue_m]);
-        rays.colours.extend([of_probability(link.p[STEPS - 1]); 2]);
-        if link.blocked_now {
+        rays.colours.extend([of_probability(link.p_of_any(STEPS)); 2]);
+        if link.is_blocked() {
             blocked.points_m.extend([ap.position_m, ue_m]);
         }
     }

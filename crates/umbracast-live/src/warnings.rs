@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
+use umbracast::STEPS;
 use umbracast_io::rows::LinkRow;
 
 /// What a link has come to.
@@ -11,9 +12,9 @@ use umbracast_io::rows::LinkRow;
 pub enum State {
     /// In sight, and likely to stay so for 900 ms.
     Clear,
-    /// In sight, and likely to be blocked within 900 ms.
+    /// In sight, and likely to be blocked within 900 ms: by others, the owner or the hall.
     Warned,
-    /// Blocked.
+    /// Blocked by any of them.
     Blocked,
     /// Nobody is followed there any more, who was warned of or blocked before.
     Gone,
@@ -46,10 +47,10 @@ impl State {
     }
 
     fn of(link: &LinkRow) -> Self {
-        match (link.blocked_now, link.blocked.last()) {
+        match (link.is_blocked(), link.is_warned_of()) {
             (true, _) => Self::Blocked,
-            (false, Some(true)) => Self::Warned,
-            _ => Self::Clear,
+            (false, true) => Self::Warned,
+            (false, false) => Self::Clear,
         }
     }
 }
@@ -109,7 +110,10 @@ impl Event {
             "frame": link.frame,
             "time_ns": link.time_ns,
             "p_now": link.p_now,
-            "p_w9": link.p[link.p.len() - 1],
+            "p_w9": link.p[STEPS - 1],
+            "p_any_now": link.p_of_any(0),
+            "p_any_w9": link.p_of_any(STEPS),
+            "cause": matches!(state, State::Warned | State::Blocked).then(|| link.cause()),
             "onset_p10_s": link.onset_s[0],
             "onset_p50_s": link.onset_s[1],
             "onset_p90_s": link.onset_s[2],
@@ -138,6 +142,21 @@ mod tests {
             })
             .collect();
         assert_eq!(said, [vec![], vec!["warning"], vec![], vec!["blocked"], vec!["clear"]]);
+    }
+
+    /// A link behind a pillar was once clear: nobody was told of it.
+    #[test]
+    fn a_link_that_a_pillar_blocks_is_not_clear() {
+        let mut warnings = Warnings::default();
+        let mut behind = link(false, false);
+        (behind.p_any[STEPS], behind.p_hall[STEPS]) = (Some(0.9), Some(0.9));
+        let told = &warnings.changes(&[behind], &[])[0];
+        assert_eq!((told.state, &told.json()["cause"]), (State::Warned, &"hall".into()));
+        (behind.p_any[0], behind.p_own[0]) = (Some(0.7), Some(0.7));
+        let told = &warnings.changes(&[behind], &[])[0];
+        assert_eq!((told.state, &told.json()["cause"]), (State::Blocked, &"owner".into()));
+        let told = &warnings.changes(&[link(false, false)], &[])[0];
+        assert_eq!((told.state, &told.json()["cause"]), (State::Clear, &Value::Null));
     }
 
     #[test]

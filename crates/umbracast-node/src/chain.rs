@@ -281,8 +281,8 @@ fn warning(event: &Event, time_ns: i64, frame: u64, closed_ns: i64) -> Warning {
         access_point: event.access_point.clone(),
         track: link.track,
         state: event.state.name().to_owned(),
-        p_now: link.p_now,
-        p_w9: link.p[link.p.len() - 1],
+        p_now: link.p_of_any(0),
+        p_w9: link.p_of_any(umbracast::STEPS),
         onset_s: link.onset_s.map(|onset_s| onset_s.unwrap_or(f64::NAN)),
         closed_ns,
     }

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use umbracast::{Error, STEPS, Site};
+use umbracast::{Error, Site};
 use umbracast_io::rows::{LinkRow, TrackRow};
 
 use super::context::Kept;
@@ -85,7 +85,7 @@ pub fn plan(kept: &Kept) -> Result<Option<Figure>, Error> {
 
 /// Which of the plan's three kinds a link is.
 fn kind_of(link: &LinkRow) -> usize {
-    if link.blocked_now { 2 } else { usize::from(link.blocked[STEPS - 1]) }
+    if link.is_blocked() { 2 } else { usize::from(link.is_warned_of()) }
 }
 
 /// Walls, pillars, furniture and a bar for the scale.

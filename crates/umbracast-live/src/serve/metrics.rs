@@ -43,7 +43,8 @@ pub fn text(watched: &Watched, newest: &Published, connections: &Connections) ->
         newest.frames_skipped as f64,
     );
     gauge(&mut out, "tracks", "People followed now.", newest.tracks.len() as f64);
-    let state = |blocked: bool| newest.links.iter().filter(|link| link.blocked_now == blocked).count() as f64;
+    let state =
+        |blocked: bool| newest.links.iter().filter(|link| link.is_blocked() == blocked).count() as f64;
     gauge(&mut out, "links_blocked", "Links blocked now.", state(true));
     gauge(&mut out, "streams", "Open WebSockets and event streams.", connections.streams() as f64);
     let what = "Connections closed unheard because there were too many.";
