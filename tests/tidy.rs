@@ -169,10 +169,13 @@ fn every_figure_of_a_page_stands_in_a_recorded_run() {
         for part in text.split("<!-- from ").skip(1) {
             let (comment, rest) = part.split_once("-->").expect("a comment that names a record");
             let name = comment.split_whitespace().next().expect("the name of a record");
-            let record =
-                fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{page}: {name}: {e}"));
             let block = rest.split("```").nth(1).expect("a block below the comment");
             let lines: Vec<&str> = block.lines().skip(1).filter(|line| !line.trim().is_empty()).collect();
+            // A record that nobody has made yet has an empty block.
+            let Ok(record) = fs::read_to_string(root().join(name)) else {
+                assert!(lines.is_empty(), "{page} quotes {name}, which is not there");
+                continue;
+            };
             assert!(!lines.is_empty(), "{page} quotes nothing of {name}");
             for line in lines {
                 let found = record.lines().any(|recorded| recorded.trim_end() == line.trim_end());

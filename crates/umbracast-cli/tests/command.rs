@@ -4,17 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use umbracast::decide::Action;
-use umbracast_io::rows::{DecisionRow, LossRow};
-use umbracast_io::tables;
-use umbracast_io::wire::WireRow;
-
-#[path = "common/command.rs"]
-#[allow(dead_code, reason = "this test has helpers of its own, which show what was said")]
-mod command;
 mod common;
 
-use command::results_in;
 use common::folder;
 
 /// Two people who cross in front of the `side` access point, for three seconds.
@@ -159,55 +150,6 @@ fn simulate_run_evaluate_inspect() {
     assert!((40..=60).contains(&rows), "two people in 30 frames: {rows}");
     let about = fs::read_to_string(out.join("run.json")).expect("run.json");
     assert!(about.contains("\"frame_numbers\": [\n    \"0-29\"\n  ]"), "{about}");
-}
-
-#[test]
-fn a_site_with_radios_has_tables_of_losses_and_decisions_and_no_other_site_has() {
-    let folder = folder("radio");
-    let sim = simulate(&folder, "0");
-    let (out, plain) = (folder.join("out"), folder.join("plain"));
-    let run = |out: &Path, radio: &str, handover: &str| {
-        let access_points =
-            [("side", "[14.0, 0.0, 2.0]"), ("north", "[0.0, 14.0, 3.0]")].map(|(name, at)| {
-                format!("[[site.access_points]]\nname = \"{name}\"\nposition_m = {at}\n{radio}\n")
-            });
-        let site = out.with_extension("toml");
-        fs::write(&site, access_points.concat() + handover).expect("writes");
-        done(&["run", text(&sim), "--site", text(&site), "--mcap", "--csv", "--out", text(out)]);
-    };
-    run(
-        &out,
-        "radio = { carrier_ghz = 140.0, margin_db = 5.0 }",
-        "[site.handover]\nprocedure = \"nr-ltm\"\n",
-    );
-    run(&plain, "", "");
-    let names = ["side".to_owned(), "north".to_owned()];
-    let losses = tables::read::<LossRow>(&out, &names).expect("a table");
-    assert!(
-        losses.iter().any(|row| row.loss_db[0][1] > 5.0),
-        "somebody crosses in front of the access point"
-    );
-    let decisions = tables::read::<DecisionRow>(&out, &names).expect("a table");
-    assert!(decisions.iter().any(|row| row.action != Action::Stay && row.target.is_some()), "a change helps");
-    let csv = fs::read_to_string(out.join("decisions.csv")).expect("a table");
-    assert!(
-        csv.starts_with("scene,frame,time_ns,track,serving,action,target,deadline_s,saved_s,p_out\n"),
-        "{csv}"
-    );
-    // The same bytes as without radios, but for the configuration and what is of the radio alone.
-    let radio = ["links_db.parquet", "links_db.csv", "decisions.parquet", "decisions.csv"];
-    let of = |folder: &Path| {
-        let kept = |(name, _): &(String, Vec<u8>)| {
-            !radio.contains(&name.as_str()) && name != "config.toml" && !name.ends_with(".mcap")
-        };
-        contents(folder).into_iter().filter(kept).collect::<Vec<_>>()
-    };
-    assert!(of(&out) == of(&plain));
-    assert!(radio.iter().all(|name| !plain.join(name).exists()));
-    let topics =
-        |folder: &Path| results_in(&folder.join("results-0000.mcap")).into_keys().collect::<Vec<_>>();
-    let of_radio = [LossRow::TOPIC, DecisionRow::TOPIC].map(str::to_owned);
-    assert!(of_radio.iter().all(|topic| topics(&out).contains(topic) && !topics(&plain).contains(topic)));
 }
 
 #[test]

@@ -35,6 +35,8 @@ pub enum Order {
     Hold,
     /// As usual, until the next order.
     Release,
+    /// Point the beam at the best reflection of the same access point, or at the access point again.
+    Beam(bool),
 }
 
 /// What a policy sees at an instant.
@@ -50,6 +52,12 @@ pub struct View<'a> {
     pub reported_db: &'a [f64],
     /// Whether there is a new one.
     pub is_new: bool,
+    /// Whether the beam is pointed at a reflection.
+    pub reflected: bool,
+    /// Whether the way that the beam is pointed at is out.
+    pub out: bool,
+    /// Whether the straight way to the serving access point is out.
+    pub straight_out: bool,
 }
 
 /// What came of a device's time.
@@ -119,6 +127,11 @@ impl Network {
         self.radios[ap].is_none_or(|radio| traces.loss_db(tick, ap, person) >= radio.margin_db)
     }
 
+    /// The same of its best reflection.
+    pub fn is_reflection_out(&self, traces: &Traces, tick: usize, ap: usize, person: usize) -> bool {
+        self.radios[ap].is_none_or(|radio| traces.reflected_db(tick, ap, person) >= radio.margin_db)
+    }
+
     /// Signal to noise of a link.
     pub fn snr_db(&self, traces: &Traces, tick: usize, ap: usize, person: usize) -> f64 {
         self.radios[ap].map_or(f64::NEG_INFINITY, |radio| {
@@ -153,14 +166,18 @@ pub fn drive(
     let mut serving = network.strongest(traces, begin, person);
     let (mut phase, mut command, mut held, mut out_for) = (Phase::Served, None, false, 0);
     let mut prepared: Option<(usize, f64)> = None;
+    let mut reflected = false;
     let mut last_change: Option<(usize, usize)> = None;
     let mut reported_db = vec![f64::NEG_INFINITY; network.radios.len()];
     let (mut tally, mut window_bps) = (Tally::default(), 0.0);
     for tick in begin..traces.ticks {
         match phase {
-            Phase::Changing { until, to } if tick >= until => (serving, phase) = (to, Phase::Served),
+            Phase::Changing { until, to } if tick >= until => {
+                (serving, phase, reflected) = (to, Phase::Served, false);
+            }
             Phase::Lost { until } if tick >= until => {
-                (serving, phase) = (network.strongest(traces, tick, person), Phase::Served);
+                serving = network.strongest(traces, tick, person);
+                (phase, reflected) = (Phase::Served, false);
             }
             _ => {}
         }
@@ -171,9 +188,16 @@ pub fn drive(
                     network.snr_db(traces, tick, ap, person) + REPORT_NOISE_DB * normal(&mut noise);
             }
         }
-        let out = network.is_out(traces, tick, serving, person);
+        let straight_out = network.is_out(traces, tick, serving, person);
+        let way_out = |reflected: bool| match reflected {
+            true => network.is_reflection_out(traces, tick, serving, person),
+            false => straight_out,
+        };
+        let mut out = way_out(reflected);
         let mut change = None;
-        match policy(&View { tick, person, serving, reported_db: &reported_db, is_new }) {
+        let view =
+            View { tick, person, serving, reported_db: &reported_db, is_new, reflected, out, straight_out };
+        match policy(&view) {
             Some(Order::Command(to)) if command.is_none() => {
                 command = Some((tick + ticks_of(costs.command_s), to));
                 held = false;
@@ -187,6 +211,10 @@ pub fn drive(
             }
             Some(Order::Hold) => (held, prepared) = (true, None),
             Some(Order::Release) => (held, prepared) = (false, None),
+            // A beam is switched in 3 ms, less than an instant of the truth.
+            Some(Order::Beam(to_reflection)) => {
+                (reflected, out) = (to_reflection, way_out(to_reflection));
+            }
             _ => {}
         }
         if let Some((to, level_db)) = prepared.filter(|_| is_new)
@@ -223,7 +251,12 @@ pub fn drive(
             phase = Phase::Lost { until: tick + ticks_of(costs.recovery_s) };
         }
         if serves {
-            window_bps += rate_bps(network, network.snr_db(traces, tick, serving, person), serving);
+            let straight_db = network.snr_db(traces, tick, serving, person);
+            let more_db = match reflected {
+                true => traces.loss_db(tick, serving, person) - traces.reflected_db(tick, serving, person),
+                false => 0.0,
+            };
+            window_bps += rate_bps(network, straight_db + more_db, serving);
         }
         if (tick - begin + 1).is_multiple_of(WINDOW_TICKS) {
             tally.rates_bps.push((window_bps / WINDOW_TICKS as f64) as f32);
@@ -241,4 +274,45 @@ fn rate_bps(network: &Network, snr_db: f64, ap: usize) -> f64 {
 
 fn normal(random: &mut impl Rng) -> f64 {
     StandardNormal.sample(random)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::policy::{Reactive, Tuning};
+    use umbracast::site::Handover;
+
+    fn network() -> Network {
+        Network { radios: vec![Some(Radio::default()); 2], costs: Handover::default().costs(), seed: 1 }
+    }
+
+    /// The first access point fades for 400 ms; its reflection does not. The other one loses `other_db` all the time.
+    fn traces(other_db: f32) -> Traces {
+        Traces::by_hand(400, 2, |tick, ap| match ap {
+            0 if (100..140).contains(&tick) => [25.0, 6.0],
+            0 => [0.0, f32::INFINITY],
+            _ => [other_db, f32::INFINITY],
+        })
+    }
+
+    fn driven(traces: &Traces, conditional: bool, beams: bool) -> Tally {
+        let mut policy = Reactive::new(Tuning::Fast, conditional, beams, 2);
+        drive(&network(), traces, 0, 0, |view| policy.order(view))
+    }
+
+    #[test]
+    fn a_beam_at_a_reflection_saves_a_link_that_has_no_other_access_point() {
+        let (without, with) = (driven(&traces(30.0), false, false), driven(&traces(30.0), false, true));
+        assert!(without.recoveries >= 1 && without.out_ticks >= 30, "{without:?}");
+        assert!(with.recoveries == 0 && with.out_ticks <= 4, "two reports, 20 ms apart: {with:?}");
+        assert_eq!((with.ticks, with.handovers), (400, 0));
+    }
+
+    #[test]
+    fn a_command_that_finds_the_link_out_is_lost_and_a_prepared_device_needs_none() {
+        let (command, conditional) = (driven(&traces(4.0), false, false), driven(&traces(4.0), true, false));
+        assert!(command.lost_commands >= 1, "{command:?}");
+        assert!(conditional.lost_commands == 0 && conditional.handovers >= 1, "{conditional:?}");
+        assert!(conditional.out_ticks < command.out_ticks, "{conditional:?} {command:?}");
+    }
 }

@@ -6,9 +6,15 @@
 
 mod fresnel;
 mod silhouette;
+mod reflection;
 pub mod truth;
 pub mod foreseen;
 pub mod device;
 pub mod oracle;
 pub mod policy;
-pub mod score;
+pub mod case;
+pub mod hall;
+pub mod experiment;
+pub mod fades;
+pub mod trace;
+pub mod report;

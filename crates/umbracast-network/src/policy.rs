@@ -9,64 +9,98 @@ use crate::foreseen::Foreseen;
 use crate::truth::{TICK_NS, TICK_S, Traces};
 
 /// A policy.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Policy {
     /// Whoever was the strongest at first, for good.
     Stay,
     /// 3GPP's event A3: a neighbour is stronger by an offset for a while, in filtered reports.
-    A3 {
-        /// Time constant of the filter.
-        filter_s: f64,
-        /// Time to trigger.
-        trigger_s: f64,
-    },
+    A3(Tuning),
     /// The same condition, prepared before and carried out by the device without a command.
-    Conditional {
-        /// Time constant of the filter.
-        filter_s: f64,
-        /// Time to trigger.
-        trigger_s: f64,
-    },
+    Conditional(Tuning),
+    /// A3, and a beam that fails is pointed at the best reflection of the same access point (3GPP TS 38.321, 5.17).
+    Beams,
     /// Decisions on what a frame shows, as if nothing moved.
     AsNow,
+    /// Decisions on what the paper's method says.
+    Paper,
+    /// Decisions on forecasts by constant velocity.
+    ConstantVelocity,
     /// Decisions on forecasts.
     Foreseen,
-    /// The same, published at once.
-    ForeseenAtOnce,
+    /// The same where no device can be prepared: every change needs a command.
+    Commands,
+    /// The same as forecasts, published at once.
+    AtOnce,
     /// Decisions on the true next 0.9 s.
     Perfect,
+    /// The least of outage and price of changes, by who knows the whole trace.
+    Oracle,
+    /// Every access point at once.
+    All,
+}
+
+/// How fast reports count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Tuning {
+    /// Filtered over 60 ms, 40 ms to trigger.
+    Fast,
+    /// 160 ms and 160 ms.
+    Slow,
 }
 
 /// A neighbour must be stronger by so much (usual in networks).
 const OFFSET_DB: f64 = 3.0;
+/// A beam has failed after so many reports in which it is out: as fast as the standard lets it be (beamFailureInstanceMaxCount n2).
+const FAILED_REPORTS: usize = 2;
+
+impl Tuning {
+    /// Time constant of the filter and time to trigger, seconds.
+    pub fn seconds(self) -> [f64; 2] {
+        match self {
+            Self::Fast => [0.06, 0.04],
+            Self::Slow => [0.16, 0.16],
+        }
+    }
+}
 
 impl Policy {
-    /// Those of the tables, in their order.
-    pub const ALL: [Self; 9] = [
+    /// All of them, in the order of tables.
+    pub const ALL: [Self; 15] = [
         Self::Stay,
-        Self::A3 { filter_s: 0.06, trigger_s: 0.04 },
-        Self::A3 { filter_s: 0.16, trigger_s: 0.16 },
-        Self::Conditional { filter_s: 0.06, trigger_s: 0.04 },
+        Self::A3(Tuning::Fast),
+        Self::A3(Tuning::Slow),
+        Self::Conditional(Tuning::Fast),
+        Self::Conditional(Tuning::Slow),
+        Self::Beams,
         Self::AsNow,
+        Self::Paper,
+        Self::ConstantVelocity,
         Self::Foreseen,
-        Self::ForeseenAtOnce,
+        Self::Commands,
+        Self::AtOnce,
         Self::Perfect,
-        Self::Conditional { filter_s: 0.16, trigger_s: 0.16 },
+        Self::Oracle,
+        Self::All,
     ];
 
-    /// As tables name it.
-    pub fn name(&self) -> String {
-        let ms = |s: &f64| (s * 1e3).round();
+    /// As the command and its tables name it.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Stay => "stay".to_owned(),
-            Self::A3 { filter_s, trigger_s } => format!("A3 {}/{}", ms(filter_s), ms(trigger_s)),
-            Self::Conditional { filter_s, trigger_s } => {
-                format!("conditional {}/{}", ms(filter_s), ms(trigger_s))
-            }
-            Self::AsNow => "LiDAR, as now".to_owned(),
-            Self::Foreseen => "forecast".to_owned(),
-            Self::ForeseenAtOnce => "forecast, no age".to_owned(),
-            Self::Perfect => "perfect 0.9 s".to_owned(),
+            Self::Stay => "stay",
+            Self::A3(Tuning::Fast) => "a3-60-40",
+            Self::A3(Tuning::Slow) => "a3-160-160",
+            Self::Conditional(Tuning::Fast) => "conditional-60-40",
+            Self::Conditional(Tuning::Slow) => "conditional-160-160",
+            Self::Beams => "a3-with-beams",
+            Self::AsNow => "as-now",
+            Self::Paper => "paper",
+            Self::ConstantVelocity => "constant-velocity",
+            Self::Foreseen => "forecast",
+            Self::Commands => "forecast-commands",
+            Self::AtOnce => "forecast-no-age",
+            Self::Perfect => "perfect-0.9-s",
+            Self::Oracle => "oracle",
+            Self::All => "all-at-once",
         }
     }
 }
@@ -77,20 +111,26 @@ pub struct Reactive {
     filter_s: f64,
     trigger_s: f64,
     conditional: bool,
+    beams: bool,
     filtered_db: Vec<f64>,
     /// By access point, since when it has been stronger.
     since: Vec<Option<usize>>,
+    /// In how many reports in a row the beam was out.
+    failed: usize,
 }
 
 impl Reactive {
-    /// Before its first report.
-    pub fn new(filter_s: f64, trigger_s: f64, conditional: bool, access_points: usize) -> Self {
+    /// Before its first report. `conditional` changes need no command; with `beams` reflections are used too.
+    pub fn new(tuning: Tuning, conditional: bool, beams: bool, access_points: usize) -> Self {
+        let [filter_s, trigger_s] = tuning.seconds();
         Self {
             filter_s,
             trigger_s,
             conditional,
+            beams,
             filtered_db: vec![f64::NAN; access_points],
             since: vec![None; access_points],
+            failed: 0,
         }
     }
 
@@ -115,10 +155,20 @@ impl Reactive {
                 best = Some(ap);
             }
         }
-        best.map(|ap| {
+        if let Some(ap) = best {
             self.since.fill(None);
-            if self.conditional { Order::Execute(ap) } else { Order::Command(ap) }
-        })
+            return Some(if self.conditional { Order::Execute(ap) } else { Order::Command(ap) });
+        }
+        self.beam(view)
+    }
+
+    fn beam(&mut self, view: &View<'_>) -> Option<Order> {
+        self.failed = if view.out { self.failed + 1 } else { 0 };
+        match self.beams {
+            true if view.reflected && !view.straight_out => Some(Order::Beam(false)),
+            true if !view.reflected && self.failed >= FAILED_REPORTS => Some(Order::Beam(true)),
+            _ => None,
+        }
     }
 }
 
@@ -152,8 +202,7 @@ impl<'a> Advised<'a> {
 
     /// What it asks for at an instant.
     pub fn order(&mut self, view: &View<'_>) -> Option<Order> {
-        let age_s = if self.policy == Policy::ForeseenAtOnce { 0.0 } else { self.network.costs.age_s };
-        let now_ns = view.tick as i64 * TICK_NS - (age_s * 1e9) as i64;
+        let now_ns = view.tick as i64 * TICK_NS - (self.network.costs.age_s * 1e9) as i64;
         let published = self.frames[self.next..].iter().take_while(|frame| frame.time_ns <= now_ns).count();
         self.next += published;
         let frame = published.checked_sub(1).map(|_| &self.frames[self.next - 1])?;
@@ -168,38 +217,43 @@ impl<'a> Advised<'a> {
 
     fn advise(&mut self, frame: &Foreseen, view: &View<'_>) -> Option<Decision> {
         let (person, serving) = (view.person, view.serving);
-        if self.policy == Policy::Perfect {
-            let tick = (frame.time_ns / TICK_NS) as usize;
-            let mut outages = Outages::new(self.network.radios.len(), 1, 1);
-            let mut loss = Loss::clear(serving, 0);
-            for step in 0..=STEPS {
-                // What is out within half a step of a step's instant is out at it.
-                let at = tick + 10 * step;
-                for ap in self.network.ways() {
-                    let last = (at + 5).min(self.traces.ticks);
-                    let out =
-                        (at.saturating_sub(4)..last).any(|t| self.network.is_out(self.traces, t, ap, person));
-                    if out {
-                        outages.set(ap, 0, step, 0);
-                        loss.p_out[STEPS - 1] = if ap == serving { 1.0 } else { loss.p_out[STEPS - 1] };
-                    }
-                }
+        match self.policy {
+            Policy::Perfect => self.knowing(frame, person, serving),
+            Policy::AsNow => self.as_now(frame, frame.index_of[person]?, serving),
+            _ => {
+                let index = frame.index_of[person]?;
+                self.decider.advise(serving, frame.loss(serving, index)?, index, &frame.outages)
             }
-            return self.decider.advise(serving, &loss, 0, &outages);
         }
-        let index = frame.index_of[person]?;
-        if self.policy == Policy::AsNow {
-            let mut outages = Outages::new(self.network.radios.len(), 1, 1);
-            let mut loss = Loss::clear(serving, 0);
+    }
+
+    /// What is out within half a step of a step's instant is out at it.
+    fn knowing(&mut self, frame: &Foreseen, person: usize, serving: usize) -> Option<Decision> {
+        let tick = (frame.time_ns / TICK_NS) as usize;
+        let mut outages = Outages::new(self.network.radios.len(), 1, 1);
+        let mut loss = Loss::clear(serving, 0);
+        for step in 0..=STEPS {
+            let at = tick + 10 * step;
             for ap in self.network.ways() {
-                if frame.loss(ap, index).is_some_and(|loss| loss.p_out_now >= 0.5) {
-                    (0..=STEPS).for_each(|step| outages.set(ap, 0, step, 0));
-                    loss.p_out_now = if ap == serving { 1.0 } else { loss.p_out_now };
+                let mut instants = at.saturating_sub(4)..(at + 5).min(self.traces.ticks);
+                if instants.any(|tick| self.network.is_out(self.traces, tick, ap, person)) {
+                    outages.set(ap, 0, step, 0);
+                    loss.p_out[STEPS - 1] = if ap == serving { 1.0 } else { loss.p_out[STEPS - 1] };
                 }
             }
-            return self.decider.advise(serving, &loss, 0, &outages);
         }
-        let loss = frame.loss(serving, index)?;
-        self.decider.advise(serving, loss, index, &frame.outages)
+        self.decider.advise(serving, &loss, 0, &outages)
+    }
+
+    fn as_now(&mut self, frame: &Foreseen, index: usize, serving: usize) -> Option<Decision> {
+        let mut outages = Outages::new(self.network.radios.len(), 1, 1);
+        let mut loss = Loss::clear(serving, 0);
+        for ap in self.network.ways() {
+            if frame.loss(ap, index).is_some_and(|loss| loss.p_out_now >= 0.5) {
+                (0..=STEPS).for_each(|step| outages.set(ap, 0, step, 0));
+                loss.p_out_now = if ap == serving { 1.0 } else { loss.p_out_now };
+            }
+        }
+        self.decider.advise(serving, &loss, 0, &outages)
     }
 }

@@ -6,6 +6,7 @@ use umbracast::geometry::{DVec2, DVec3};
 use umbracast_sim::body::Walker;
 
 use crate::fresnel::Fresnel;
+use crate::reflection::Wall;
 use crate::silhouette::Outline;
 pub use crate::silhouette::TruthModel;
 
@@ -16,6 +17,25 @@ pub const TICK_S: f64 = 0.01;
 
 /// A body farther from a path costs it nothing: its half width and three Fresnel zones of the longest wave.
 const ASIDE_M: f64 = 1.3;
+/// The way by a wall is worked out where the straight one loses so much: nobody asks for it before.
+const REFLECTED_FROM_DB: f64 = 3.0;
+
+/// What losses are worked out for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Air {
+    /// What a body costs.
+    pub model: TruthModel,
+    /// By access point; `None` without a radio.
+    pub wavelengths_m: Vec<Option<f64>>,
+}
+
+impl Air {
+    /// Of the radios of a site.
+    pub fn of(site: &Site, model: TruthModel) -> Self {
+        let wavelength_m = |ap: &umbracast::site::AccessPoint| ap.radio.map(|radio| radio.wavelength_m());
+        Self { model, wavelengths_m: site.access_points.iter().map(wavelength_m).collect() }
+    }
+}
 
 /// Losses of all links of a scene.
 #[derive(Debug, Clone)]
@@ -28,6 +48,8 @@ pub struct Traces {
     pub people: usize,
     /// By instant, access point and person, dB.
     loss_db: Vec<f32>,
+    /// The same by the best single reflection, beside the straight way in sight; infinite where nobody asks for it.
+    reflected_db: Vec<f32>,
     /// By instant and person: where everybody is.
     place_m: Vec<DVec2>,
     /// By instant, access point and person: how long the link is, metres.
@@ -35,40 +57,48 @@ pub struct Traces {
 }
 
 impl Traces {
-    /// Of a scene's bodies, for `ticks` instants, at the carrier of each access point with a radio (others lose nothing).
+    /// Of a scene's bodies, for `ticks` instants, one for each of `airs` (access points without a radio lose nothing).
     /// `own_body` says whether the owner's own body counts.
     pub fn of_scene(
         site: &Site,
         walkers: &[Walker],
         ticks: usize,
-        model: TruthModel,
+        airs: &[Air],
         own_body: bool,
-    ) -> Self {
+    ) -> Vec<Self> {
         let fresnel = Fresnel::new();
-        let (access_points, people) = (site.access_points.len(), walkers.len());
-        let instants: Vec<Instant> = (0..ticks)
-            .into_par_iter()
-            .map(|tick| Instant::new(site, walkers, tick as i64 * TICK_NS, model, own_body, &fresnel))
-            .collect();
-        let mut traces = Self {
-            ticks,
-            access_points,
-            people,
-            loss_db: Vec::new(),
-            place_m: Vec::new(),
-            length_m: Vec::new(),
+        let view = View { site, airs, own_body, fresnel: &fresnel, walls: Wall::of_hall(&site.hall) };
+        let instants: Vec<Instant> =
+            (0..ticks).into_par_iter().map(|tick| view.at(walkers, tick as i64 * TICK_NS)).collect();
+        let of_air = |air: usize| {
+            let mut traces = Self {
+                ticks,
+                access_points: site.access_points.len(),
+                people: walkers.len(),
+                loss_db: Vec::new(),
+                reflected_db: Vec::new(),
+                place_m: Vec::new(),
+                length_m: Vec::new(),
+            };
+            for instant in &instants {
+                traces.loss_db.extend(&instant.loss_db[air]);
+                traces.reflected_db.extend(&instant.reflected_db[air]);
+                traces.place_m.extend(&instant.place_m);
+                traces.length_m.extend(&instant.length_m);
+            }
+            traces
         };
-        for instant in instants {
-            traces.loss_db.extend(instant.loss_db);
-            traces.place_m.extend(instant.place_m);
-            traces.length_m.extend(instant.length_m);
-        }
-        traces
+        (0..airs.len()).map(of_air).collect()
     }
 
     /// What a link loses at an instant.
     pub fn loss_db(&self, tick: usize, access_point: usize, person: usize) -> f64 {
         f64::from(self.loss_db[self.at(tick, access_point, person)])
+    }
+
+    /// What its best single reflection loses, beside the straight way in sight; infinite while the straight way loses little.
+    pub fn reflected_db(&self, tick: usize, access_point: usize, person: usize) -> f64 {
+        f64::from(self.reflected_db[self.at(tick, access_point, person)])
     }
 
     /// How long a link is at an instant.
@@ -86,50 +116,122 @@ impl Traces {
     }
 }
 
+/// One instant: by air, then by access point and person.
 struct Instant {
-    loss_db: Vec<f32>,
+    loss_db: Vec<Vec<f32>>,
+    reflected_db: Vec<Vec<f32>>,
     place_m: Vec<DVec2>,
     length_m: Vec<f32>,
 }
 
-impl Instant {
-    fn new(
-        site: &Site,
-        walkers: &[Walker],
-        time_ns: i64,
-        model: TruthModel,
-        own_body: bool,
-        fresnel: &Fresnel,
-    ) -> Self {
+struct View<'a> {
+    site: &'a Site,
+    airs: &'a [Air],
+    own_body: bool,
+    fresnel: &'a Fresnel,
+    walls: Vec<Wall>,
+}
+
+impl View<'_> {
+    fn at(&self, walkers: &[Walker], time_ns: i64) -> Instant {
         let states: Vec<_> = walkers.iter().map(|walker| walker.state_at(time_ns)).collect();
         let mut meshes = vec![Vec::new(); walkers.len()];
         for (mesh, walker) in meshes.iter_mut().zip(walkers) {
             walker.mesh_at(time_ns, mesh);
         }
+        let ue = &self.site.ue;
         let ue_m = |person: usize| {
             states[person].map(|state| {
-                site.ue.on_body(state.position_m, state.heading_rad, state.height_m)
-                    + DVec3::Z * state.floor_m
+                ue.on_body(state.position_m, state.heading_rad, state.height_m) + DVec3::Z * state.floor_m
             })
         };
+        let mut instant = Instant {
+            loss_db: vec![Vec::new(); self.airs.len()],
+            reflected_db: vec![Vec::new(); self.airs.len()],
+            place_m: states.iter().map(|state| state.map_or(DVec2::NAN, |state| state.position_m)).collect(),
+            length_m: Vec::new(),
+        };
         let mut outline = Outline::default();
-        let mut instant = Self { loss_db: Vec::new(), place_m: Vec::new(), length_m: Vec::new() };
-        instant.place_m.extend(states.iter().map(|state| state.map_or(DVec2::NAN, |state| state.position_m)));
-        for ap in &site.access_points {
+        let (mut losses_db, mut ways_db) = (vec![0.0; self.airs.len()], vec![0.0; self.airs.len()]);
+        for (access_point, ap) in self.site.access_points.iter().enumerate() {
             for person in 0..walkers.len() {
-                let (mut loss_db, mut length_m) = (0.0, 0.0);
-                if let (Some(ue_m), Some(radio)) = (ue_m(person), &ap.radio) {
-                    length_m = ap.position().distance(ue_m);
-                    for (body, mesh) in meshes.iter().enumerate() {
-                        if (body != person || own_body) && outline.look(ap.position(), ue_m, mesh, ASIDE_M) {
-                            loss_db += outline.loss_db(model, fresnel, radio.wavelength_m());
+                let (ap_m, ue_m) = (ap.position(), ue_m(person).filter(|_| ap.radio.is_some()));
+                let length_m = ue_m.map_or(0.0, |ue_m| ap_m.distance(ue_m));
+                instant.length_m.push(length_m as f32);
+                losses_db.fill(0.0);
+                if let Some(ue_m) = ue_m {
+                    self.add_bodies(
+                        &mut outline,
+                        [ap_m, ue_m],
+                        access_point,
+                        person,
+                        &meshes,
+                        &mut losses_db,
+                    );
+                }
+                let mut reflected_db = vec![f64::INFINITY; self.airs.len()];
+                if let Some(ue_m) = ue_m.filter(|_| losses_db.iter().any(|db| *db >= REFLECTED_FROM_DB)) {
+                    for wall in &self.walls {
+                        let Some(way) = wall.reflects(ap_m, ue_m) else { continue };
+                        ways_db.fill(way.loss_db);
+                        // Bodies stand on this side of the wall: of each unfolded way they meet the leg that is here.
+                        for ends_m in [[way.ap_image_m, ue_m], [ap_m, way.ue_image_m]] {
+                            self.add_bodies(
+                                &mut outline,
+                                ends_m,
+                                access_point,
+                                person,
+                                &meshes,
+                                &mut ways_db,
+                            );
                         }
+                        reflected_db.iter_mut().zip(&ways_db).for_each(|(least, db)| *least = least.min(*db));
                     }
                 }
-                instant.loss_db.push(loss_db as f32);
-                instant.length_m.push(length_m as f32);
+                for air in 0..self.airs.len() {
+                    instant.loss_db[air].push(losses_db[air] as f32);
+                    instant.reflected_db[air].push(reflected_db[air] as f32);
+                }
             }
         }
         instant
+    }
+
+    /// Adds what bodies cost a straight way, by air.
+    fn add_bodies(
+        &self,
+        outline: &mut Outline,
+        [tx_m, rx_m]: [DVec3; 2],
+        access_point: usize,
+        person: usize,
+        meshes: &[Vec<DVec3>],
+        losses_db: &mut [f64],
+    ) {
+        for (body, mesh) in meshes.iter().enumerate() {
+            if (body == person && !self.own_body) || !outline.look(tx_m, rx_m, mesh, ASIDE_M) {
+                continue;
+            }
+            for (air, loss_db) in self.airs.iter().zip(losses_db.iter_mut()) {
+                if let Some(wavelength_m) = air.wavelengths_m[access_point] {
+                    *loss_db += outline.loss_db(air.model, self.fresnel, wavelength_m);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+impl Traces {
+    /// Of one person and links of 5 m that lose what `[straight, reflected]` says, by instant and access point.
+    pub(crate) fn by_hand(
+        ticks: usize,
+        access_points: usize,
+        loss_db: impl Fn(usize, usize) -> [f32; 2],
+    ) -> Self {
+        let all = (0..ticks * access_points).map(|at| loss_db(at / access_points, at % access_points));
+        let (loss_db, reflected_db) = all.map(|[straight, reflected]| (straight, reflected)).unzip();
+        let place_m = vec![DVec2::ZERO; ticks];
+        let length_m = vec![5.0; ticks * access_points];
+        Self { ticks, access_points, people: 1, loss_db, reflected_db, place_m, length_m }
     }
 }

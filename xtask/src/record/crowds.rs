@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::fs;
 
 use super::book::Book;
-use crate::tools::{Result, argument, root};
+use crate::tools::{Result, argument};
 
 /// How recorded walkers of the circle antipode experiment are read.
 const ANTIPODE: [&str; 6] = ["--centre", "--unit", "cm", "--fps", "25", "--trajectories"];
@@ -198,12 +198,32 @@ fn losses(report: &str) -> Vec<(String, [String; 3])> {
     rows
 }
 
-/// Policies of changing access points, in closed loop.
+/// Policies of changing access points, in closed loop; then sweeps, each model as truth and as predictor, and the dB told.
 pub fn network(book: &mut Book) -> Result<()> {
-    let line =
-        "cargo run --release --quiet --package umbracast-network --example closed_loop -- 220000 40 20";
-    book.command(line);
-    let said = book.bash(&root(), line)?;
-    book.line(&said);
-    Ok(())
+    let first = "220000";
+    book.umbracast_says(["network", "--scenes", "40", "--seed", first])?;
+    let few =
+        ["--policies", "a3-60-40,conditional-60-40,forecast,oracle", "--seed", "220100", "--scenes", "10"];
+    for sweep in [
+        ["--carrier", "28", "--truth", "edges", "--margin", "5,10,15,20"].as_slice(),
+        &["--carrier", "28", "--truth", "edges", "--interruption", "3,25,70"],
+        &["--carrier", "28", "--truth", "edges", "--people", "5,20,40"],
+        &["--carrier", "28", "--truth", "edges", "--access-points", "1,2,4,8"],
+        &["--carrier", "28", "--truth", "edges", "--own-body"],
+        &[
+            "--carrier",
+            "28",
+            "--truth",
+            "model-b,kirchhoff,edges",
+            "--predictor",
+            "kirchhoff,model-b,three-edges",
+        ],
+    ] {
+        book.umbracast_says(["network"].iter().chain(sweep).chain(&few).copied())?;
+    }
+    book.umbracast_says(["network", "--losses", "--scenes", "10", "--seed", first])?;
+    let many = ["--people", "50", "--access-points", "8", "--carrier", "28", "--truth", "edges"];
+    book.umbracast_says(
+        ["network", "--losses", "--scenes", "1", "--seed", first].iter().chain(&many).copied(),
+    )
 }

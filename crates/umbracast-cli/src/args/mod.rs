@@ -11,6 +11,7 @@ use umbracast_sim::crowd::Preset;
 
 mod live;
 mod calibrate;
+mod network;
 #[cfg(feature = "node")]
 mod node;
 #[cfg(feature = "node")]
@@ -20,6 +21,7 @@ pub use calibrate::Calibrate;
 #[cfg(feature = "node")]
 pub use fleet::Fleet;
 pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
+pub use network::Network;
 #[cfg(feature = "node")]
 pub use node::Node;
 
@@ -90,6 +92,8 @@ pub enum Command {
     Ablate(Ablate),
     /// Show how many returns a person gives at each place, and which places are blind.
     Coverage(Coverage),
+    /// Play a radio network in closed loop: what forecasts of blockage gain it, beside other policies and an oracle.
+    Network(Network),
     /// Run the paper's whole experiment: 500 scenes, every mode, AABB and OBB. A stopped run resumes.
     Reproduce(Reproduce),
     /// Show what is in a file.

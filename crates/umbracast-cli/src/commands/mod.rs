@@ -11,6 +11,7 @@ pub mod fleet;
 pub mod demo;
 pub mod inspect;
 pub mod live;
+pub mod network;
 #[cfg(feature = "node")]
 pub mod node;
 pub mod check;

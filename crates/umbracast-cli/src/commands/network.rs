@@ -1,0 +1,103 @@
+//! `network`: what forecasts of blockage gain a network, in closed loop.
+
+use umbracast::forecast::Weights;
+use umbracast::{Config, Error, Mode};
+use umbracast_network::case::{Sweep, with_radios};
+use umbracast_network::experiment::{self, Spec};
+use umbracast_network::hall::{Crowd, Hall};
+use umbracast_network::policy::Policy;
+use umbracast_network::{fades, report, trace};
+
+use crate::args::{Common, Network};
+use crate::ending::Ending;
+use crate::progress::bar;
+use crate::{say, setup};
+
+/// Plays every case of the sweep.
+pub fn run(args: &Network, common: &Common) -> Result<Ending, Error> {
+    let site = setup::config(Mode::Default, args.site.site.as_deref())?;
+    let is_given = site.site.has_radio();
+    let config = with_radios(&site, args.own_body);
+    let policies = if args.policies.is_empty() { Policy::ALL.to_vec() } else { args.policies.clone() };
+    let weights = setup::weights(None)?;
+    let paper: Option<&Weights> =
+        (!args.losses && args.trace.is_none() && policies.contains(&Policy::Paper)).then_some(&weights);
+    let hall = Hall::new(&config, paper)?;
+    let specs = args.people.iter().map(|&people| {
+        let first = args.seed.unwrap_or(setup::TEST_SEED);
+        Spec {
+            hall: &hall,
+            crowd: Crowd { preset: args.preset, people, seconds: args.seconds.into() },
+            seeds: (first..first + u64::from(args.scenes)).collect(),
+            cases: sweep(args, people, &config, is_given).cases(),
+            policies: policies.clone(),
+            weights: Some(&weights),
+        }
+    });
+    let specs: Vec<Spec> = specs.collect();
+    for case in specs.iter().flat_map(|spec| &spec.cases) {
+        // As if it stood in a file: what cannot be is named.
+        Config::of_run(&case.config(&config)?.to_toml(), "network")?;
+    }
+    let progress = bar((specs.len() * args.scenes as usize) as u64, "scenes played", common.quiet);
+    let (first, scenes, seconds) = (args.seed.unwrap_or(setup::TEST_SEED), args.scenes, args.seconds);
+    let played = format!("{scenes} scenes of {seconds} s, {}, seeds from {first}\n\n", args.preset.name());
+    if args.losses {
+        let compared = setup::with_threads(common.threads, || {
+            specs.iter().map(|spec| fades::compare(spec, || progress.inc(1))).collect::<Result<Vec<_>, _>>()
+        })??
+        .concat();
+        progress.finish_and_clear();
+        say::text(&match common.json {
+            true => format!("{}\n", report::fades_to_json(&compared)),
+            false => played + &report::fades_to_text(&compared),
+        });
+        return Ok(Ending::Done);
+    }
+    if let (Some(_), Some(folder), Some(spec)) = (&args.trace, &args.out, specs.first()) {
+        setup::make_dir(folder)?;
+        for &seed in &spec.seeds {
+            let Some(case) = spec.cases.first() else { continue };
+            let csv = setup::with_threads(common.threads, || trace::csv(spec, case, seed))??;
+            setup::write(&folder.join(format!("trace-{seed}.csv")), csv)?;
+            progress.inc(1);
+        }
+        progress.finish_and_clear();
+        return Ok(Ending::Done);
+    }
+    let rows = setup::with_threads(common.threads, || {
+        specs.iter().map(|spec| experiment::run(spec, || progress.inc(1))).collect::<Result<Vec<_>, _>>()
+    })??
+    .concat();
+    progress.finish_and_clear();
+    let json = format!("{}\n", report::to_json(&rows));
+    if let Some(folder) = &args.out {
+        setup::make_dir(folder)?;
+        setup::write(&folder.join("network.csv"), report::to_csv(&rows))?;
+        setup::write(&folder.join("network.json"), &json)?;
+    }
+    say::text(&if common.json { json } else { played + &report::to_text(&rows) });
+    Ok(Ending::Done)
+}
+
+/// What is not asked for is as a site with radios says, or else as usual.
+fn sweep(args: &Network, people: usize, config: &Config, is_given: bool) -> Sweep {
+    let or = |asked: &[f64], usual: &[f64]| match asked.is_empty() && !is_given {
+        true => usual.to_vec(),
+        false => asked.to_vec(),
+    };
+    let count = if is_given { config.site.access_points.len() } else { 4 };
+    let access_points = if args.access_points.is_empty() { vec![count] } else { args.access_points.clone() };
+    Sweep {
+        people,
+        access_points,
+        carriers_ghz: or(&args.carrier, &[28.0, 60.0, 140.0]),
+        margins_db: or(&args.margin, &[10.0]),
+        interruptions_ms: or(&args.interruption, &[25.0]),
+        predictors: match args.predictor.is_empty() && !is_given {
+            true => vec![umbracast::site::LossModel::Kirchhoff],
+            false => args.predictor.clone(),
+        },
+        truths: args.truth.clone(),
+    }
+}

@@ -1,0 +1,180 @@
+//! How well the losses told about fades are those that came.
+
+use std::time::Duration;
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use umbracast::{Config, Error};
+use umbracast_sim::random::stream;
+
+use crate::case::Case;
+use crate::experiment::{BEGIN_TICKS, Spec, Truths};
+use crate::foreseen::Foreteller;
+use crate::hall::Seen;
+use crate::truth::Traces;
+
+/// A fade is deeper.
+const FADE_DB: f64 = 10.0;
+/// So many instants before and after its deepest one belong to it: 400 ms.
+const ABOUT_TICKS: usize = 40;
+/// Which steps are looked at: 300 and 500 ms ahead.
+pub const STEPS_AHEAD: [usize; 2] = [3, 5];
+/// A step has so many instants.
+const STEP_TICKS: usize = 10;
+
+/// Losses told beside those that came, about fades.
+#[derive(Debug, Clone, Default)]
+pub struct Compared {
+    /// The case.
+    pub case: Option<Case>,
+    /// Whether the spread of real fades about a model is in what is told and in the truth.
+    pub spread: bool,
+    /// How many fades.
+    pub fades: u64,
+    /// By step ahead: sums of squared differences of the median told, dB^2.
+    pub squares_db2: [f64; 2],
+    /// By step ahead: how many truths lie within the 10 and 90 % told.
+    pub within: [u64; 2],
+    /// By step ahead: how many truths there are.
+    pub count: [u64; 2],
+    /// How long the losses of each frame took.
+    pub took: Vec<Duration>,
+}
+
+impl Compared {
+    /// Root of the mean squared difference, dB.
+    pub fn rmse_db(&self, ahead: usize) -> f64 {
+        (self.squares_db2[ahead] / self.count[ahead].max(1) as f64).sqrt()
+    }
+
+    /// The share of truths within the 10 and 90 % told.
+    pub fn coverage(&self, ahead: usize) -> f64 {
+        self.within[ahead] as f64 / self.count[ahead].max(1) as f64
+    }
+
+    /// How long the losses of a frame took at this share of frames, milliseconds.
+    pub fn took_ms(&self, share: f64) -> f64 {
+        let mut took = self.took.clone();
+        took.sort_unstable();
+        let at = (share * took.len().saturating_sub(1) as f64) as usize;
+        took.get(at).map_or(0.0, |took| took.as_secs_f64() * 1e3)
+    }
+
+    fn add(&mut self, other: Self) {
+        self.fades += other.fades;
+        for ahead in 0..STEPS_AHEAD.len() {
+            self.squares_db2[ahead] += other.squares_db2[ahead];
+            self.within[ahead] += other.within[ahead];
+            self.count[ahead] += other.count[ahead];
+        }
+        self.took.extend(other.took);
+    }
+}
+
+/// Compares every scene, each case without and with the spread of real fades. `progress` is called after each scene.
+///
+/// # Errors
+/// As [`crate::experiment::run`].
+pub fn compare(spec: &Spec, progress: impl Fn() + Sync) -> Result<Vec<Compared>, Error> {
+    let scene = |seed: u64| -> Result<Vec<Compared>, Error> {
+        let seen = spec.hall.see(spec.crowd, seed)?;
+        let truths = Truths::of(spec.hall.config(), &spec.cases, &seen)?;
+        let mut all = Vec::new();
+        for case in &spec.cases {
+            for spread in [false, true] {
+                let mut config = case.config(spec.hall.config())?;
+                let radios = config.site.access_points.iter_mut().filter_map(|ap| ap.radio.as_mut());
+                radios.for_each(|radio| radio.fade_spread = spread);
+                let traces = truths.of_case(&config, case);
+                all.push(Compared { case: Some(*case), ..of_scene(&config, &seen, traces, seed, spread)? });
+            }
+        }
+        progress();
+        Ok(all)
+    };
+    let scenes: Vec<Vec<Compared>> =
+        spec.seeds.par_iter().with_max_len(1).map(|seed| scene(*seed)).collect::<Result<_, _>>()?;
+    let mut scenes = scenes.into_iter();
+    let mut sums = scenes.next().unwrap_or_default();
+    scenes.for_each(|scene| sums.iter_mut().zip(scene).for_each(|(sum, other)| sum.add(other)));
+    Ok(sums)
+}
+
+fn of_scene(
+    config: &Config,
+    seen: &Seen,
+    traces: &Traces,
+    seed: u64,
+    spread: bool,
+) -> Result<Compared, Error> {
+    let mut compared = Compared { spread, ..Compared::default() };
+    let truth_db = about_fades(traces, seed, spread, &mut compared.fades);
+    let at =
+        |tick, access_point, person| (tick * traces.access_points + access_point) * traces.people + person;
+    let mut foreteller = Foreteller::new(config, None)?;
+    for frame in &seen.ours {
+        let said = foreteller.foresee(frame, traces);
+        compared.took.push(foreteller.fading);
+        let tick = (frame.time_ns / crate::truth::TICK_NS) as usize;
+        for (ahead, steps) in STEPS_AHEAD.into_iter().enumerate() {
+            let then = tick + steps * STEP_TICKS;
+            if tick < BEGIN_TICKS || then >= traces.ticks {
+                continue;
+            }
+            for person in 0..traces.people {
+                let Some(index) = said.index_of[person] else { continue };
+                for access_point in 0..traces.access_points {
+                    let came_db = truth_db[at(then, access_point, person)];
+                    let Some(loss) = said.loss(access_point, index).filter(|_| came_db.is_finite()) else {
+                        continue;
+                    };
+                    let [low_db, told_db, high_db] = loss.steps_db[steps - 1];
+                    let came_db = f64::from(came_db);
+                    compared.squares_db2[ahead] += (told_db - came_db).powi(2);
+                    compared.within[ahead] += u64::from((low_db..=high_db).contains(&came_db));
+                    compared.count[ahead] += 1;
+                }
+            }
+        }
+    }
+    Ok(compared)
+}
+
+/// The truth about fades, NaN elsewhere: by instant, access point and person. With `spread` each fade is deeper or shallower than
+/// the model's by a draw of its own.
+fn about_fades(traces: &Traces, seed: u64, spread: bool, fades: &mut u64) -> Vec<f32> {
+    let (links, people) = (traces.access_points * traces.people, traces.people);
+    let mut truth_db = vec![f32::NAN; traces.ticks * links];
+    let mut random = stream(seed, "fades", 0);
+    for link in 0..links {
+        let loss_db = |tick: usize| traces.loss_db(tick, link / people, link % people);
+        let mut tick = 0;
+        while tick < traces.ticks {
+            if loss_db(tick) < FADE_DB {
+                tick += 1;
+                continue;
+            }
+            let end = (tick..traces.ticks).find(|t| loss_db(*t) < FADE_DB).unwrap_or(traces.ticks);
+            let deepest = (tick..end).max_by(|a, b| loss_db(*a).total_cmp(&loss_db(*b))).unwrap_or(tick);
+            *fades += 1;
+            let deeper = if spread { normal(&mut random) } else { 0.0 };
+            for t in deepest.saturating_sub(ABOUT_TICKS)..(deepest + ABOUT_TICKS + 1).min(traces.ticks) {
+                let db = loss_db(t);
+                truth_db[t * links + link] = (db + deeper * sigma_db(db)) as f32;
+            }
+            tick = end;
+        }
+    }
+    truth_db
+}
+
+/// One standard deviation of real fades about a model: residuals of the passages of IMMERSE (TU Dortmund 2024), a draw a fade.
+fn sigma_db(model_db: f64) -> f64 {
+    let positive_db = model_db.max(0.0);
+    (1.5 + 0.9 * positive_db.sqrt()).min(6.0) * (2.0 * positive_db).min(1.0)
+}
+
+fn normal(random: &mut impl Rng) -> f64 {
+    StandardNormal.sample(random)
+}
