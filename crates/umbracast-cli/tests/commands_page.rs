@@ -87,3 +87,17 @@ fn listed_commands_are_read_from_a_help() {
     let help = "Usage: x\n\nCommands:\n  demo  One\n  run   Two\n  help  Three\n\nOptions:\n  -h\n";
     assert_eq!(listed(help), ["demo", "run"]);
 }
+
+#[cfg(not(feature = "node"))]
+#[test]
+fn a_build_without_nodes_says_how_to_get_them() {
+    for words in [&["node", "track", "--site", "hall.toml"][..], &["node", "--help"], &["fleet"]] {
+        let done = Command::new(env!("CARGO_BIN_EXE_umbracast")).args(words).output().expect("it runs");
+        let told = String::from_utf8_lossy(&done.stderr);
+        assert!(
+            told.contains("without the feature `node`") && told.contains("--features node"),
+            "{words:?}: {told}"
+        );
+        assert_eq!(done.status.code(), Some(1), "{words:?}");
+    }
+}

@@ -2,6 +2,7 @@
 //! adds, and what happens when something fails. Needs root, `ip` and `python3`:
 //! `node_faults UMBRACAST SECONDS SECONDS`, with the command built with the feature `node`, the length of the comparison and
 //! that of each failure's run. `short`, behind them: a few failures, and an error where what must happen does not.
+//! `node_faults UMBRACAST fleet`: what happens on one host, alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Read};
@@ -19,6 +20,9 @@ use umbracast_node::hall::Hall;
 use umbracast_node::keys::Keys;
 use umbracast_node::network::Network;
 
+#[path = "node_faults/fleet.rs"]
+mod fleet;
+
 const PLACES: [(&str, &str); 3] = [("edge", "10.77.0.2"), ("server", "10.77.0.3"), ("radio", "10.77.0.4")];
 /// The bad wire's ends.
 const BAD: [(&str, &str); 2] = [("edge", "10.78.0.2"), ("server", "10.78.0.3")];
@@ -29,6 +33,11 @@ const GAP: Duration = Duration::from_millis(150);
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [command, only] = &arguments[..]
+        && only == "fleet"
+    {
+        return Ok(fleet::alone(Path::new(command))?);
+    }
     let (command, equal_s, fault_s, short) = match &arguments[..] {
         [command, equal_s, fault_s] => (command, equal_s, fault_s, false),
         [command, equal_s, fault_s, short] if short == "short" => (command, equal_s, fault_s, true),
@@ -39,6 +48,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bench = Bench { command: command.into(), folder, short };
     bench.lay_wires()?;
     let outcome = bench.equality(equal_s).and_then(|()| bench.faults(fault_s));
+    let outcome =
+        outcome.and_then(|()| if short { Ok(()) } else { fleet::cases(&bench.command, &bench.folder) });
     bench.take_wires_away();
     std::fs::remove_dir_all(&bench.folder)?;
     Ok(outcome?)
