@@ -45,13 +45,21 @@ struct Mode {
     seen: u32,
 }
 
-/// Revolutions in which a pixel was kept from learning, because somebody expected stood there.
+/// In how many revolutions something was so of a pixel.
 #[derive(Debug, Clone, Copy, Default)]
-struct Frozen {
+struct Count {
     /// Halved by forgetting.
     revolutions: f32,
     /// The last of them.
     seen: u32,
+}
+
+impl Count {
+    fn note(&mut self, revolution: u32) {
+        if self.seen != revolution {
+            *self = Self { revolutions: self.revolutions + 1.0, seen: revolution };
+        }
+    }
 }
 
 /// What becomes of one return.
@@ -74,7 +82,10 @@ pub struct RangeModel {
     bins_per_cdeg: f32,
     rows: usize,
     modes: Vec<[Mode; MODES]>,
-    frozen: Vec<Frozen>,
+    /// Kept from learning, because somebody expected stood there.
+    frozen: Vec<Count>,
+    /// Looked at, whether anything came back or not. `None` where only returns are told: then every revolution looked everywhere.
+    looked: Option<Vec<Count>>,
     /// Nearest background of each pixel, before the margin; infinite where nothing stands, 0 while unknown.
     nearest_m: Vec<f32>,
     /// The same, less margin, over the neighbours in azimuth: a nearer return is new.
@@ -94,7 +105,12 @@ pub struct RangeModel {
 }
 
 impl RangeModel {
-    /// Knows nothing yet.
+    /// Knows nothing yet, and will be told of every ray, also of those that come back without a return ([`RangeModel::look`]).
+    pub fn of_rays(azimuth_bin_deg: f64) -> Self {
+        Self { looked: Some(Vec::new()), ..Self::new(azimuth_bin_deg) }
+    }
+
+    /// Knows nothing yet, and will be told of returns alone.
     pub fn new(azimuth_bin_deg: f64) -> Self {
         let bins = (360.0 / azimuth_bin_deg).round().clamp(1.0, 36_000.0) as usize;
         Self {
@@ -103,6 +119,7 @@ impl RangeModel {
             rows: 0,
             modes: Vec::new(),
             frozen: Vec::new(),
+            looked: None,
             nearest_m: Vec::new(),
             limit_m: Vec::new(),
             revolutions: 0.0,
@@ -116,7 +133,8 @@ impl RangeModel {
 
     /// One of the same make that knows nothing.
     pub fn forgotten(&self) -> Self {
-        Self::new(360.0 / self.bins as f64)
+        let bin_deg = 360.0 / self.bins as f64;
+        if self.looked.is_some() { Self::of_rays(bin_deg) } else { Self::new(bin_deg) }
     }
 
     /// How many rows there are.
@@ -130,7 +148,9 @@ impl RangeModel {
             return;
         }
         let (old_rows, old) = (self.rows, std::mem::take(&mut self.modes));
-        let old_frozen = std::mem::replace(&mut self.frozen, vec![Frozen::default(); rows * self.bins]);
+        let old_frozen = std::mem::replace(&mut self.frozen, vec![Count::default(); rows * self.bins]);
+        let no_looks = vec![Count::default(); rows * self.bins];
+        let old_looked = self.looked.as_mut().map(|looked| std::mem::replace(looked, no_looks));
         self.rows = rows;
         self.modes = vec![[Mode::default(); MODES]; rows * self.bins];
         self.nearest_m = vec![0.0; rows * self.bins];
@@ -143,6 +163,11 @@ impl RangeModel {
             }
             for (new, old) in self.frozen.chunks_exact_mut(rows).zip(old_frozen.chunks_exact(old_rows)) {
                 new[..old_rows].copy_from_slice(old);
+            }
+            if let (Some(looked), Some(old_looked)) = (&mut self.looked, old_looked) {
+                for (new, old) in looked.chunks_exact_mut(rows).zip(old_looked.chunks_exact(old_rows)) {
+                    new[..old_rows].copy_from_slice(old);
+                }
             }
             self.find_limits();
         }
@@ -211,6 +236,15 @@ impl RangeModel {
     #[inline]
     pub fn limit_m(&self, pixel: usize) -> f32 {
         self.limit_m[pixel]
+    }
+
+    /// A ray of this revolution looks there. What no ray looked at, for packets were lost or the revolution began late, is unknown and
+    /// not open: what comes back from there later is no person for that.
+    #[inline]
+    pub fn look(&mut self, pixel: usize) {
+        if let Some(looked) = &mut self.looked {
+            looked[pixel].note(self.count);
+        }
     }
 
     /// Does with a return what was decided.
@@ -328,10 +362,7 @@ impl RangeModel {
     /// Leaves a revolution out of a pixel's account: somebody who is expected there was seen. Otherwise what stands behind
     /// would come back in ever fewer of the revolutions, until the one who stands is taken for it.
     fn freeze(&mut self, pixel: usize) {
-        let frozen = &mut self.frozen[pixel];
-        if frozen.seen != self.count {
-            *frozen = Frozen { revolutions: frozen.revolutions + 1.0, seen: self.count };
-        }
+        self.frozen[pixel].note(self.count);
     }
 
     /// Closes a revolution that was observed and works out the limits anew. What was always empty counts as
@@ -350,7 +381,8 @@ impl RangeModel {
         if self.revolutions > MEMORY_REVOLUTIONS {
             self.revolutions *= 0.5;
             self.modes.iter_mut().flatten().for_each(|mode| mode.weight *= 0.5);
-            self.frozen.iter_mut().for_each(|frozen| frozen.revolutions *= 0.5);
+            let counts = self.frozen.iter_mut().chain(self.looked.iter_mut().flatten());
+            counts.for_each(|count| count.revolutions *= 0.5);
         }
         self.find_limits();
     }
@@ -374,15 +406,16 @@ impl RangeModel {
     }
 
     fn find_limits(&mut self) {
-        let unseen_m = if self.known || self.revolutions >= START_REVOLUTIONS { f32::INFINITY } else { 0.0 };
         // An empty scan is believed as it is; what walks by has to be outvoted.
         let least = |revolutions: f32| match self.known {
             true => SHARE * revolutions,
             false => (SHARE * revolutions).max(revolutions.min(1.5)),
         };
-        for ((nearest, modes), frozen) in self.nearest_m.iter_mut().zip(&self.modes).zip(&self.frozen) {
-            let least = least(self.revolutions - frozen.revolutions);
-            *nearest = nearest_m(modes, least).unwrap_or(unseen_m).min(unseen_m);
+        for (pixel, nearest) in self.nearest_m.iter_mut().enumerate() {
+            let looks = self.looked.as_ref().map_or(self.revolutions, |looked| looked[pixel].revolutions);
+            let unseen_m = if self.known || looks >= START_REVOLUTIONS { f32::INFINITY } else { 0.0 };
+            let least = least(looks - self.frozen[pixel].revolutions);
+            *nearest = nearest_m(&self.modes[pixel], least).unwrap_or(unseen_m).min(unseen_m);
         }
         for bin in 0..self.bins {
             let [own, left, right] = [0, self.bins - 1, 1].map(|off| (bin + off) % self.bins * self.rows);

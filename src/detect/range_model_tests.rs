@@ -157,3 +157,32 @@ fn what_stays_is_not_forgotten_where_its_edge_goes() {
     }
     assert!(!is_new(&wall, 140));
 }
+
+/// A live run that began within a revolution, or lost packets of the first one, took walls for people and never learned them.
+#[test]
+fn a_wall_that_the_first_revolution_did_not_look_at_is_no_person() {
+    let mut model = RangeModel::of_rays(1.0);
+    model.grow(ROWS);
+    let pixels = |bins: std::ops::Range<usize>| bins.start * ROWS..bins.end * ROWS;
+    // Walls all round but for ten bins, from which nothing comes back.
+    let open = pixels(300..310);
+    let mut turn = |bins: std::ops::Range<usize>| {
+        for pixel in pixels(bins) {
+            model.look(pixel);
+            if !open.contains(&pixel) {
+                model.observe(pixel, 5.0);
+            }
+        }
+        model.close_revolution(false);
+        [100, 250, 305].map(|bin| model.limit_m(bin * ROWS))
+    };
+    let [wall_m, not_looked_at_m, _] = turn(0..180);
+    assert!((4.5..5.0).contains(&wall_m), "{wall_m}");
+    assert!(not_looked_at_m <= 0.0, "nothing is new there yet: {not_looked_at_m}");
+    let [wall_m, seen_later_m, open_m] = turn(0..360);
+    assert!(
+        [wall_m, seen_later_m].iter().all(|limit_m| (4.5..5.0).contains(limit_m)),
+        "{wall_m} {seen_later_m}"
+    );
+    assert!(open_m.is_infinite(), "whatever appears there is new");
+}

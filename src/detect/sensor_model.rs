@@ -152,7 +152,7 @@ impl SensorModel {
         Self {
             range_min_m: sensor.range_min_m as f32,
             range_max_m: sensor.range_max_m as f32,
-            ranges: RangeModel::new(azimuth_bin_deg(sensor)),
+            ranges: RangeModel::of_rays(azimuth_bin_deg(sensor)),
             cloud_ranges: RangeModel::new(CLOUD_AZIMUTH_BIN_DEG),
             row_of_elevation: vec![None; (180.0 / CLOUD_ELEVATION_BIN_DEG) as usize + 3],
             elevation_bins_per_rad: 1.0_f64.to_degrees() / CLOUD_ELEVATION_BIN_DEG,
@@ -293,10 +293,13 @@ impl SensorModel {
                 continue;
             }
             for (b, &range_m) in ranges_m.iter().enumerate() {
+                let pixel = pixels[b] as usize;
+                if learn.is_all() {
+                    ranges.look(pixel);
+                }
                 if range_m == 0.0 {
                     continue;
                 }
-                let pixel = pixels[b] as usize;
                 // Written so that NaN is caught: it is neither beyond the limit nor in the range.
                 let background = range_m >= ranges.limit_m(pixel);
                 if background && !learn.is_all() {
