@@ -32,6 +32,11 @@ const NO_NODES: &str = "this program was built without the feature `node`, which
                         `cargo build --release --features node`";
 
 fn main() -> ExitCode {
+    // SAFETY: nothing has begun yet, so there is no other thread.
+    #[cfg(feature = "node")]
+    unsafe {
+        umbracast_node::runtime::widen();
+    }
     let given = Cli::command().get_matches();
     let cli = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
     if let Some((name, given)) = given.subcommand() {

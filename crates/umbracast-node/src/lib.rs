@@ -7,6 +7,7 @@ pub mod access;
 pub mod ros2;
 pub mod mqtt;
 pub mod outward;
+pub mod runtime;
 pub mod network;
 pub mod meet;
 pub mod hall;
