@@ -67,17 +67,19 @@ impl Health {
     /// assert_eq!(day.packets_late, 5);
     /// ```
     pub fn add(&mut self, other: &Self) {
-        self.packets_wrong_size += other.packets_wrong_size;
-        self.packets_not_understood += other.packets_not_understood;
-        self.packets_late += other.packets_late;
-        self.packets_duplicate += other.packets_duplicate;
-        self.clock_jumps += other.clock_jumps;
-        self.sensors_missing += other.sensors_missing;
-        self.points_invalid += other.points_invalid;
-        self.frames_out_of_order += other.frames_out_of_order;
-        self.points_over_limit += other.points_over_limit;
-        self.frames_with_fewer_samples += other.frames_with_fewer_samples;
-        self.sensors_moved += other.sensors_moved;
-        self.clocks_corrected += other.clocks_corrected;
+        // An account may come from outside: numbers that no program counts to must not overflow.
+        let sum = |own: &mut u64, more: u64| *own = own.saturating_add(more);
+        sum(&mut self.packets_wrong_size, other.packets_wrong_size);
+        sum(&mut self.packets_not_understood, other.packets_not_understood);
+        sum(&mut self.packets_late, other.packets_late);
+        sum(&mut self.packets_duplicate, other.packets_duplicate);
+        sum(&mut self.clock_jumps, other.clock_jumps);
+        sum(&mut self.sensors_missing, other.sensors_missing);
+        sum(&mut self.points_invalid, other.points_invalid);
+        sum(&mut self.frames_out_of_order, other.frames_out_of_order);
+        sum(&mut self.points_over_limit, other.points_over_limit);
+        sum(&mut self.frames_with_fewer_samples, other.frames_with_fewer_samples);
+        sum(&mut self.sensors_moved, other.sensors_moved);
+        sum(&mut self.clocks_corrected, other.clocks_corrected);
     }
 }

@@ -113,6 +113,22 @@ impl MixtureTracker {
         }
     }
 
+    /// The `id` of who is born next.
+    pub fn next_id(&self) -> u64 {
+        self.next_id
+    }
+
+    /// The `id` of everybody followed, ascending.
+    pub fn ids(&self) -> impl Iterator<Item = u64> {
+        self.people.iter().map(|person| person.id)
+    }
+
+    /// Gives everybody another `id`, in the same order, and who is born next `next_id`.
+    pub fn renumber(&mut self, id: impl Fn(u64) -> u64, next_id: u64) {
+        self.people.iter_mut().for_each(|person| person.id = id(person.id));
+        self.next_id = next_id;
+    }
+
     /// Last step's tracks predicted to `time_ns`.
     pub fn priors(&self, time_ns: i64, priors: &mut Vec<Prior>) {
         let last_ns = self.time_ns.unwrap_or(time_ns);

@@ -152,6 +152,40 @@ impl Tracker {
         whole
     }
 
+    /// The `id` of who is born next.
+    ///
+    /// ```
+    /// use umbracast::{Config, track::Tracker};
+    ///
+    /// let config = Config::default();
+    /// let mut tracker = Tracker::new(&config.track, &config.site);
+    /// tracker.renumber(|id| id, 5);
+    /// assert_eq!((tracker.next_id(), tracker.ids()), (5, Vec::new()));
+    /// ```
+    pub fn next_id(&self) -> u64 {
+        match &self.0 {
+            Method::Mixture(tracker) => tracker.next_id(),
+            Method::Paper(tracker) => tracker.next_id(),
+        }
+    }
+
+    /// The `id` of everybody followed, ascending.
+    pub fn ids(&self) -> Vec<u64> {
+        match &self.0 {
+            Method::Mixture(tracker) => tracker.ids().collect(),
+            Method::Paper(tracker) => tracker.ids().collect(),
+        }
+    }
+
+    /// Gives everybody another `id`, in the same order, and who is born next `next_id`: for trackers on several hosts that
+    /// numbered people apart.
+    pub fn renumber(&mut self, id: impl Fn(u64) -> u64, next_id: u64) {
+        match &mut self.0 {
+            Method::Mixture(tracker) => tracker.renumber(id, next_id),
+            Method::Paper(tracker) => tracker.renumber(id, next_id),
+        }
+    }
+
     fn visit(&mut self, words: &mut impl Words) {
         match &mut self.0 {
             Method::Mixture(tracker) => tracker.visit(words),

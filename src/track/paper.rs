@@ -103,6 +103,22 @@ impl PaperTracker {
         Self { variant, people: Vec::new(), next_id: 0, time_ns: None }
     }
 
+    /// The `id` of who is born next.
+    pub fn next_id(&self) -> u64 {
+        self.next_id
+    }
+
+    /// The `id` of everybody followed, ascending.
+    pub fn ids(&self) -> impl Iterator<Item = u64> {
+        self.people.iter().map(|person| person.id)
+    }
+
+    /// Gives everybody another `id`, in the same order, and who is born next `next_id`.
+    pub fn renumber(&mut self, id: impl Fn(u64) -> u64, next_id: u64) {
+        self.people.iter_mut().for_each(|person| person.id = id(person.id));
+        self.next_id = next_id;
+    }
+
     /// Takes a frame's detections, all taken to be of its end; `tracks` is every track alive then, in order of `id`.
     pub fn update(&mut self, time_ns: i64, detections: &[Detection], tracks: &mut Vec<Track>) {
         if self.time_ns.is_some_and(|last_ns| time_ns <= last_ns) {

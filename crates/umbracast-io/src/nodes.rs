@@ -41,8 +41,10 @@ pub struct Priors {
     pub time_ns: i64,
     /// Who leads,
     pub tracker: String,
-    /// and since when, time of its host.
-    pub leads_since_ns: i64,
+    /// and in which term: of two leaders the one of the newer term leads.
+    pub term: u64,
+    /// A digest of everybody's number, by which one that stands by sees that it numbers people as the leader does.
+    pub numbers: u64,
     /// One a track.
     pub priors: Vec<Prior>,
 }
@@ -54,6 +56,8 @@ pub struct Followed {
     pub time_ns: i64,
     /// The frame's.
     pub frame: u64,
+    /// Of the tracker that led: who has heard of a newer term gives this up.
+    pub term: u64,
     /// Everybody, in order of id.
     pub tracks: Vec<Track>,
     /// None before stage 2; one a track after it.
@@ -75,6 +79,8 @@ pub struct TrackerState {
     pub time_ns: i64,
     /// The end of frame 0.
     pub first_ns: i64,
+    /// Of the tracker that led.
+    pub term: u64,
     /// The program's, which alone understands the rest.
     pub version: String,
     /// [`umbracast::track::Tracker`] as it writes itself.
@@ -88,6 +94,8 @@ pub struct Warning {
     pub time_ns: i64,
     /// The frame's.
     pub frame: u64,
+    /// Of the tracker that led: who has heard of a newer term gives this up.
+    pub term: u64,
     /// Its name.
     pub access_point: String,
     /// Whose link.
@@ -195,7 +203,8 @@ impl Message for Priors {
     fn visit(&mut self, f: &mut impl Fields) {
         f.header(&mut self.time_ns);
         f.string("tracker", &mut self.tracker);
-        f.i64("leads_since_ns", &mut self.leads_since_ns);
+        f.u64("term", &mut self.term);
+        f.u64("numbers", &mut self.numbers);
         f.list("priors", &mut self.priors);
     }
 }
@@ -212,6 +221,7 @@ impl Message for Followed {
     fn visit(&mut self, f: &mut impl Fields) {
         f.header(&mut self.time_ns);
         f.u64("frame", &mut self.frame);
+        f.u64("term", &mut self.term);
         f.list("tracks", &mut self.tracks);
         f.list("forecasts", &mut self.forecasts);
         f.u32_list("sensors", &mut self.sensors);
@@ -232,6 +242,7 @@ impl Message for TrackerState {
     fn visit(&mut self, f: &mut impl Fields) {
         f.header(&mut self.time_ns);
         f.i64("first_ns", &mut self.first_ns);
+        f.u64("term", &mut self.term);
         f.string("version", &mut self.version);
         f.bytes("tracker", &mut self.tracker);
     }
@@ -249,6 +260,7 @@ impl Message for Warning {
     fn visit(&mut self, f: &mut impl Fields) {
         f.header(&mut self.time_ns);
         f.u64("frame", &mut self.frame);
+        f.u64("term", &mut self.term);
         f.string("access_point", &mut self.access_point);
         f.u64("track", &mut self.track);
         f.string("state", &mut self.state);

@@ -63,8 +63,14 @@ fn every_message_survives_and_a_part_of_it_is_none() {
     survives(followed());
     let prior = Prior { height_m: 1.7, confirmed: true, ..Prior::empty() };
     let priors = vec![prior; 2];
-    survives(Priors { time_ns: TIME_NS, tracker: "a".to_owned(), leads_since_ns: 5, priors });
-    survives(TrackerState { time_ns: 1, first_ns: 2, version: "0.1.0".to_owned(), tracker: vec![1, 2, 3] });
+    survives(Priors { time_ns: TIME_NS, tracker: "a".to_owned(), term: 5, numbers: 6, priors });
+    survives(TrackerState {
+        time_ns: 1,
+        first_ns: 2,
+        term: 3,
+        version: "0.1.0".to_owned(),
+        tracker: vec![1, 2, 3],
+    });
     survives(Warning { state: "blocked".to_owned(), onset_s: [0.1, 0.2, 0.3], ..Warning::default() });
     survives(NodeHealth {
         stages: vec!["track".to_owned()],

@@ -24,6 +24,8 @@ pub struct Published {
     pub frame: u64,
     /// The end of the frame, in the time of the sensors.
     pub time_ns: i64,
+    /// Of the tracker that led, where several may (`umbracast_node::terms`).
+    pub term: u64,
     /// When it was published, host time.
     pub published_ns: i64,
     /// From the last packet of the frame to this.

@@ -75,6 +75,16 @@ impl Warnings {
         events
     }
 
+    /// Tracks have other numbers. What was said of an old number is not forgotten: it is gone with the next frame.
+    pub fn renumber(&mut self, number: impl Fn(u64) -> u64) {
+        let renumbered = |(&(access_point, track), &(state, link)): (&(u32, u64), &(State, LinkRow))| {
+            let track = number(track);
+            ((access_point, track), (state, LinkRow { track, ..link }))
+        };
+        let renumbered: Vec<_> = self.0.iter().map(renumbered).collect();
+        self.0.extend(renumbered);
+    }
+
     /// Other access points from now on: what a link was goes with its access point's name. Links of names that are no
     /// more are gone.
     pub fn rename(&mut self, before: &[String], after: &[String]) -> Vec<Event> {
@@ -167,6 +177,16 @@ mod tests {
         assert_eq!((gone[0].state, gone[0].link.track), (State::Gone, 5));
         assert!(warnings.changes(&[], &[]).is_empty(), "said once");
         assert_eq!(warnings.changes(&[link(false, true)], &[])[0].state, State::Warned);
+    }
+
+    #[test]
+    fn who_is_renumbered_is_gone_by_the_old_number_and_not_warned_of_again_by_the_new_one() {
+        let mut warnings = Warnings::default();
+        let of = |track: u64| LinkRow { track, ..link(false, true) };
+        assert_eq!(warnings.changes(&[of(3), of(5)], &[]).len(), 2);
+        warnings.renumber(|track| if track == 5 { 100 } else { track });
+        let events = warnings.changes(&[of(3), of(100)], &[]);
+        assert_eq!((events.len(), events[0].state, events[0].link.track), (1, State::Gone, 5));
     }
 
     #[test]

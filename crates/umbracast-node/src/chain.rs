@@ -1,6 +1,7 @@
 //! The stages after the foreground, as many consecutive ones as a process runs: the calls of
 //! [`umbracast::Pipeline::step`], with network messages at the ends.
 
+use sha2::{Digest, Sha256};
 use umbracast::blockage::Caster;
 use umbracast::decide::Decider;
 use umbracast::detect::{self, Clocks, Clusterer, Measurer, Prior};
@@ -93,6 +94,31 @@ pub struct Made {
     pub closed_ns: i64,
     /// How long the stages took until here.
     pub took_ns: i64,
+    /// Of the tracker that led.
+    pub term: u64,
+    /// Everybody's number, in order.
+    pub numbers: Vec<u64>,
+}
+
+impl Made {
+    /// Everybody has another number.
+    pub fn renumber(&mut self, number: impl Fn(u64) -> u64) {
+        let followed = self.followed.iter_mut().flat_map(|followed| {
+            let tracks = followed.tracks.iter_mut().map(|track| &mut track.id);
+            tracks.chain(followed.forecasts.iter_mut().map(|forecast| &mut forecast.track))
+        });
+        let links = self.links.iter_mut().flatten().map(|link| &mut link.track);
+        let warnings = self.warnings.iter_mut().map(|warning| &mut warning.track);
+        let all = followed.chain(links).chain(warnings).chain(&mut self.numbers);
+        all.for_each(|old| *old = number(*old));
+    }
+
+    /// A digest of everybody's number.
+    pub fn digest(&self) -> u64 {
+        let bytes: Vec<u8> = self.numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+        let digest = Sha256::digest(bytes);
+        digest.iter().take(8).fold(0, |number, &byte| number << 8 | u64::from(byte))
+    }
 }
 
 impl Chain {
@@ -124,8 +150,12 @@ impl Chain {
     pub fn joined(&mut self, joined: Joined, now_ns: impl Fn() -> i64) -> Option<Made> {
         let time_ns = joined.views.time_ns;
         if joined.anew && !self.is_later(time_ns) {
-            // Somebody's clock was set back: who was followed is followed no more.
-            self.tracker = self.tracker.as_ref().map(|_| Tracker::new(&self.config.track, &self.config.site));
+            // Somebody's clock was set back: who was followed is followed no more, and nobody else gets their numbers.
+            self.tracker = self.tracker.as_ref().map(|before| {
+                let mut tracker = Tracker::new(&self.config.track, &self.config.site);
+                tracker.renumber(|id| id, before.next_id());
+                tracker
+            });
             (self.first_ns, self.last_ns) = (None, None);
         }
         if !self.is_later(time_ns) {
@@ -153,7 +183,7 @@ impl Chain {
         }
         tracker.update(&joined.views, &o.detections, &mut o.tracks);
         tracker.priors(time_ns + STEP_NS, &mut self.priors);
-        o.health.frames_out_of_order += self.out_of_order;
+        o.health.frames_out_of_order = o.health.frames_out_of_order.saturating_add(self.out_of_order);
         o.health.clocks_corrected = self.clocks.corrected();
         let made = Made {
             priors: Some(Priors {
@@ -163,6 +193,7 @@ impl Chain {
             }),
             detections: Some(rows::detections(0, o).collect()),
             closed_ns: joined.closed_ns,
+            numbers: o.tracks.iter().map(|track| track.id).collect(),
             ..Made::default()
         };
         let sensors = joined.views.of_scans.iter().map(|view| view.sensor as u32).collect();
@@ -185,15 +216,17 @@ impl Chain {
         let o = &mut self.outcome;
         (o.time_ns, o.frame, o.health) = (followed.time_ns, followed.frame, followed.health);
         (o.tracks, o.forecasts) = (followed.tracks, followed.forecasts);
-        let made = Made { closed_ns: followed.closed_ns, ..Made::default() };
+        let made = Made { closed_ns: followed.closed_ns, term: followed.term, ..Made::default() };
         self.later_stages(made, followed.sensors, followed.took_ns, begun_ns, now_ns, false)
     }
 
-    /// What another tracker needs to go on from here; `None` before the first frame, or where no tracker is in the row.
-    pub fn state(&self) -> Option<TrackerState> {
+    /// What another tracker needs to go on from here, as it is known in a term; `None` before the first frame, or where no
+    /// tracker is in the row.
+    pub fn state(&self, term: u64) -> Option<TrackerState> {
         Some(TrackerState {
             time_ns: self.last_ns?,
             first_ns: self.first_ns?,
+            term,
             version: VERSION.to_owned(),
             tracker: self.tracker.as_ref()?.state(),
         })
@@ -205,8 +238,32 @@ impl Chain {
         let taken = state.version == VERSION && tracker.take_up(&state.tracker);
         if taken {
             (self.first_ns, self.last_ns) = (Some(state.first_ns), Some(state.time_ns));
+            self.warnings = Warnings::default();
         }
         taken
+    }
+
+    /// The number of who is born next.
+    pub fn next_number(&self) -> u64 {
+        self.tracker.as_ref().map_or(0, Tracker::next_id)
+    }
+
+    /// Everybody's number, ascending.
+    pub fn numbers(&self) -> Vec<u64> {
+        self.tracker.as_ref().map(Tracker::ids).unwrap_or_default()
+    }
+
+    /// Everybody has another number, and who is born next has `next`.
+    pub fn renumber(&mut self, number: impl Fn(u64) -> u64, next: u64) {
+        if let Some(tracker) = &mut self.tracker {
+            tracker.renumber(&number, next);
+        }
+        self.warnings.renumber(number);
+    }
+
+    /// The next frame says again which warnings hold.
+    pub fn say_again(&mut self) {
+        self.warnings = Warnings::default();
     }
 
     /// Time begins anew: the next frame is taken whatever its time.
@@ -241,7 +298,8 @@ impl Chain {
             self.fader.fade(caster, &mut o.losses);
             self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
             self.fewer_samples += u64::from(caster.took_fewer_samples());
-            o.health.frames_with_fewer_samples += self.fewer_samples;
+            o.health.frames_with_fewer_samples =
+                o.health.frames_with_fewer_samples.saturating_add(self.fewer_samples);
             let (mut tracks, mut links) = (Vec::new(), Vec::new());
             rows::of_outcome(0, o, &mut tracks, &mut links);
             let events = self.warnings.changes(&links, &self.access_points);
@@ -256,6 +314,7 @@ impl Chain {
             made.followed = Some(Followed {
                 time_ns: o.time_ns,
                 frame: o.frame,
+                term: made.term,
                 tracks: o.tracks.clone(),
                 forecasts: if self.forecaster.is_some() { o.forecasts.clone() } else { Vec::new() },
                 sensors,
@@ -278,6 +337,7 @@ fn warning(event: &Event, time_ns: i64, frame: u64, closed_ns: i64) -> Warning {
     Warning {
         time_ns,
         frame,
+        term: 0,
         access_point: event.access_point.clone(),
         track: link.track,
         state: event.state.name().to_owned(),

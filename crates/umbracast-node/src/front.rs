@@ -16,6 +16,7 @@ use umbracast_live::HostClock;
 use umbracast_live::receive::Arrived;
 
 use crate::keys::front_end;
+use crate::terms::Terms;
 
 /// Without an empty scan, a front end waits so long for the priors of its frame while a tracker is there.
 const PRIORS_WAIT: Duration = Duration::from_millis(50);
@@ -51,6 +52,7 @@ pub struct Front {
 #[derive(Debug, Default)]
 pub struct Expected {
     newest: Mutex<Option<(Priors, i64)>>,
+    terms: Mutex<Terms>,
     heard: Condvar,
 }
 
@@ -222,8 +224,11 @@ pub fn takes_clouds(sensor: &Sensor) -> bool {
 }
 
 impl Expected {
-    /// Takes what was heard.
+    /// Takes what was heard, if no newer leader is there.
     pub fn hear(&self, priors: Priors, now_ns: i64) {
+        if !self.terms.lock().unwrap_or_else(PoisonError::into_inner).takes(priors.term, now_ns) {
+            return;
+        }
         let mut newest = self.newest.lock().unwrap_or_else(PoisonError::into_inner);
         *newest = Some((priors, now_ns));
         drop(newest);

@@ -120,6 +120,25 @@ impl Hall {
         declared.wait().map_err(|e| said(key, e))
     }
 
+    /// Hears rows of a leader ([`Outlet::put_rows`]), with its term.
+    ///
+    /// # Errors
+    /// A key that is none.
+    pub fn hear_rows(
+        &self,
+        key: &str,
+        hear: impl Fn(u64, &ZBytes) + Send + Sync + 'static,
+    ) -> Result<Subscriber<()>, Error> {
+        let heard = move |sample: zenoh::sample::Sample| {
+            if sample.kind() == SampleKind::Put {
+                let term = sample.attachment().and_then(|term| term.to_bytes().as_ref().try_into().ok());
+                hear(term.map_or(0, u64::from_le_bytes), sample.payload());
+            }
+        };
+        let declared = self.session.declare_subscriber(key.to_owned()).callback(heard);
+        declared.wait().map_err(|e| said(key, e))
+    }
+
     /// Answers who asks for a key, as long as what is returned lives.
     ///
     /// # Errors
@@ -190,12 +209,24 @@ impl Outlet {
         self.put_bytes(fields::encode(message));
     }
 
-    /// The same of bytes.
+    /// Publishes rows, which are the bytes of recordings. The term of the tracker that led is attached: eight bytes, the lowest
+    /// first.
+    pub fn put_rows(&self, term: u64, rows: Vec<u8>) {
+        self.count(&rows);
+        // An error is a session that was closed.
+        let _ = self.publisher.put(rows).attachment(term.to_le_bytes()).wait();
+    }
+
+    /// Publishes bytes.
     pub fn put_bytes(&self, bytes: Vec<u8>) {
-        self.traffic.messages.fetch_add(1, Ordering::Relaxed);
-        self.traffic.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        self.count(&bytes);
         // An error is a session that was closed.
         let _ = self.publisher.put(bytes).wait();
+    }
+
+    fn count(&self, bytes: &[u8]) {
+        self.traffic.messages.fetch_add(1, Ordering::Relaxed);
+        self.traffic.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
     }
 }
 

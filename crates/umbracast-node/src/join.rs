@@ -9,15 +9,13 @@ use std::time::Duration;
 
 use umbracast::detect::{Detection, Point};
 use umbracast::lidar::Views;
-use umbracast::{Health, STEP_NS, Site};
+use umbracast::{Health, Site};
 use umbracast_io::nodes::Foreground;
 
 /// As many frames may wait: more than a second of them is a clock that runs wild.
 const OPEN_MAX: usize = 16;
 /// Closed frames whose beginning is remembered, to know whether a message that came too late was worth waiting for.
 const REMEMBERED: usize = 8;
-/// A message this far ahead of the last frame is not believed alone.
-const AHEAD_NS: i64 = 100 * STEP_NS;
 /// When nothing that could be used has come for so long, time is taken as it comes: somebody's clock was set.
 const SILENCE_NS: i64 = 1_000_000_000;
 
@@ -46,7 +44,7 @@ pub struct Counts {
     pub late: u64,
     /// Messages of a sensor that had answered already: of a front end that is there twice.
     pub doubled: u64,
-    /// Messages of another site, or whose time nobody else shares.
+    /// Messages of another site.
     pub strangers: u64,
     /// Sensors that gave nothing to a frame, one a sensor and frame.
     pub sensors_missing: u64,
@@ -107,13 +105,18 @@ impl Join {
         }
     }
 
-    /// Takes a message that came at `now_ns`, time that only grows.
+    /// The next frame is taken whatever its time; what is open is given up.
+    pub fn begin_anew(&mut self) {
+        (self.last_ns, self.closed) = (None, VecDeque::new());
+        self.open.clear();
+    }
+
+    /// Takes a message that came at `now_ns`, time that only grows. What it says is within [`crate::bounds`], and of the hall's
+    /// time.
     pub fn push(&mut self, message: Foreground, now_ns: i64) {
         let known = message.sensors.iter().eq(self.sensors.iter().map(|sensor| &sensor.name));
         let sensors = self.sensors.len();
-        let within = message.covers.iter().all(|&s| (s as usize) < sensors)
-            && message.views.iter().all(|view| view.sensor < sensors)
-            && message.points.iter().all(|p| usize::from(p.sensor) < sensors && p.position_m.is_finite());
+        let within = message.covers.iter().all(|&s| (s as usize) < sensors);
         if !known || !within || message.covers.is_empty() {
             self.counts.strangers += 1;
             return;
@@ -124,13 +127,7 @@ impl Join {
             if !silent {
                 return self.too_late(&message, now_ns);
             }
-            (self.last_ns, self.closed) = (None, VecDeque::new());
-            self.open.clear();
-        }
-        let newest_ns = self.open.last_key_value().map(|(&time_ns, _)| time_ns).or(self.last_ns);
-        if !silent && newest_ns.is_some_and(|newest_ns| time_ns.saturating_sub(newest_ns) > AHEAD_NS) {
-            self.counts.strangers += 1;
-            return;
+            self.begin_anew();
         }
         let open = self.open.entry(time_ns).or_insert_with(|| Open {
             since_ns: now_ns,
@@ -207,7 +204,7 @@ impl Join {
         self.counts.sensors_missing += missing as u64;
         self.sensors.iter().for_each(|sensor| joined.health.add(&sensor.health));
         joined.health.sensors_missing = self.counts.sensors_missing;
-        joined.health.packets_late += self.counts.late;
+        joined.health.packets_late = joined.health.packets_late.saturating_add(self.counts.late);
         joined
     }
 }
@@ -215,9 +212,9 @@ impl Join {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use umbracast::Config;
     use umbracast::geometry::{DVec3, Pose};
     use umbracast::lidar::View;
+    use umbracast::{Config, STEP_NS};
 
     const MS: i64 = 1_000_000;
 
@@ -299,8 +296,7 @@ mod tests {
         (0..2).for_each(|_| join.push(message(0, 1), 0));
         join.push(message(1, 1), 0);
         assert!(join.pop(0).is_some());
-        join.push(message(0, 5000), MS);
-        assert_eq!((join.counts.strangers, join.counts.doubled), (3, 1));
+        assert_eq!((join.counts.strangers, join.counts.doubled), (2, 1));
         join.push(message(0, 1), 500 * MS);
         assert_eq!(join.counts.late, 1);
         join.push(message(0, 1), 1500 * MS);

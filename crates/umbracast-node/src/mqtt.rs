@@ -104,19 +104,23 @@ impl Sender {
     }
 
     /// Sends what a link has come to, as the page's events say it, to `umbracast/HALL/warnings/AP`, at least once. Waits for
-    /// nobody.
-    pub fn send(&self, event: &Event) {
+    /// nobody. A listener that has heard of a newer term gives the event up.
+    pub fn send(&self, event: &Event, term: u64) {
         // What separates levels and patterns of MQTT is in no name that can be subscribed to.
         let access_point = event.access_point.replace(['/', '+', '#'], "_");
         let topic = format!("umbracast/{}/warnings/{access_point}", self.hall);
-        self.publish(&topic, event.json().to_string());
+        let mut json = event.json();
+        json["term"] = term.into();
+        self.publish(&topic, json.to_string());
     }
 
-    /// Sends what is to be done about a device, as the page's events say it, to `umbracast/HALL/decisions/TRACK`, at least once.
-    /// Waits for nobody.
-    pub fn advise(&self, advice: &Advice) {
+    /// Sends what is to be done about a device, as the page's events say it, to `umbracast/HALL/decisions/TRACK`, at least once, with the
+    /// term of the tracker that led. Waits for nobody.
+    pub fn advise(&self, advice: &Advice, term: u64) {
         let topic = format!("umbracast/{}/decisions/{}", self.hall, advice.decision.track);
-        self.publish(&topic, advice.json().to_string());
+        let mut json = advice.json();
+        json["term"] = term.into();
+        self.publish(&topic, json.to_string());
     }
 
     fn publish(&self, topic: &str, text: String) {
@@ -306,7 +310,7 @@ mod tests {
     fn a_broker_gets_every_warning_as_json_and_is_told_who_is_there() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let sender = Sender::start(&at(&broker), "lab", drop).unwrap();
-        sender.send(&event()); // Waits until the broker is there.
+        sender.send(&event(), 6); // Waits until the broker is there.
         let (mut stream, _) = broker.accept().unwrap();
         let (kind, hello) = packet(&mut stream);
         assert_eq!((kind >> 4, &hello[2..6]), (1, &b"MQTT"[..]));
@@ -322,6 +326,7 @@ mod tests {
             (&"warning".into(), &7.into(), &0.75.into())
         );
         assert_eq!((&told["onset_p50_s"], &told["onset_p90_s"]), (&0.4.into(), &Value::Null));
+        assert_eq!(told["term"], 6);
         let ended = std::thread::spawn(move || drop(sender));
         // Good-bye is not said before the last word is acknowledged: a connection that is closed with acknowledgments unread is
         // reset, and what the broker had not read yet is lost.
@@ -390,7 +395,7 @@ mod tests {
             plain: false,
         };
         let sender = Sender::start(&settings, "lab", drop).unwrap();
-        (0..WAITING + 10).for_each(|_| sender.send(&event()));
+        (0..WAITING + 10).for_each(|_| sender.send(&event(), 6));
         assert!(sender.lost() >= 10);
         drop(sender);
         assert!(Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab", drop).is_err());

@@ -38,6 +38,11 @@ impl Lists {
         }
     }
 
+    /// The next list is taken whatever its time and source.
+    pub fn begin_anew(&mut self) {
+        (self.last_ns, self.used_ns) = (None, i64::MIN);
+    }
+
     /// The frame of a list: that of the nearest tenth of a second. None for a list of a frame that was given already, and
     /// for one of another source while the first one speaks.
     pub fn joined(&mut self, source: &str, list: &ObjectList, now_ns: i64) -> Option<Joined> {
@@ -53,7 +58,7 @@ impl Lists {
         (self.last_ns, self.used_ns) = (Some(time_ns), now_ns);
         source.clone_into(&mut self.source);
         let (detections, none) = objects::detections(list, time_ns);
-        self.health.points_invalid += none;
+        self.health.points_invalid = self.health.points_invalid.saturating_add(none);
         Some(Joined {
             views: Views { time_ns, of_scans: self.views.clone() },
             health: self.health,

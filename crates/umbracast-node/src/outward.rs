@@ -74,8 +74,8 @@ impl Outward {
     /// Tells a frame; waits for nobody.
     fn tell(&self, published: &Published) {
         if let Some(sender) = &self.sender {
-            published.events.iter().for_each(|event| sender.send(event));
-            published.advice.iter().for_each(|advice| sender.advise(advice));
+            published.events.iter().for_each(|event| sender.send(event, published.term));
+            published.advice.iter().for_each(|advice| sender.advise(advice, published.term));
         }
         let Some(face) = &self.face else { return };
         let mut face = face.lock().unwrap_or_else(PoisonError::into_inner);

@@ -9,7 +9,8 @@ use std::time::Duration;
 use sha2::{Digest, Sha256};
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Config, Error, Frame, Health, Site};
-use umbracast_io::messages;
+use umbracast_io::nodes::TrackerState;
+use umbracast_io::{fields, messages};
 use zenoh::Wait;
 use zenoh::bytes::ZBytes;
 use zenoh::key_expr::KeyExpr;
@@ -85,16 +86,21 @@ impl Shared {
 /// # Errors
 /// A key that is none.
 pub fn keep_state(hall: &Hall) -> Result<Sharing, Error> {
-    let kept = Arc::<Mutex<Option<ZBytes>>>::default();
+    let kept = Arc::<Mutex<Option<(u64, ZBytes)>>>::default();
     let (key, given) = (hall.keys().of("state"), kept.clone());
     let queryable = hall.answer(&key, move |query| {
         let newest = given.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some(state) = newest {
+        if let Some((_, state)) = newest {
             let _ = query.reply(query.key_expr().clone(), state).wait(); // Who asked may be gone.
         }
     })?;
     let heard = hall.hear(&key, move |_, bytes| {
-        *kept.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes.clone());
+        let Some(TrackerState { term, .. }) = fields::decode(&bytes.to_bytes()) else { return };
+        let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        // Not that of one who was away and does not know yet that another one leads.
+        if kept.as_ref().is_none_or(|(known, _)| *known <= term) {
+            *kept = Some((term, bytes.clone()));
+        }
     })?;
     Ok(Sharing { _queryable: queryable, _heard: Some(heard) })
 }

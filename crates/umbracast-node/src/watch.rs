@@ -20,6 +20,7 @@ use zenoh::pubsub::Subscriber;
 
 use crate::front;
 use crate::hall::Hall;
+use crate::terms::Terms;
 use crate::worker::Worker;
 
 /// Messages that wait to be put together.
@@ -28,6 +29,8 @@ const WAITING: usize = 256;
 const PATIENCE_NS: i64 = 200_000_000;
 /// Frames that wait for parts.
 const OPEN_MAX: usize = 32;
+/// When nothing was told for so long, time is taken as it comes.
+const SILENCE_NS: i64 = 1_000_000_000;
 const REST: Duration = Duration::from_millis(50);
 
 /// One that looks on.
@@ -42,11 +45,12 @@ pub struct Watch {
 }
 
 pub(crate) enum Part {
-    Links(ZBytes),
-    Losses(ZBytes),
-    Decisions(ZBytes),
+    /// Rows, with the term of the tracker that led.
+    Links(u64, ZBytes),
+    Losses(u64, ZBytes),
+    Decisions(u64, ZBytes),
     Tracks(ZBytes),
-    Detections(ZBytes),
+    Detections(u64, ZBytes),
     /// A front end's message, and the key that it came with.
     Foreground(String, ZBytes),
 }
@@ -57,6 +61,7 @@ struct Parts {
     /// When the links came.
     since_ns: Option<i64>,
     frame: u64,
+    term: u64,
     links: Option<Vec<LinkRow>>,
     losses: Option<Vec<LossRow>>,
     decisions: Option<Vec<DecisionRow>>,
@@ -78,21 +83,25 @@ impl Watch {
         listener: Listener,
     ) -> Result<Self, Error> {
         let queue = Arc::new(Queue::new(WAITING, WhenFull::DropOldest));
+        let hear_rows = |key: &str, kind: fn(u64, ZBytes) -> Part| {
+            let queue = queue.clone();
+            hall.hear_rows(&hall.keys().of(key), move |term, bytes| queue.push(kind(term, bytes.clone())))
+        };
         let hear = |key: &str, kind: fn(ZBytes) -> Part| {
             let queue = queue.clone();
             hall.hear(&hall.keys().of(key), move |_, bytes| queue.push(kind(bytes.clone())))
         };
         let mut subscribers = vec![
-            hear("links", Part::Links)?,
+            hear_rows("links", Part::Links)?,
             hear("tracks", Part::Tracks)?,
-            hear("detections", Part::Detections)?,
+            hear_rows("detections", Part::Detections)?,
         ];
         let (has_radio, has_decisions) = (config.site.has_radio(), config.site.has_decisions());
         if has_radio {
-            subscribers.push(hear("losses", Part::Losses)?);
+            subscribers.push(hear_rows("losses", Part::Losses)?);
         }
         if has_decisions {
-            subscribers.push(hear("decisions", Part::Decisions)?);
+            subscribers.push(hear_rows("decisions", Part::Decisions)?);
         }
         if points {
             let foregrounds = queue.clone();
@@ -110,6 +119,8 @@ impl Watch {
             warnings: Warnings::default(),
             advised: Advised::default(),
             open: BTreeMap::new(),
+            terms: Terms::default(),
+            told_ns: (None, 0),
             clock,
             listener,
             frames: frames.clone(),
@@ -129,6 +140,9 @@ struct Gather {
     warnings: Warnings,
     advised: Advised,
     open: BTreeMap<i64, Parts>,
+    terms: Terms,
+    /// The last frame that was told, and when.
+    told_ns: (Option<i64>, i64),
     clock: HostClock,
     listener: Listener,
     frames: Arc<AtomicU64>,
@@ -164,39 +178,66 @@ impl Gather {
     fn take(&mut self, part: Part) {
         let names = self.names.clone();
         match part {
-            Part::Links(bytes) => {
+            Part::Links(term, bytes) => {
                 let Some((frame, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
                 let now_ns = self.clock.now_ns();
-                let parts = self.parts(time_ns);
+                let Some(parts) = self.led(term, time_ns) else { return };
                 (parts.frame, parts.since_ns, parts.links) = (frame, Some(now_ns), Some(rows));
             }
-            Part::Losses(bytes) => {
+            Part::Losses(term, bytes) => {
                 let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
-                self.parts(time_ns).losses = Some(rows);
+                let Some(parts) = self.led(term, time_ns) else { return };
+                parts.losses = Some(rows);
             }
-            Part::Decisions(bytes) => {
+            Part::Decisions(term, bytes) => {
                 let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
-                self.parts(time_ns).decisions = Some(rows);
+                let Some(parts) = self.led(term, time_ns) else { return };
+                parts.decisions = Some(rows);
             }
-            Part::Detections(bytes) => {
+            Part::Detections(term, bytes) => {
                 let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
-                self.parts(time_ns).detections = Some(rows);
+                let Some(parts) = self.led(term, time_ns) else { return };
+                parts.detections = Some(rows);
             }
             Part::Tracks(bytes) => {
                 let Some(tracks) = fields::decode::<Followed>(&bytes.to_bytes()) else { return };
                 if tracks.forecasts.len() == tracks.tracks.len() {
-                    let time_ns = tracks.time_ns;
-                    self.parts(time_ns).tracks = Some(tracks);
+                    let Some(parts) = self.led(tracks.term, tracks.time_ns) else { return };
+                    parts.tracks = Some(tracks);
                 }
             }
             Part::Foreground(key, bytes) => {
                 let Some(part) = front::heard(&key, &bytes.to_bytes()) else { return };
+                if self.is_told(part.time_ns) {
+                    return;
+                }
                 let (sensors, known) = (self.sensors, &mut self.parts(part.time_ns).foreground);
                 if is_another(&part, known, sensors) {
                     known.push(part);
                 }
             }
         }
+    }
+
+    /// Where a part of a leader goes; none of an older term, nor of a frame that was told.
+    fn led(&mut self, term: u64, time_ns: i64) -> Option<&mut Parts> {
+        let now_ns = self.clock.now_ns();
+        if !self.terms.takes(term, now_ns) || self.is_told(time_ns) {
+            return None;
+        }
+        let parts = self.parts(time_ns);
+        if parts.term < term {
+            // What another leader said of this frame is of other numbers.
+            let foreground = std::mem::take(&mut parts.foreground);
+            *parts = Parts { term, foreground, ..Parts::default() };
+        }
+        Some(parts)
+    }
+
+    /// Whether a frame was told, or a later one. When all has been silent, time is taken as it comes.
+    fn is_told(&self, time_ns: i64) -> bool {
+        let silent = self.clock.now_ns() - self.told_ns.1 > SILENCE_NS;
+        !silent && self.told_ns.0.is_some_and(|told_ns| time_ns <= told_ns)
     }
 
     fn parts(&mut self, time_ns: i64) -> &mut Parts {
@@ -232,6 +273,7 @@ impl Gather {
             let Some((time_ns, parts)) = self.open.pop_first() else { return };
             let complete = whole(&parts);
             if let Some(published) = self.published(time_ns, parts) {
+                self.told_ns = (Some(time_ns), now_ns);
                 self.frames.fetch_add(1, Ordering::Relaxed);
                 (self.listener)(&Arc::new(published));
             }
@@ -256,8 +298,9 @@ impl Gather {
         Some(Published {
             frame: parts.frame,
             time_ns,
+            term: parts.term,
             published_ns: now_ns,
-            latency: time(now_ns - followed.closed_ns),
+            latency: time(now_ns.saturating_sub(followed.closed_ns)),
             step: time(followed.took_ns),
             detections: parts.detections.unwrap_or_default(),
             tracks,
