@@ -10,7 +10,6 @@ use umbracast::{Config, Error, Health};
 use umbracast_io::fields;
 use umbracast_io::nodes::{Followed, Foreground, Priors, TrackerState};
 use umbracast_io::objects::{self, ObjectList};
-use umbracast_io::wire;
 use umbracast_live::HostClock;
 use umbracast_live::latency::Latencies;
 use umbracast_live::queue::{Popped, Queue, WhenFull};
@@ -22,10 +21,11 @@ use zenoh::query::{Query, Queryable};
 use crate::bounds::{Bounds, Refused};
 use crate::chain::{Chain, Made, Row};
 use crate::front;
-use crate::hall::{Hall, Outlet, Urgency};
+use crate::hall::Hall;
 use crate::join::{Join, Joined};
 use crate::lead::{Frame, Lead, Said};
 use crate::objects::Lists;
+use crate::outlets::Outlets;
 use crate::role::Role;
 use crate::seat::{Seat, Work};
 use crate::terms::Terms;
@@ -174,83 +174,6 @@ impl Back {
         }
         let worker = Worker::start(queue, move |items| stages.run(items));
         Ok(Self { worker, counted, _subscribers: subscribers, _queryable: queryable })
-    }
-}
-
-/// Where results leave.
-struct Outlets {
-    priors: Option<Outlet>,
-    state: Option<Outlet>,
-    detections: Option<Outlet>,
-    followed: Option<Outlet>,
-    links: Option<Outlet>,
-    /// Where the site has a radio.
-    losses: Option<Outlet>,
-    /// Where it says what changes cost.
-    decisions: Option<Outlet>,
-    /// Of each access point.
-    warnings: Vec<(String, Outlet)>,
-    access_points: Vec<String>,
-    tracker: String,
-}
-
-impl Outlets {
-    fn new(hall: &Hall, config: &Config, row: Row) -> Result<Self, Error> {
-        let keys = hall.keys();
-        let outlet = |wanted: bool, key: &str, urgency| {
-            wanted.then(|| hall.outlet(&keys.of(key), urgency)).transpose()
-        };
-        let access_points: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
-        let warnings = access_points.iter().filter(|_| row.cast).map(|name| {
-            let chunk = crate::network::chunk(name).map_err(|e| e.within("site.access_points"))?;
-            Ok((name.clone(), hall.outlet(&keys.warnings(&chunk), Urgency::Warning)?))
-        });
-        let tracks = if row.forecast { "tracks" } else { "followed" };
-        Ok(Self {
-            priors: outlet(row.track, "priors", Urgency::Result)?,
-            state: outlet(row.track, "state", Urgency::Rest)?,
-            detections: outlet(row.track, "detections", Urgency::Rest)?,
-            followed: outlet(row.track || row.forecast, tracks, Urgency::Stage)?,
-            links: outlet(row.cast, "links", Urgency::Result)?,
-            losses: outlet(row.cast && config.site.has_radio(), "losses", Urgency::Result)?,
-            decisions: outlet(row.cast && config.site.has_decisions(), "decisions", Urgency::Warning)?,
-            warnings: warnings.collect::<Result<_, Error>>()?,
-            access_points,
-            tracker: hall.id(),
-        })
-    }
-
-    /// Warnings and decisions first, then what other stages wait for, then what is looked at.
-    fn put(&self, mut made: Made) {
-        let term = made.term;
-        for warning in &mut made.warnings {
-            warning.term = term;
-            if let Some((_, outlet)) = self.warnings.iter().find(|(name, _)| *name == warning.access_point) {
-                outlet.put(warning);
-            }
-        }
-        let names = &self.access_points;
-        if let (Some(outlet), Some(_)) = (&self.decisions, &made.links) {
-            outlet.put_rows(term, wire::encode(made.time_ns, made.frame, &made.decisions, names));
-        }
-        if let (Some(outlet), Some(followed)) = (&self.followed, &mut made.followed) {
-            followed.term = term;
-            outlet.put(followed);
-        }
-        let numbers = made.digest();
-        if let (Some(outlet), Some(priors)) = (&self.priors, &mut made.priors) {
-            (priors.tracker, priors.term, priors.numbers) = (self.tracker.clone(), term, numbers);
-            outlet.put(priors);
-        }
-        if let (Some(outlet), Some(links)) = (&self.links, &made.links) {
-            outlet.put_rows(term, wire::encode(made.time_ns, made.frame, links, names));
-            if let Some(outlet) = &self.losses {
-                outlet.put_rows(term, wire::encode(made.time_ns, made.frame, &made.losses, names));
-            }
-        }
-        if let (Some(outlet), Some(detections)) = (&self.detections, &made.detections) {
-            outlet.put_rows(term, wire::encode(made.time_ns, made.frame, detections, names));
-        }
     }
 }
 

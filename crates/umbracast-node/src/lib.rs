@@ -21,6 +21,7 @@ pub mod objects;
 pub mod lead;
 pub mod seat;
 pub mod chain;
+mod outlets;
 pub mod back;
 pub mod watch;
 pub mod share;

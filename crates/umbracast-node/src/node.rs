@@ -266,6 +266,7 @@ impl Node {
             summary.incomplete += count(&counted.incomplete);
             summary.late += count(&counted.late);
             summary.broken += count(&counted.broken);
+            summary.troubles.extend(lock(&counted.troubles).iter().cloned());
             summary.leads |= counted.leads.load(Ordering::Relaxed);
             summary.latency = lock(&counted.latency).clone();
             summary.wire = lock(&counted.wire).clone();
