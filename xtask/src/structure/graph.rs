@@ -7,15 +7,17 @@ use super::modules::{Module, Name, of_package};
 use crate::tools::Result;
 
 /// The packages in the order of the data; `lib.rs` or `main.rs` is the first file of each.
-const PACKAGES: [(&str, &str); 9] = [
+const PACKAGES: [(&str, &str); 11] = [
     ("umbracast", "src"),
     ("umbracast-sim", "crates/umbracast-sim/src"),
     ("umbracast-io", "crates/umbracast-io/src"),
     ("umbracast-eval", "crates/umbracast-eval/src"),
     ("umbracast-train", "crates/umbracast-train/src"),
+    ("umbracast-network", "crates/umbracast-network/src"),
     ("umbracast-calibrate", "crates/umbracast-calibrate/src"),
     ("umbracast-live", "crates/umbracast-live/src"),
     ("umbracast-node", "crates/umbracast-node/src"),
+    ("umbracast-fuzz", "crates/umbracast-fuzz/src"),
     ("umbracast-cli", "crates/umbracast-cli/src"),
 ];
 
