@@ -374,4 +374,4 @@ fn quantiles_db(of_step: &[f32], sorted_db: &mut Vec<f32>) -> [f64; 3] {
 
 #[cfg(test)]
 #[path = "links_tests.rs"]
-mod tests;
+pub(super) mod tests;

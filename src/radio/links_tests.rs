@@ -11,7 +11,7 @@ use crate::site::Radio;
 use crate::track::Track;
 
 /// Somebody who is known well, at a place, with a velocity.
-fn somebody(id: u64, position_m: DVec2, velocity_mps: DVec2) -> Track {
+pub(in crate::radio) fn somebody(id: u64, position_m: DVec2, velocity_mps: DVec2) -> Track {
     let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE };
     let mut covariance = [[0.0; 4]; 4];
     [4e-4, 4e-4, 4e-3, 4e-3].into_iter().enumerate().for_each(|(i, variance)| covariance[i][i] = variance);

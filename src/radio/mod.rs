@@ -7,7 +7,9 @@ mod table;
 mod body;
 mod outages;
 mod links;
+mod bindings;
 
+pub use bindings::{Binder, Binding, Report};
 pub use links::{Fader, Loss};
 pub use outages::Outages;
 pub use passage::{Passage, Rectangle};

@@ -60,16 +60,26 @@ impl Radio {
         LIGHT_MPS / (self.carrier_ghz * 1e9)
     }
 
-    /// Signal to noise of a free link so long: Friis' equation, noise of -174 dBm in each hertz.
+    /// Power that an isotropic antenna receives at the end of a free link so long: Friis' equation.
+    ///
+    /// ```
+    /// let received_dbm = umbracast::site::Radio::default().received_dbm(10.0);
+    /// assert!((received_dbm + 41.4).abs() < 0.1, "{received_dbm}");
+    /// ```
+    pub fn received_dbm(&self, distance_m: f64) -> f64 {
+        let free_space_db = 20.0 * (4.0 * std::f64::consts::PI * distance_m / self.wavelength_m()).log10();
+        self.transmit_dbm - free_space_db
+    }
+
+    /// Signal to noise of a free link so long: noise of -174 dBm in each hertz.
     ///
     /// ```
     /// let snr_db = umbracast::site::Radio::default().snr_db(10.0);
     /// assert!((snr_db - 43.6).abs() < 0.1, "{snr_db}");
     /// ```
     pub fn snr_db(&self, distance_m: f64) -> f64 {
-        let free_space_db = 20.0 * (4.0 * std::f64::consts::PI * distance_m / self.wavelength_m()).log10();
         let noise_dbm = -174.0 + 10.0 * (self.bandwidth_mhz * 1e6).log10() + self.noise_figure_db;
-        self.transmit_dbm - free_space_db - noise_dbm
+        self.received_dbm(distance_m) - noise_dbm
     }
 }
 

@@ -10,7 +10,7 @@ use crate::truth::{TICK_S, Traces};
 /// Reference signals come so often (3GPP TS 38.213, the usual period of synchronisation blocks).
 pub const REPORT_TICKS: usize = 2;
 /// Standard deviation of a report, dB: what links in sight show in the passages of IMMERSE.
-const REPORT_NOISE_DB: f64 = 0.6;
+pub const REPORT_NOISE_DB: f64 = 0.6;
 /// No modulation carries more, bits a second in each hertz.
 const MOST_BPS_HZ: f64 = 7.4;
 /// A change back within so long is a ping-pong.

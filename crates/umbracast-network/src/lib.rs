@@ -10,6 +10,7 @@ mod reflection;
 pub mod truth;
 pub mod foreseen;
 pub mod device;
+pub mod reports;
 pub mod oracle;
 pub mod policy;
 pub mod case;

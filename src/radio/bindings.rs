@@ -1,0 +1,400 @@
+//! Which person carries which device, told by the power that access points hear of it.
+//!
+//! A device's power follows the person who carries it: it falls with distance, and it falls where somebody stands in the way. The
+//! losses foreseen for each track are therefore compared with what is heard. Each device has a hidden Markov model whose states are
+//! the tracks, and one more for nobody who is followed. Each state keeps its own estimate of the device's level in sight, one for each
+//! access point, for antennas and hands differ. States exchange probability and levels as an interacting multiple model filter does
+//! (Blom and Bar-Shalom 1988): what was learned of a device goes with it when its track is swapped or born again.
+
+use std::collections::BTreeMap;
+
+use crate::Site;
+use crate::geometry::DVec2;
+use crate::radio::Loss;
+use crate::site::{Radio, Ue};
+use crate::track::Track;
+
+/// What one access point heard of one device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Report {
+    /// When it was heard.
+    pub time_ns: i64,
+    /// Which access point of the site.
+    pub access_point: usize,
+    /// The network's name of the device.
+    pub device: u64,
+    /// Received power of the reference signal, dBm.
+    pub power_dbm: f64,
+}
+
+/// How likely a device is carried by a person.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Binding {
+    /// As its reports name it.
+    pub device: u64,
+    /// The person.
+    pub track: u64,
+    /// The probability. Those of a device sum to less than 1 where it may be with nobody who is followed.
+    pub p: f64,
+}
+
+/// Less likely bindings are not told.
+const LEAST_P: f64 = 0.01;
+/// Devices that are followed at most; reports of others are skipped.
+const DEVICES_MAX: usize = 4096;
+/// A device that was not heard for so long is forgotten.
+const FORGOTTEN_NS: i64 = 60_000_000_000;
+/// Reports may come so late, and be so far ahead of the frames. Frames of that time are kept.
+const LATE_NS: i64 = 500_000_000;
+/// Standard deviation of a device's level about Friis' equation, dB: gains of antennas and hands that nobody knows.
+const LEVEL_DB: f64 = 5.0;
+/// How far a level wanders, dB in the root of a second.
+const WANDERS_DB: f64 = 0.3;
+/// Standard deviation of a report in sight, dB: noise, steps of 1 dB, and small fades (IMMERSE: 0.45 to 0.7).
+const REPORT_DB: f64 = 1.2;
+/// Shares of a loss's three quantiles.
+const SHARES: [f64; 3] = [0.3, 0.4, 0.3];
+/// A report is worth nothing with this probability, and may then be anywhere within so many dB.
+const STRAY: f64 = 0.02;
+const STRAY_DB: f64 = 60.0;
+/// Of a person who is not followed nothing is foreseen but that the power stays about what it was. It wanders so far, dB in the root of
+/// a second; before the first report it is anywhere.
+const UNSEEN_DB: f64 = 20.0;
+const ANYWHERE: Level = Level { mean_db: -80.0, variance: 900.0 };
+/// Errors of successive frames are alike, so that a frame counts for this share of an independent one. This and [`UNSEEN_DB`] were chosen
+/// on the scenes of seeds 130000 and 130001.
+const COUNTS: f64 = 0.3;
+/// Two tracks that are this near (one standard deviation, metres) may be swapped, so often a second.
+const SWAP_M: f64 = 0.5;
+const SWAP_HZ: f64 = 0.2;
+/// Elsewhere a device changes hands, or its person is lost, so often a second; and it is found again so often.
+const CHANGE_HZ: f64 = 1.0 / 300.0;
+const FOUND_HZ: f64 = 1.0 / 3.0;
+
+/// Finds out who carries which device.
+#[derive(Debug, Clone)]
+pub struct Binder {
+    radios: Vec<Option<(Radio, [f64; 3])>>,
+    ue: Ue,
+    /// The last frames, oldest first.
+    frames: Vec<Seen>,
+    devices: BTreeMap<u64, Device>,
+    /// Heard, and not yet compared: a frame of their time is awaited.
+    reports: Vec<Report>,
+    skipped: u64,
+}
+
+/// What a frame says of everybody's links.
+#[derive(Debug, Clone, Default)]
+struct Seen {
+    time_ns: i64,
+    tracks: Vec<u64>,
+    places_m: Vec<DVec2>,
+    /// By track and access point: power in sight of a device of the usual level, dBm, and the quantiles of its loss, dB.
+    links: Vec<(f64, [f64; 3])>,
+}
+
+#[derive(Debug, Clone)]
+struct Device {
+    heard_ns: i64,
+    /// State 0 is nobody; the others are the tracks of `tracks`.
+    p: Vec<f64>,
+    tracks: Vec<u64>,
+    /// By state and access point.
+    levels: Vec<Level>,
+    /// By access point: the power itself, as far as nothing but the last reports foretells it.
+    powers: Vec<Level>,
+}
+
+/// By how much a device is heard louder than its distance says, dB: mean and variance.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    mean_db: f64,
+    variance: f64,
+}
+
+const UNKNOWN: Level = Level { mean_db: 0.0, variance: LEVEL_DB * LEVEL_DB };
+
+impl Binder {
+    /// Needs the site's access points, their radios and where devices are on a body.
+    pub fn new(site: &Site) -> Self {
+        Self {
+            radios: site.access_points.iter().map(|ap| ap.radio.map(|r| (r, ap.position_m))).collect(),
+            ue: site.ue,
+            frames: Vec::new(),
+            devices: BTreeMap::new(),
+            reports: Vec::new(),
+            skipped: 0,
+        }
+    }
+
+    /// Takes what was heard, in any order, up to half a second late. A report of an access point without a radio, of no finite
+    /// power, or of a device too many is skipped and counted.
+    pub fn hear(&mut self, reports: &[Report]) {
+        for report in reports {
+            let known = self.radios.get(report.access_point).is_some_and(Option::is_some);
+            let room = self.devices.contains_key(&report.device) || self.devices.len() < DEVICES_MAX;
+            if known && room && report.power_dbm.is_finite() {
+                self.reports.push(*report);
+            } else {
+                self.skipped += 1;
+            }
+        }
+    }
+
+    /// How many reports were of no use since the start.
+    pub fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
+    /// Compares what was heard with a frame's tracks and losses, and tells who may carry what, devices in order, likeliest first.
+    pub fn bind(&mut self, time_ns: i64, tracks: &[Track], losses: &[Loss], bindings: &mut Vec<Binding>) {
+        bindings.clear();
+        self.see(time_ns, tracks, losses);
+        let seconds = match &self.frames[..] {
+            [.., before, now] => (now.time_ns - before.time_ns) as f64 * 1e-9,
+            _ => 0.0,
+        };
+        let heard = self.due(time_ns);
+        for report in &heard {
+            let unheard = || Device::new(report.time_ns, self.radios.len());
+            let device = self.devices.entry(report.device).or_insert_with(unheard);
+            device.heard_ns = device.heard_ns.max(report.time_ns);
+        }
+        self.devices.retain(|_, device| time_ns - device.heard_ns < FORGOTTEN_NS);
+        let Some(now) = self.frames.last() else { return };
+        let moves = moves(now, seconds);
+        let mut of_device = heard.as_slice();
+        for (name, device) in &mut self.devices {
+            device.follow(&now.tracks, self.radios.len());
+            device.exchange(&moves, seconds);
+            let (own, rest) = of_device.split_at(of_device.iter().take_while(|r| r.device == *name).count());
+            of_device = rest;
+            for of_access_point in own.chunk_by(|a, b| a.access_point == b.access_point) {
+                device.weigh(of_access_point, &self.frames, self.radios.len());
+            }
+            let told = device.tracks.iter().zip(&device.p[1..]).filter(|(_, p)| **p >= LEAST_P);
+            let from = bindings.len();
+            bindings.extend(told.map(|(&track, &p)| Binding { device: *name, track, p }));
+            bindings[from..].sort_by(|a, b| b.p.total_cmp(&a.p).then(a.track.cmp(&b.track)));
+        }
+    }
+
+    /// Keeps what a frame says, and of the frames before as many as late reports may ask for.
+    fn see(&mut self, time_ns: i64, tracks: &[Track], losses: &[Loss]) {
+        let mut seen = Seen::default();
+        while self.frames.first().is_some_and(|frame| frame.time_ns < time_ns - LATE_NS) {
+            seen = self.frames.remove(0);
+        }
+        seen.time_ns = time_ns;
+        seen.tracks.clear();
+        seen.places_m.clear();
+        seen.links.clear();
+        for track in tracks.iter().filter(|track| track.confirmed) {
+            seen.tracks.push(track.id);
+            seen.places_m.push(track.position_m);
+            let ue_m = self.ue.on_body(track.position_m, track.heading_rad, track.height_m);
+            for (access_point, radio) in self.radios.iter().enumerate() {
+                let of_link = |loss: &&Loss| loss.track == track.id && loss.access_point == access_point;
+                let loss_db = losses.iter().find(of_link).map_or([0.0; 3], |loss| loss.now_db);
+                let in_sight_dbm = radio.map_or(0.0, |(radio, place_m)| {
+                    radio.received_dbm(ue_m.distance(place_m.into()).max(0.1))
+                });
+                seen.links.push((in_sight_dbm, loss_db));
+            }
+        }
+        self.frames.push(seen);
+    }
+
+    /// Takes out the reports that frames cover, by device and access point; those too old are skipped.
+    fn due(&mut self, time_ns: i64) -> Vec<Report> {
+        let oldest_ns = self.frames.first().map_or(time_ns, |frame| frame.time_ns);
+        // What is said to be heard long after now will be as little believed then.
+        let of_use = |report: &Report| (oldest_ns..=time_ns + LATE_NS).contains(&report.time_ns);
+        let before = self.reports.len();
+        self.reports.retain(of_use);
+        self.skipped += (before - self.reports.len()) as u64;
+        let due = |report: &mut Report| report.time_ns <= time_ns;
+        let mut due: Vec<Report> = self.reports.extract_if(.., due).collect();
+        due.sort_by_key(|report| (report.device, report.access_point, report.time_ns));
+        due
+    }
+}
+
+/// How likely a device comes from one track to another within a frame, as (from, to, probability): only of tracks that are near.
+fn moves(now: &Seen, seconds: f64) -> Vec<(usize, usize, f64)> {
+    let mut moves = Vec::new();
+    for (i, a) in now.places_m.iter().enumerate() {
+        for (j, b) in now.places_m.iter().enumerate() {
+            let apart = a.distance_squared(*b) / (2.0 * SWAP_M * SWAP_M);
+            if i != j && apart < 10.0 {
+                moves.push((i + 1, j + 1, SWAP_HZ * seconds * (-apart).exp()));
+            }
+        }
+    }
+    moves
+}
+
+impl Device {
+    fn new(heard_ns: i64, access_points: usize) -> Self {
+        Self {
+            heard_ns,
+            p: vec![1.0],
+            tracks: Vec::new(),
+            levels: vec![UNKNOWN; access_points],
+            powers: vec![ANYWHERE; access_points],
+        }
+    }
+
+    /// Takes over a frame's tracks: who is gone leaves his share to nobody.
+    fn follow(&mut self, tracks: &[u64], access_points: usize) {
+        if self.tracks == tracks {
+            return;
+        }
+        let (old_p, old_levels) = (std::mem::take(&mut self.p), std::mem::take(&mut self.levels));
+        let mut nobody: Vec<(f64, usize)> = vec![(old_p[0], 0)];
+        for (state, track) in self.tracks.iter().enumerate() {
+            if !tracks.contains(track) {
+                nobody.push((old_p[state + 1], state + 1));
+            }
+        }
+        self.p.push(nobody.iter().map(|(p, _)| p).sum());
+        for access_point in 0..access_points {
+            let of = |&(p, state): &(f64, usize)| (p, old_levels[state * access_points + access_point]);
+            self.levels.push(Level::mixed(nobody.iter().map(of)));
+        }
+        for track in tracks {
+            let before = self.tracks.iter().position(|known| known == track).map(|state| state + 1);
+            self.p.push(before.map_or(0.0, |state| old_p[state]));
+            let from = before.unwrap_or(0) * access_points;
+            self.levels.extend_from_slice(&old_levels[from..from + access_points]);
+        }
+        self.tracks.clear();
+        self.tracks.extend_from_slice(tracks);
+    }
+
+    /// Lets states exchange probability and levels, as long as a frame is.
+    fn exchange(&mut self, near: &[(usize, usize, f64)], seconds: f64) {
+        let (states, access_points) = (self.p.len(), self.levels.len() / self.p.len());
+        let everybody = (states - 1).max(1) as f64;
+        let (lost, found) = (CHANGE_HZ * seconds, if states > 1 { FOUND_HZ * seconds } else { 0.0 });
+        let mut leaves = vec![0.0; states];
+        let mut comes: Vec<(usize, usize, f64)> = Vec::new();
+        for state in 1..states {
+            comes.push((state, 0, lost));
+            comes.push((0, state, found / everybody));
+        }
+        comes.extend(near);
+        comes.iter().for_each(|&(from, _, share)| leaves[from] += share);
+        for power in &mut self.powers {
+            power.variance = (power.variance + UNSEEN_DB * UNSEEN_DB * seconds).min(ANYWHERE.variance);
+        }
+        let (p, levels) = (self.p.clone(), self.levels.clone());
+        let stays = |state: usize| (1.0 - leaves[state]).max(0.0);
+        let mut parts: Vec<Vec<(f64, usize)>> = (0..states).map(|s| vec![(p[s] * stays(s), s)]).collect();
+        comes.iter().for_each(|&(from, to, share)| parts[to].push((p[from] * share, from)));
+        for (state, parts) in parts.iter().enumerate() {
+            self.p[state] = parts.iter().map(|(p, _)| p).sum();
+            for access_point in 0..access_points {
+                let of = |&(p, from): &(f64, usize)| (p, levels[from * access_points + access_point]);
+                let level = &mut self.levels[state * access_points + access_point];
+                *level = Level::mixed(parts.iter().map(of));
+                level.variance = (level.variance + WANDERS_DB * WANDERS_DB * seconds).min(UNKNOWN.variance);
+            }
+        }
+    }
+
+    /// Weighs every state by what one access point heard since the last frame, taken as one report.
+    fn weigh(&mut self, reports: &[Report], frames: &[Seen], access_points: usize) {
+        let Some(first) = reports.first() else { return };
+        let count = reports.len() as f64;
+        let power_dbm = reports.iter().map(|report| report.power_dbm).sum::<f64>() / count;
+        let time_ns = first.time_ns
+            + (reports.iter().map(|r| (r.time_ns - first.time_ns) as f64).sum::<f64>() / count) as i64;
+        let access_point = first.access_point;
+        let unseen = self.powers[access_point].weigh(power_dbm, &[(1.0, 0.0, 0.0)]);
+        let mut sum = 0.0;
+        for state in 0..self.p.len() {
+            let level = &mut self.levels[state * access_points + access_point];
+            let foreseen = match state.checked_sub(1) {
+                Some(track) => expected(frames, time_ns, self.tracks[track], access_point, access_points),
+                None => None,
+            };
+            let likelihood = foreseen.map_or(unseen, |expected| level.weigh(power_dbm, &expected));
+            self.p[state] *= likelihood.powf(COUNTS);
+            sum += self.p[state];
+        }
+        self.p.iter_mut().for_each(|p| *p /= sum);
+    }
+}
+
+/// What a track's device of the usual level would be heard with, as (share, dBm, standard deviation): quantiles of the frame before
+/// and of that after. `None` where the track is in neither.
+fn expected(
+    frames: &[Seen],
+    time_ns: i64,
+    track: u64,
+    access_point: usize,
+    access_points: usize,
+) -> Option<[(f64, f64, f64); 6]> {
+    let after = frames.iter().position(|frame| frame.time_ns >= time_ns)?;
+    let before = after.saturating_sub(1);
+    let of = |frame: &Seen| {
+        let at = frame.tracks.iter().position(|id| *id == track)?;
+        Some(frame.links[at * access_points + access_point])
+    };
+    let (early, late) = (of(&frames[before]), of(&frames[after]));
+    let (early, late) = (early.or(late)?, late.or(early)?);
+    let span_ns = (frames[after].time_ns - frames[before].time_ns).max(1);
+    let share = ((time_ns - frames[before].time_ns) as f64 / span_ns as f64).clamp(0.0, 1.0);
+    let mut parts = [(0.0, 0.0, 0.0); 6];
+    for (frame, (weight, (in_sight_dbm, losses_db))) in
+        [(1.0 - share, early), (share, late)].into_iter().enumerate()
+    {
+        let spread_db = (losses_db[2] - losses_db[0]) / 4.0;
+        for i in 0..3 {
+            parts[3 * frame + i] = (weight * SHARES[i], in_sight_dbm - losses_db[i], spread_db);
+        }
+    }
+    Some(parts)
+}
+
+impl Level {
+    /// Mean and variance of several levels, each with its share.
+    fn mixed(parts: impl Iterator<Item = (f64, Self)> + Clone) -> Self {
+        let sum: f64 = parts.clone().map(|(p, _)| p).sum();
+        if sum <= f64::MIN_POSITIVE {
+            return UNKNOWN;
+        }
+        let mean_db = parts.clone().map(|(p, level)| p * level.mean_db).sum::<f64>() / sum;
+        let square = |(p, level): (f64, Self)| p * (level.variance + (level.mean_db - mean_db).powi(2));
+        Self { mean_db, variance: parts.map(square).sum::<f64>() / sum }
+    }
+
+    /// The likelihood of a power, 1/dB. The level learns from it, as a Kalman filter does, as far as the power is no stray.
+    fn weigh<const N: usize>(&mut self, power_dbm: f64, expected: &[(f64, f64, f64); N]) -> f64 {
+        let mut parts = [(0.0, 0.0, 0.0); N];
+        for (part, &(share, dbm, spread_db)) in parts.iter_mut().zip(expected) {
+            let noise = REPORT_DB * REPORT_DB + spread_db * spread_db;
+            let (off_db, variance) = (power_dbm - dbm - self.mean_db, self.variance + noise);
+            let density =
+                (-0.5 * off_db * off_db / variance).exp() / (std::f64::consts::TAU * variance).sqrt();
+            *part = ((1.0 - STRAY) * share * density, off_db, noise);
+        }
+        let fits: f64 = parts.iter().map(|part| part.0).sum();
+        let likelihood = fits + STRAY / STRAY_DB;
+        if fits > 0.0 {
+            let off_db = parts.iter().map(|(w, off_db, _)| w * off_db).sum::<f64>() / fits;
+            let noise =
+                parts.iter().map(|(w, off, noise)| w * (noise + (off - off_db).powi(2))).sum::<f64>() / fits;
+            let gain = self.variance / (self.variance + noise) * fits / likelihood;
+            self.mean_db += gain * off_db;
+            self.variance *= 1.0 - gain;
+        }
+        likelihood
+    }
+}
+
+#[cfg(test)]
+#[path = "bindings_tests.rs"]
+mod tests;
