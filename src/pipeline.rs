@@ -6,7 +6,7 @@ use crate::detect::{Background, Clocks, Cluster, Clusterer, Detection, Measurer,
 use crate::forecast::{Forecast, Forecaster, Weights};
 use crate::lidar::{Views, is_time};
 use crate::mounting::Mountings;
-use crate::radio::{Fader, Loss, Outages};
+use crate::radio::{Binder, Binding, Fader, Loss, Outages, Report};
 use crate::track::{Track, Tracker};
 use crate::{Config, Error, Frame, Health};
 
@@ -45,6 +45,8 @@ pub struct Outcome {
     pub blockages: Vec<Blockage>,
     /// One an access point with a radio and confirmed track, in the same order; none where the method draws no samples.
     pub losses: Vec<Loss>,
+    /// Who may carry which device that was heard ([`Pipeline::hear`]), devices in order, likeliest first.
+    pub bindings: Vec<Binding>,
     /// One a confirmed track, where the site says what changes cost.
     pub decisions: Vec<Decision>,
     /// What was skipped since the start.
@@ -99,6 +101,7 @@ pub struct Pipeline {
     forecaster: Forecaster,
     caster: Caster,
     fader: Fader,
+    binder: Binder,
     decider: Decider,
     outcome: Outcome,
 }
@@ -128,6 +131,7 @@ impl Pipeline {
             forecaster: Forecaster::new(&config.forecast, weights)?,
             caster: Caster::new(&config.blockage, &config.site),
             fader: Fader::new(&config.site),
+            binder: Binder::new(&config.site),
             decider: Decider::new(&config.site),
             outcome: Outcome::default(),
         })
@@ -149,6 +153,27 @@ impl Pipeline {
     pub fn learn_empty(&mut self, frame: &Frame) {
         let health = &mut self.outcome.health;
         self.background.learn_empty(&self.mountings.follow(&frame.usable(health), health));
+    }
+
+    /// Takes what access points heard of devices since the last step. Reports may be half a second late; what is of no use is skipped
+    /// and counted ([`Binder::skipped`]).
+    ///
+    /// ```
+    /// use umbracast::{Config, Pipeline, radio::Report};
+    ///
+    /// let mut pipeline = Pipeline::new(&Config::default(), None)?;
+    /// // Access points of the default site have no radio, so nothing can be made of it.
+    /// pipeline.hear(&[Report { time_ns: 0, access_point: 0, device: 7, power_dbm: -61.0 }]);
+    /// assert_eq!(pipeline.binder().skipped(), 1);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    pub fn hear(&mut self, reports: &[Report]) {
+        self.binder.hear(reports);
+    }
+
+    /// What compares devices with tracks.
+    pub fn binder(&self) -> &Binder {
+        &self.binder
     }
 
     /// One frame through all stages.
@@ -184,6 +209,7 @@ impl Pipeline {
         self.forecaster.forecast(&o.tracks, &mut o.forecasts);
         self.caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
         self.fader.fade(&self.caster, &mut o.losses);
+        self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
         self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
         o.health.clocks_corrected = self.clocks.corrected();
         o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());
@@ -226,6 +252,7 @@ impl Pipeline {
     pub fn take_over_links(&mut self, config: &Config) {
         self.caster = Caster::new(&config.blockage, &config.site);
         self.fader = Fader::new(&config.site);
+        self.binder = Binder::new(&config.site);
         self.decider = Decider::new(&config.site);
     }
 }

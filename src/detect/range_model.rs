@@ -8,6 +8,9 @@ mod movers;
 const SHARE: f32 = 0.3;
 /// Without an empty scan what was seen first is believed, after so many revolutions, until something farther comes back.
 const START_REVOLUTIONS: f32 = 1.0;
+/// What no ray looked at is unknown and not open, for packets were lost or the first revolution began late; after so many revolutions
+/// it lies between the columns of a sensor that has fewer of them.
+const UNKNOWN_REVOLUTIONS: f32 = 10.0;
 /// Revolutions after which what was learned weighs half: a minute at 10 Hz.
 const MEMORY_REVOLUTIONS: f32 = 600.0;
 /// What was put there after the empty scan is background once it came back so often,
@@ -238,8 +241,7 @@ impl RangeModel {
         self.limit_m[pixel]
     }
 
-    /// A ray of this revolution looks there. What no ray looked at, for packets were lost or the revolution began late, is unknown and
-    /// not open: what comes back from there later is no person for that.
+    /// A ray of this revolution looks there.
     #[inline]
     pub fn look(&mut self, pixel: usize) {
         if let Some(looked) = &mut self.looked {
@@ -413,7 +415,8 @@ impl RangeModel {
         };
         for (pixel, nearest) in self.nearest_m.iter_mut().enumerate() {
             let looks = self.looked.as_ref().map_or(self.revolutions, |looked| looked[pixel].revolutions);
-            let unseen_m = if self.known || looks >= START_REVOLUTIONS { f32::INFINITY } else { 0.0 };
+            let open = looks >= START_REVOLUTIONS || self.revolutions >= UNKNOWN_REVOLUTIONS;
+            let unseen_m = if self.known || open { f32::INFINITY } else { 0.0 };
             let least = least(looks - self.frozen[pixel].revolutions);
             *nearest = nearest_m(&self.modes[pixel], least).unwrap_or(unseen_m).min(unseen_m);
         }
@@ -425,10 +428,11 @@ impl RangeModel {
         }
     }
 
-    /// Edges jitter by one bin from revolution to revolution, so the neighbours of a pixel count as well.
+    /// Edges jitter by one bin from revolution to revolution, so the neighbours of a pixel count as well, as far as they are known.
     #[inline]
-    fn limit_of(&self, pixels: [usize; 3]) -> f32 {
-        pixels.map(|pixel| self.nearest_m[pixel]).into_iter().fold(f32::INFINITY, f32::min) - self.margin_m
+    fn limit_of(&self, [own, left, right]: [usize; 3]) -> f32 {
+        let beside_m = [left, right].map(|pixel| self.nearest_m[pixel]).into_iter().filter(|m| *m > 0.0);
+        beside_m.fold(self.nearest_m[own], f32::min) - self.margin_m
     }
 }
 

@@ -147,9 +147,12 @@ impl Binder {
         self.skipped
     }
 
-    /// Compares what was heard with a frame's tracks and losses, and tells who may carry what, devices in order, likeliest first.
+    /// Compares what was heard with a frame's tracks and its losses, in the order of [`Fader::fade`](super::Fader::fade), and tells who may carry what, devices in order, likeliest first.
     pub fn bind(&mut self, time_ns: i64, tracks: &[Track], losses: &[Loss], bindings: &mut Vec<Binding>) {
         bindings.clear();
+        if self.radios.iter().all(Option::is_none) {
+            return;
+        }
         self.see(time_ns, tracks, losses);
         let seconds = match &self.frames[..] {
             [.., before, now] => (now.time_ns - before.time_ns) as f64 * 1e-9,
@@ -190,17 +193,23 @@ impl Binder {
         seen.tracks.clear();
         seen.places_m.clear();
         seen.links.clear();
-        for track in tracks.iter().filter(|track| track.confirmed) {
+        let people = tracks.iter().filter(|track| track.confirmed).count();
+        for (person, track) in tracks.iter().filter(|track| track.confirmed).enumerate() {
             seen.tracks.push(track.id);
             seen.places_m.push(track.position_m);
             let ue_m = self.ue.on_body(track.position_m, track.heading_rad, track.height_m);
+            let mut radios = 0;
             for (access_point, radio) in self.radios.iter().enumerate() {
+                let Some((radio, place_m)) = radio else {
+                    seen.links.push((0.0, [0.0; 3]));
+                    continue;
+                };
+                // Losses come access points with radios first, in the order of confirmed tracks.
                 let of_link = |loss: &&Loss| loss.track == track.id && loss.access_point == access_point;
-                let loss_db = losses.iter().find(of_link).map_or([0.0; 3], |loss| loss.now_db);
-                let in_sight_dbm = radio.map_or(0.0, |(radio, place_m)| {
-                    radio.received_dbm(ue_m.distance(place_m.into()).max(0.1))
-                });
-                seen.links.push((in_sight_dbm, loss_db));
+                let loss = losses.get(radios * people + person).filter(of_link);
+                let in_sight_dbm = radio.received_dbm(ue_m.distance((*place_m).into()).max(0.1));
+                seen.links.push((in_sight_dbm, loss.map_or([0.0; 3], |loss| loss.now_db)));
+                radios += 1;
             }
         }
         self.frames.push(seen);

@@ -76,6 +76,7 @@ fn heard(seconds: i64, named: impl Fn(u64, i64) -> Option<u64>) -> (Binder, Vec<
             }
         }
         tracks.sort_by_key(|track| track.id);
+        losses.sort_by_key(|loss| (loss.access_point, loss.track));
         binder.hear(&reports);
         binder.bind(now_ns, &tracks, &losses, &mut bindings);
     }

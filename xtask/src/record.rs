@@ -59,7 +59,7 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 44] = [
+const JOBS: [Job; 45] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
@@ -84,6 +84,7 @@ const JOBS: [Job; 44] = [
     job("gestures", "people who talk with their hands beside a sensor", 10, Needs::Nothing, gestures::gestures),
     job("cut", "what a frame gains that closes as soon as the part with people has", 3, Needs::Nothing, crowds::cut),
     job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", 20, Needs::Nothing, crowds::network),
+    job("bindings", "which device is carried by whom, from the power heard", 4, Needs::Nothing, crowds::bindings),
     job("live", "ten minutes live, three times over, the page open", 33, Needs::Asking, live::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", 25, Needs::Asking, nodes::nodes),
     job("halls", "1 to 64 halls on one host", 8, Needs::Asking, nodes::halls),

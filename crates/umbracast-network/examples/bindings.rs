@@ -124,6 +124,7 @@ fn scene(people: usize, seed: u64) -> Result<(Vec<Share>, Share), String> {
             tracks.iter_mut().for_each(|track| track.id = swaps.now(track.id));
             losses.iter_mut().for_each(|loss| loss.track = swaps.now(loss.track));
             tracks.sort_by_key(|track| track.id);
+            losses.sort_by_key(|loss| (loss.access_point, loss.track));
             swapped.bind(outcome.time_ns, &tracks, &losses, &mut bindings);
             for person in 0..people {
                 let Some(track) = carrier(&traces, tick, person, &outcome.tracks) else { continue };

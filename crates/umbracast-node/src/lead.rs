@@ -22,6 +22,8 @@ const PATIENCE_NS: i64 = 250_000_000;
 /// A tracker that was cut off waits so long before it takes over: connections are given up after two seconds of silence, and are made
 /// anew within another one.
 const RETURNS_NS: i64 = 3_000_000_000;
+/// One that was away for less hears what was said meanwhile: connections are held.
+const HELD_NS: i64 = 1_500_000_000;
 /// A gap of this length between frames means that it was cut off.
 const GAP_NS: i64 = 1_000_000_000;
 /// So many frames are kept for a leader that does not answer.
@@ -55,8 +57,8 @@ pub struct Lead<T> {
     awake_ns: Option<i64>,
     /// When its last frame was done.
     done_ns: Option<i64>,
-    /// When it came back.
-    back_ns: Option<i64>,
+    /// Until when it is in no hurry, since it was away.
+    returns_ns: Option<i64>,
     delay: Delay,
     /// Frames that were too late to be published.
     pub stale: u64,
@@ -117,7 +119,7 @@ impl<T> Lead<T> {
             kept: VecDeque::new(),
             awake_ns: None,
             done_ns: None,
-            back_ns: None,
+            returns_ns: None,
             delay: Delay::default(),
             stale: 0,
         }
@@ -149,11 +151,11 @@ impl<T> Lead<T> {
 
     /// Whoever runs it calls this often. One that has slept leads no more.
     pub fn wake(&mut self, now_ns: i64) {
-        let slept = self.awake_ns.is_some_and(|awake_ns| now_ns - awake_ns > PATIENCE_NS);
+        let slept_ns = self.awake_ns.map_or(0, |awake_ns| now_ns - awake_ns);
         self.awake_ns = Some(now_ns);
-        if slept {
+        if slept_ns > PATIENCE_NS {
             self.term = None;
-            self.back_ns = Some(now_ns);
+            self.returns(slept_ns, now_ns);
         }
     }
 
@@ -193,8 +195,9 @@ impl<T> Lead<T> {
     pub fn done(&mut self, frame: Frame<T>, now_ns: i64) -> Option<T> {
         self.wake(now_ns);
         let at_ns = self.delay.undelayed_ns(frame.closed_ns, now_ns);
-        if self.done_ns.is_some_and(|done_ns| now_ns - done_ns > GAP_NS) {
-            self.back_ns = Some(now_ns);
+        let gap_ns = self.done_ns.map_or(0, |done_ns| now_ns - done_ns);
+        if gap_ns > GAP_NS {
+            self.returns(gap_ns, now_ns);
         }
         self.done_ns = Some(now_ns);
         let is_stale = now_ns - at_ns > self.stale_ns;
@@ -221,7 +224,7 @@ impl<T> Lead<T> {
             return Some(first.at_ns + PATIENCE_NS);
         }
         let due_ns = first.at_ns + if self.others { PATIENCE_NS } else { 0 };
-        Some(self.back_ns.map_or(due_ns, |back_ns| due_ns.max(back_ns + RETURNS_NS)))
+        Some(self.returns_ns.map_or(due_ns, |returns_ns| due_ns.max(returns_ns)))
     }
 
     /// Leads from now on.
@@ -231,10 +234,15 @@ impl<T> Lead<T> {
         let term = own.unwrap_or_else(|| terms::next(self.newest, terms::tag(&self.id)));
         let renumbered = (!resumes && !first).then(|| (self.agreed.unwrap_or(0), terms::first_number(term)));
         (self.term, self.held, self.newest, self.agreed) = (Some(term), Some(term), Some(term), None);
-        (self.back_ns, self.awake_ns) = (None, Some(now_ns));
+        (self.returns_ns, self.awake_ns) = (None, Some(now_ns));
         let stale_ns = self.stale_ns;
         let fresh = |kept: Kept<T>| (now_ns - kept.at_ns <= stale_ns).then_some(kept.frame.results);
         Taken { kept: self.kept.drain(..).filter_map(fresh).collect(), renumbered }
+    }
+
+    fn returns(&mut self, away_ns: i64, now_ns: i64) {
+        let returns_ns = now_ns + if away_ns < HELD_NS { PATIENCE_NS } else { RETURNS_NS };
+        self.returns_ns = self.returns_ns.max(Some(returns_ns));
     }
 
     /// True where nobody has led since it did: it goes on in its term.

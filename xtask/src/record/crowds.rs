@@ -227,3 +227,12 @@ pub fn network(book: &mut Book) -> Result<()> {
         ["network", "--losses", "--scenes", "1", "--seed", first].iter().chain(&many).copied(),
     )
 }
+
+/// Which device is carried by whom, told from the power heard.
+pub fn bindings(book: &mut Book) -> Result<()> {
+    let line = "cargo run --release --quiet --package umbracast-network --example bindings -- 231000 10 20";
+    book.command(line);
+    let said = book.bash(&root(), line)?;
+    book.line(&said);
+    Ok(())
+}
