@@ -231,8 +231,5 @@ pub fn network(book: &mut Book) -> Result<()> {
 /// Which device is carried by whom, told from the power heard.
 pub fn bindings(book: &mut Book) -> Result<()> {
     let line = "cargo run --release --quiet --package umbracast-network --example bindings -- 231000 10 20";
-    book.command(line);
-    let said = book.bash(&root(), line)?;
-    book.line(&said);
-    Ok(())
+    super::house::script(book, line, line)
 }
