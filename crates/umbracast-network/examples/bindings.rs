@@ -17,7 +17,7 @@ use umbracast::track::Track;
 use umbracast::{Config, Health, Mode, Pipeline};
 use umbracast_eval::run::chain::{empty_frames, push};
 use umbracast_network::reports::{self, LATE_NS};
-use umbracast_network::truth::{TICK_NS, Traces, TruthModel};
+use umbracast_network::truth::{Air, TICK_NS, Traces, TruthModel};
 use umbracast_sim::crowd::{Preset, strolling};
 use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
@@ -88,9 +88,12 @@ fn scene(people: usize, seed: u64) -> Result<(Vec<Share>, Share), String> {
     let mut scene =
         Scene::in_hall(strolling(Preset::Orca03, people, RADIUS_M, seed, SECONDS), site, &sensors, seed);
     let ticks = (SECONDS * 100) as usize;
-    let traces = Traces::of_scene(site, scene.walkers(), ticks, TruthModel::ModelB, false);
+    let airs = [Air::of(site, TruthModel::ModelB)];
+    let [traces] = &Traces::of_scene(site, scene.walkers(), ticks, &airs, false)[..] else {
+        return Err("one air has one truth".to_owned());
+    };
     let device_of = |person: usize| FIRST_DEVICE + (person * 7 + 3) as u64 % people as u64;
-    let reports = reports::of_scene(site, &traces, seed, device_of);
+    let reports = reports::of_scene(site, traces, seed, device_of);
     let mut assembler = Assembler::new(site).map_err(|e| e.to_string())?;
     let (mut health, mut sent) = (Health::default(), 0);
     // One network hears what LiDARs see; for the other, tracks are swapped.
@@ -109,7 +112,7 @@ fn scene(people: usize, seed: u64) -> Result<(Vec<Share>, Share), String> {
             let tick = ((outcome.time_ns / TICK_NS) as usize).min(ticks - 1);
             plain.bind(outcome.time_ns, &outcome.tracks, &outcome.losses, &mut bindings);
             for person in 0..people {
-                let Some(track) = carrier(&traces, tick, person, &outcome.tracks) else { continue };
+                let Some(track) = carrier(traces, tick, person, &outcome.tracks) else { continue };
                 for (share, asked_s) in shares.iter_mut().zip(ASKED_S) {
                     if (now_s - asked_s).abs() < 0.05 {
                         share.note(bound(&bindings, device_of(person)) == Some(track));
@@ -127,7 +130,7 @@ fn scene(people: usize, seed: u64) -> Result<(Vec<Share>, Share), String> {
             losses.sort_by_key(|loss| (loss.access_point, loss.track));
             swapped.bind(outcome.time_ns, &tracks, &losses, &mut bindings);
             for person in 0..people {
-                let Some(track) = carrier(&traces, tick, person, &outcome.tracks) else { continue };
+                let Some(track) = carrier(traces, tick, person, &outcome.tracks) else { continue };
                 if swaps.since_s(track).is_some_and(|s| (now_s - s - AFTER_SWAP_S).abs() < 0.05) {
                     after_swap.note(bound(&bindings, device_of(person)) == Some(swaps.now(track)));
                 }
