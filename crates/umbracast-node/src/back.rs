@@ -463,10 +463,13 @@ fn sender(key: &str) -> &str {
     end.trim_end_matches("/foreground")
 }
 
-/// A length of time in words.
+/// A length of time in words; coarse, so that messages of one sender are counted together.
 fn span(span_ns: i64) -> String {
-    let span_s = span_ns.unsigned_abs() as f64 * 1e-9;
-    if span_s < 100.0 { format!("{span_s:.1} s") } else { format!("{:.1} h", span_s / 3600.0) }
+    match span_ns.unsigned_abs() / 1_000_000_000 {
+        0 => "less than a second".to_owned(),
+        span_s @ 1..100 => format!("{span_s} s"),
+        span_s => format!("{:.1} h", span_s as f64 / 3600.0),
+    }
 }
 
 /// What a thread that panicked left is whole: every change is one assignment.

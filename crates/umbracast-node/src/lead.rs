@@ -223,7 +223,13 @@ impl<T> Lead<T> {
         if self.resumes() {
             return Some(first.at_ns + PATIENCE_NS);
         }
-        let due_ns = first.at_ns + if self.others { PATIENCE_NS } else { 0 };
+        let patience_ns = match () {
+            () if !self.others => 0,
+            // Everybody would get another number: the leader's state comes first, if there is one still.
+            () if self.said.is_some() && self.is_out_of_step() => RETURNS_NS,
+            () => PATIENCE_NS,
+        };
+        let due_ns = first.at_ns + patience_ns;
         Some(self.returns_ns.map_or(due_ns, |returns_ns| due_ns.max(returns_ns)))
     }
 
