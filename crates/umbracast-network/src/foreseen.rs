@@ -79,6 +79,7 @@ impl Foreteller {
     }
 
     /// What it says of the next frame; devices are bound to the tracks that are nearest to their people.
+    #[expect(clippy::disallowed_methods, reason = "how long losses take is a figure of the command's")]
     pub fn foresee(&mut self, frame: &Followed, traces: &Traces) -> Foreseen {
         self.forecaster.forecast(&frame.tracks, &mut self.forecasts);
         self.caster.cast(&frame.tracks, &self.forecasts, &mut self.blockages);
