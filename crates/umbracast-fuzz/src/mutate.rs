@@ -31,7 +31,7 @@ impl Random {
     }
 
     /// The next number.
-    pub fn next(&mut self) -> u64 {
+    pub fn draw(&mut self) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -40,7 +40,7 @@ impl Random {
 
     /// A number below `most`; 0 where there is none.
     pub fn below(&mut self, most: usize) -> usize {
-        (self.next() >> 16) as usize % most.max(1)
+        (self.draw() >> 16) as usize % most.max(1)
     }
 }
 
@@ -59,10 +59,10 @@ pub fn damage(whole: &[u8], random: &mut Random, bytes: &mut Vec<u8>) {
         };
         match random.below(8) {
             0 => bytes[at] ^= 1 << random.below(8),
-            1 => bytes[at] = random.next() as u8,
+            1 => bytes[at] = random.draw() as u8,
             2 => bytes.truncate(at),
             3 => {
-                let inserted: Vec<u8> = (0..random.below(16)).map(|_| random.next() as u8).collect();
+                let inserted: Vec<u8> = (0..random.below(16)).map(|_| random.draw() as u8).collect();
                 bytes.splice(at..at, inserted);
             }
             4 => drop(bytes.drain(at..(at + random.below(16)).min(bytes.len()))),

@@ -118,7 +118,7 @@ fn stream(input: &[u8]) -> bool {
             );
             last_ns = Some(frame.time_ns);
             frames += 1;
-            columns += frame.scans.iter().map(|scan| crate::targets::step::columns(scan)).sum::<usize>();
+            columns += frame.scans.iter().map(crate::targets::step::columns).sum::<usize>();
         }
     };
     while !given.is_over() {
