@@ -79,7 +79,8 @@ fn all(args: &Args) -> Result<bool, String> {
     }
     if let Some(file) = &args.input {
         let bytes = fs::read(file).map_err(|e| format!("{}: {e}", file.display()))?;
-        return Ok(targets.iter().fold(true, |kept, target| one(target, &bytes) && kept));
+        // All of them are asked, also after one that is broken.
+        return Ok(targets.iter().filter(|target| !one(target, &bytes)).count() == 0);
     }
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(2, usize::from));
     let until = match args.inputs {

@@ -88,7 +88,7 @@ impl Bounds {
             }
             let (place_m, _) = self.sensors[view.sensor];
             if !is_turn(&view.site_from_sensor)
-                || !(view.site_from_sensor.translation_m.distance(place_m) <= MOVED_M)
+                || !is_within(view.site_from_sensor.translation_m.distance(place_m), MOVED_M)
             {
                 return Err("a sensor elsewhere than the site says");
             }
@@ -100,7 +100,7 @@ impl Bounds {
             }
             let (place_m, reach_m) = self.sensors[sensor];
             // Not a number is no less than anything.
-            if !(point.position_m.distance(place_m) <= reach_m) {
+            if !is_within(point.position_m.distance(place_m), reach_m) {
                 return Err("points out of the sensor's reach");
             }
             if point.time_ns.abs_diff(message.time_ns) > APART_NS {
@@ -185,6 +185,11 @@ fn is_turn(pose: &Pose) -> bool {
 
 fn is_span(took_ns: i64) -> Result<(), Refusal> {
     if (0..=TOOK_MAX_NS).contains(&took_ns) { Ok(()) } else { Err("a time that no stage takes") }
+}
+
+/// What is no number is not within anything.
+fn is_within(distance_m: f64, most_m: f64) -> bool {
+    distance_m <= most_m
 }
 
 /// What was refused, by sender.
