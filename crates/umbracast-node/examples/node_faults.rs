@@ -4,6 +4,9 @@
 //! that of each failure's run. `short`, behind them: a few failures, and an error where what must happen does not.
 //! `node_faults UMBRACAST fleet`: what happens on one host, alone.
 
+#[path = "node_faults/vanish.rs"]
+mod vanish;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -32,6 +35,10 @@ const FAILS_FOR: Duration = Duration::from_secs(5);
 const GAP: Duration = Duration::from_millis(150);
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    // SAFETY: nothing has begun yet, so there is no other thread. Hosts that vanish must not stop who looks on.
+    unsafe {
+        umbracast_node::runtime::widen();
+    }
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [command, only] = &arguments[..]
         && only == "fleet"
@@ -241,6 +248,7 @@ impl Bench {
             "\n{:44} {:40} {:>7} {:>7} {:>9} {:>11} {:>10}",
             "what failed", "what must happen", "frames", "lost", "gap, ms", "recovers,s", "renumbered"
         );
+        self.vanishing(&self.record("long", "26")?)?;
         for fault in FAULTS.iter().filter(|fault| fault.short || !self.short) {
             let (seen, well) = self.fault(fault, &recording)?;
             println!("{:44} {:40} {seen}", fault.what, fault.must);
