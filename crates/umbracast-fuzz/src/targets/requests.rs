@@ -19,7 +19,7 @@ pub const HTTP: Target = Target { name: "http", corpus: requests, check: request
 
 const TOKEN: &str = "a-token-of-tests";
 /// The server answers within less, or it hangs.
-const PATIENCE: Duration = Duration::from_secs(10);
+const PATIENCE: Duration = Duration::from_secs(30);
 /// As much of an answer is read.
 const ANSWER_BYTES: usize = 1 << 16;
 
