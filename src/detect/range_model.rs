@@ -150,28 +150,15 @@ impl RangeModel {
         if rows <= self.rows {
             return;
         }
-        let (old_rows, old) = (self.rows, std::mem::take(&mut self.modes));
-        let old_frozen = std::mem::replace(&mut self.frozen, vec![Count::default(); rows * self.bins]);
-        let no_looks = vec![Count::default(); rows * self.bins];
-        let old_looked = self.looked.as_mut().map(|looked| std::mem::replace(looked, no_looks));
-        self.rows = rows;
-        self.modes = vec![[Mode::default(); MODES]; rows * self.bins];
-        self.nearest_m = vec![0.0; rows * self.bins];
-        self.limit_m = vec![0.0; rows * self.bins];
+        let old_rows = std::mem::replace(&mut self.rows, rows);
+        let pixels = rows * self.bins;
+        self.modes = widened(&self.modes, [old_rows, rows], self.bins);
+        self.frozen = widened(&self.frozen, [old_rows, rows], self.bins);
+        self.looked = self.looked.as_ref().map(|looked| widened(looked, [old_rows, rows], self.bins));
+        (self.nearest_m, self.limit_m) = (vec![0.0; pixels], vec![0.0; pixels]);
         // Numbers of pixels change: what was put there is learned anew.
-        (self.furniture, self.furnished) = (vec![0; rows * self.bins], 0);
+        (self.furniture, self.furnished) = (vec![0; pixels], 0);
         if old_rows > 0 {
-            for (new, old) in self.modes.chunks_exact_mut(rows).zip(old.chunks_exact(old_rows)) {
-                new[..old_rows].copy_from_slice(old);
-            }
-            for (new, old) in self.frozen.chunks_exact_mut(rows).zip(old_frozen.chunks_exact(old_rows)) {
-                new[..old_rows].copy_from_slice(old);
-            }
-            if let (Some(looked), Some(old_looked)) = (&mut self.looked, old_looked) {
-                for (new, old) in looked.chunks_exact_mut(rows).zip(old_looked.chunks_exact(old_rows)) {
-                    new[..old_rows].copy_from_slice(old);
-                }
-            }
             self.find_limits();
         }
     }
@@ -434,6 +421,17 @@ impl RangeModel {
         let beside_m = [left, right].map(|pixel| self.nearest_m[pixel]).into_iter().filter(|m| *m > 0.0);
         beside_m.fold(self.nearest_m[own], f32::min) - self.margin_m
     }
+}
+
+/// What is kept of every pixel, with more rows in each bin.
+fn widened<T: Copy + Default>(old: &[T], [old_rows, rows]: [usize; 2], bins: usize) -> Vec<T> {
+    let mut wide = vec![T::default(); rows * bins];
+    if old_rows > 0 {
+        for (wide, old) in wide.chunks_exact_mut(rows).zip(old.chunks_exact(old_rows)) {
+            wide[..old_rows].copy_from_slice(old);
+        }
+    }
+    wide
 }
 
 /// Whether a return is none or lies no nearer than its pixel's limit.

@@ -322,13 +322,15 @@ impl Device {
             + (reports.iter().map(|r| (r.time_ns - first.time_ns) as f64).sum::<f64>() / count) as i64;
         let access_point = first.access_point;
         let unseen = self.powers[access_point].weigh(power_dbm, &[(1.0, 0.0, 0.0)]);
+        let around = Around::new(frames, time_ns);
         let mut sum = 0.0;
         for state in 0..self.p.len() {
             let level = &mut self.levels[state * access_points + access_point];
-            let foreseen = match state.checked_sub(1) {
-                Some(track) => expected(frames, time_ns, self.tracks[track], access_point, access_points),
-                None => None,
-            };
+            let track = state.checked_sub(1).map(|track| self.tracks[track]);
+            let foreseen = around
+                .as_ref()
+                .zip(track)
+                .and_then(|(around, track)| around.expected(track, |at| at * access_points + access_point));
             let likelihood = foreseen.map_or(unseen, |expected| level.weigh(power_dbm, &expected));
             self.p[state] *= likelihood.powf(COUNTS);
             sum += self.p[state];
@@ -337,35 +339,43 @@ impl Device {
     }
 }
 
-/// What a track's device of the usual level would be heard with, as (share, dBm, standard deviation): quantiles of the frame before
-/// and of that after. `None` where the track is in neither.
-fn expected(
-    frames: &[Seen],
-    time_ns: i64,
-    track: u64,
-    access_point: usize,
-    access_points: usize,
-) -> Option<[(f64, f64, f64); 6]> {
-    let after = frames.iter().position(|frame| frame.time_ns >= time_ns)?;
-    let before = after.saturating_sub(1);
-    let of = |frame: &Seen| {
-        let at = frame.tracks.iter().position(|id| *id == track)?;
-        Some(frame.links[at * access_points + access_point])
-    };
-    let (early, late) = (of(&frames[before]), of(&frames[after]));
-    let (early, late) = (early.or(late)?, late.or(early)?);
-    let span_ns = (frames[after].time_ns - frames[before].time_ns).max(1);
-    let share = ((time_ns - frames[before].time_ns) as f64 / span_ns as f64).clamp(0.0, 1.0);
-    let mut parts = [(0.0, 0.0, 0.0); 6];
-    for (frame, (weight, (in_sight_dbm, losses_db))) in
-        [(1.0 - share, early), (share, late)].into_iter().enumerate()
-    {
-        let spread_db = (losses_db[2] - losses_db[0]) / 4.0;
-        for i in 0..3 {
-            parts[3 * frame + i] = (weight * SHARES[i], in_sight_dbm - losses_db[i], spread_db);
-        }
+/// The frames before and after an instant, and how near to the later one it lies, from 0 to 1.
+struct Around<'a> {
+    before: &'a Seen,
+    after: &'a Seen,
+    share: f64,
+}
+
+impl<'a> Around<'a> {
+    /// `None` where no frame is as late.
+    fn new(frames: &'a [Seen], time_ns: i64) -> Option<Self> {
+        let at = frames.iter().position(|frame| frame.time_ns >= time_ns)?;
+        let (before, after) = (&frames[at.saturating_sub(1)], &frames[at]);
+        let span_ns = (after.time_ns - before.time_ns).max(1);
+        let share = ((time_ns - before.time_ns) as f64 / span_ns as f64).clamp(0.0, 1.0);
+        Some(Self { before, after, share })
     }
-    Some(parts)
+
+    /// What a track's device of the usual level would be heard with, as (share, dBm, standard deviation): quantiles of the frame
+    /// before and of that after. `link_of` gives the link of the track at a place of a frame. `None` where the track is in neither.
+    fn expected(&self, track: u64, link_of: impl Fn(usize) -> usize) -> Option<[(f64, f64, f64); 6]> {
+        let of = |frame: &Seen| {
+            let at = frame.tracks.iter().position(|id| *id == track)?;
+            Some(frame.links[link_of(at)])
+        };
+        let (early, late) = (of(self.before), of(self.after));
+        let (early, late) = (early.or(late)?, late.or(early)?);
+        let mut parts = [(0.0, 0.0, 0.0); 6];
+        for (frame, (weight, (in_sight_dbm, losses_db))) in
+            [(1.0 - self.share, early), (self.share, late)].into_iter().enumerate()
+        {
+            let spread_db = (losses_db[2] - losses_db[0]) / 4.0;
+            for i in 0..3 {
+                parts[3 * frame + i] = (weight * SHARES[i], in_sight_dbm - losses_db[i], spread_db);
+            }
+        }
+        Some(parts)
+    }
 }
 
 impl Level {
