@@ -109,22 +109,19 @@ impl Sender {
         // What separates levels and patterns of MQTT is in no name that can be subscribed to.
         let access_point = event.access_point.replace(['/', '+', '#'], "_");
         let topic = format!("umbracast/{}/warnings/{access_point}", self.hall);
-        let mut json = event.json();
-        json["term"] = term.into();
-        self.publish(&topic, json.to_string());
+        self.publish(&topic, event.json(), term);
     }
 
     /// Sends what is to be done about a device, as the page's events say it, to `umbracast/HALL/decisions/TRACK`, at least once, with the
     /// term of the tracker that led. Waits for nobody.
     pub fn advise(&self, advice: &Advice, term: u64) {
         let topic = format!("umbracast/{}/decisions/{}", self.hall, advice.decision.track);
-        let mut json = advice.json();
-        json["term"] = term.into();
-        self.publish(&topic, json.to_string());
+        self.publish(&topic, advice.json(), term);
     }
 
-    fn publish(&self, topic: &str, text: String) {
-        if !self.state.publish(&self.client, topic, false, text) {
+    fn publish(&self, topic: &str, mut json: serde_json::Value, term: u64) {
+        json["term"] = term.into();
+        if !self.state.publish(&self.client, topic, false, json.to_string()) {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
