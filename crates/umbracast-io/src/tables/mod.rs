@@ -9,6 +9,7 @@ mod values;
 mod pages;
 mod parquet_file;
 mod csv_file;
+mod loose;
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +19,8 @@ pub use cells::{Cell, Name, Row};
 use csv_file::CsvFile;
 use parquet_file::ParquetFile;
 pub use parquet_file::TableSummary;
-pub use values::Values;
+pub use loose::Loose;
+pub use values::{Value, Values};
 
 /// Rows held back until they are written together.
 const ROW_GROUP: usize = 65_536;
