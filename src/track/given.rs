@@ -106,7 +106,9 @@ impl Windows {
             track.observed.clear();
             for observed in seen.iter().rev() {
                 let after_ns = track.observed.front().map(|next| next.time_ns - observed.time_ns);
-                if after_ns.is_none_or(|after_ns| after_ns >= STEP_LEAST_NS) && track.observed.len() < OBSERVED {
+                if after_ns.is_none_or(|after_ns| after_ns >= STEP_LEAST_NS)
+                    && track.observed.len() < OBSERVED
+                {
                     track.observed.push_front(*observed);
                 }
             }
@@ -131,7 +133,8 @@ mod tests {
                 tracks = vec![walker(3, k)];
                 windows.follow((k + 1) * STEP_NS / often, &mut tracks);
             }
-            let times: Vec<i64> = tracks[0].observed.iter().map(|observed| observed.time_ns / STEP_NS).collect();
+            let times: Vec<i64> =
+                tracks[0].observed.iter().map(|observed| observed.time_ns / STEP_NS).collect();
             assert_eq!(times, (31..=40).collect::<Vec<_>>(), "{often} a step");
         }
     }

@@ -16,7 +16,8 @@ use crate::rows::TrackRow;
 use crate::tables::{Loose, Row, Value};
 
 /// What other programs call the columns that are needed.
-const ALSO: [(&str, &str); 5] = [("id", "track"), ("x", "x_m"), ("y", "y_m"), ("vx", "vx_mps"), ("vy", "vy_mps")];
+const ALSO: [(&str, &str); 5] =
+    [("id", "track"), ("x", "x_m"), ("y", "y_m"), ("vx", "vx_mps"), ("vy", "vy_mps")];
 /// Names of a time in seconds.
 const SECONDS: [&str; 4] = ["time_s", "t_s", "time", "t"];
 /// Columns that have to be there.
@@ -68,7 +69,9 @@ impl OwnTracks {
         order.sort_by_key(key);
         if let Some(pair) = order.windows(2).find(|pair| key(&pair[0]) == key(&pair[1])) {
             let (track, first) = (rows[pair[1]].track, table.place(pair[0]));
-            let story = format!("column track: expected each person once at a time, found {track} again, after {first}");
+            let story = format!(
+                "column track: expected each person once at a time, found {track} again, after {first}"
+            );
             return Err(Error::new(story).within(table.place(pair[1])));
         }
         rows = order.into_iter().map(|r| rows[r]).collect();
@@ -159,7 +162,10 @@ fn number(rows: &mut [TrackRow]) {
 
 fn check(row: &TrackRow) -> Result<(), Error> {
     if !is_time(row.time_ns) {
-        return Err(Error::new(format!("column time_ns: expected a time that a clock shows, found {}", row.time_ns)));
+        return Err(Error::new(format!(
+            "column time_ns: expected a time that a clock shows, found {}",
+            row.time_ns
+        )));
     }
     let needed = [
         ("x_m", row.x_m, FARTHEST_M, "metres"),
@@ -169,13 +175,17 @@ fn check(row: &TrackRow) -> Result<(), Error> {
     ];
     for (name, value, most, unit) in needed {
         if value.is_nan() || value.abs() > most {
-            return Err(Error::new(format!("column {name}: expected -{most} to {most} {unit}, found {value}")));
+            return Err(Error::new(format!(
+                "column {name}: expected -{most} to {most} {unit}, found {value}"
+            )));
         }
     }
     let [xx, .., vyvy] = row.covariance;
     for (name, variance) in [("cov_xx_m2", xx), ("cov_yy_m2", row.covariance[4]), ("cov_vyvy_m2ps2", vyvy)] {
         if variance < 0.0 {
-            return Err(Error::new(format!("column {name}: expected a variance, not below 0, found {variance}")));
+            return Err(Error::new(format!(
+                "column {name}: expected a variance, not below 0, found {variance}"
+            )));
         }
     }
     if row.height_m <= 0.0 {
@@ -200,7 +210,12 @@ fn track(row: &TrackRow, site: &Site) -> Track {
     let mut track = Track::new(row.track, DVec2::new(row.x_m, row.y_m), DVec2::new(row.vx_mps, row.vy_mps));
     let c = row.covariance;
     if c[0].is_finite() && c[4].is_finite() {
-        let given = [[c[0], c[1], c[2], c[3]], [c[1], c[4], c[5], c[6]], [c[2], c[5], c[7], c[8]], [c[3], c[6], c[8], c[9]]];
+        let given = [
+            [c[0], c[1], c[2], c[3]],
+            [c[1], c[4], c[5], c[6]],
+            [c[2], c[5], c[7], c[8]],
+            [c[3], c[6], c[8], c[9]],
+        ];
         let speeds_are_given = given[2][2].is_finite() && given[3][3].is_finite();
         for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
             if (i < 2 && j < 2) || speeds_are_given {
@@ -279,7 +294,8 @@ mod tests {
     }
 
     /// One stands at (4, 0) m, and another walks into the line between that place and the access point `side`.
-    const CROSSING: &str = "id,t,x,y,vx,vy\n7,0.1,4,0,0,0\n8,0.1,6,-0.8,0,1.3\n7,0.2,4,0,0,0\n8,0.2,6,-0.67,0,1.3\n";
+    const CROSSING: &str =
+        "id,t,x,y,vx,vy\n7,0.1,4,0,0,0\n8,0.1,6,-0.8,0,1.3\n7,0.2,4,0,0,0\n8,0.2,6,-0.67,0,1.3\n";
 
     #[test]
     fn number_time_place_and_velocity_suffice() {
@@ -307,11 +323,23 @@ mod tests {
         let told = |text: &str| read(text).unwrap_err().to_string();
         for (text, expected) in [
             ("id,t,x,y,vx,vy\n1,0.1,a,0,0,0\n", "line 2, column x_m: expected a number, found \"a\""),
-            ("id,t,x,y,vx\n1,0.1,0,0,0\n", "column vy_mps: expected a number, found no such column but track"),
+            (
+                "id,t,x,y,vx\n1,0.1,0,0,0\n",
+                "column vy_mps: expected a number, found no such column but track",
+            ),
             ("id,x,y,vx,vy\n1,0,0,0,0\n", "column time_ns: expected times in nanoseconds, or time_s"),
-            ("id,t,x,y,vx,vy\n1,now,0,0,0,0\n", "line 2, column t: expected a time in seconds, found \"now\""),
-            ("id,t,x,y,vx,vy\n1,1,0,0,0,0\n2,1,0,0,0,0\n1,1,0,0,0,0\n", "line 4: column track: expected each person once"),
-            ("id,t,x,y,vx,vy\n1,1,0,0,1300,0\n", "line 2: column vx_mps: expected -100 to 100 metres a second"),
+            (
+                "id,t,x,y,vx,vy\n1,now,0,0,0,0\n",
+                "line 2, column t: expected a time in seconds, found \"now\"",
+            ),
+            (
+                "id,t,x,y,vx,vy\n1,1,0,0,0,0\n2,1,0,0,0,0\n1,1,0,0,0,0\n",
+                "line 4: column track: expected each person once",
+            ),
+            (
+                "id,t,x,y,vx,vy\n1,1,0,0,1300,0\n",
+                "line 2: column vx_mps: expected -100 to 100 metres a second",
+            ),
             ("id,t,x,y,vx,vy,height_m\n1,1,0,0,0,0,0\n", "line 2: column height_m: expected metres above 0"),
             ("id,t,x,y,vx,vy\n1,1,,0,0,0\n", "line 2, column x_m: expected a number, found null"),
         ] {

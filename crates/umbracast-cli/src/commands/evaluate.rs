@@ -11,9 +11,9 @@ use umbracast_eval::report::{self, Context, Kept};
 use umbracast_eval::run::chain::{self, Spec};
 use umbracast_eval::run::pooled::{self, Scores};
 use umbracast_eval::run::recorded::{by_scene, score_scenes};
-use umbracast_eval::score::{labels, matches};
 use umbracast_eval::score::matching::match_scene;
 use umbracast_eval::score::scene::{SceneRun, SceneTruth};
+use umbracast_eval::score::{labels, matches};
 use umbracast_io::rows::{MatchRow, PeopleRow, TrackRow};
 use umbracast_io::tables;
 
@@ -106,8 +106,9 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
     same_access_points(&config, truth)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
     let all = SceneTruth { people: tables::read(truth, &names)?, links: tables::read(truth, &names)? };
-    let scenes = by_scene(all, SceneRun { tracks: tables::read(dir, &names)?, links: tables::read(dir, &names)? })
-        .map_err(|e| e.within(dir.display()).within(truth.display()))?;
+    let scenes =
+        by_scene(all, SceneRun { tracks: tables::read(dir, &names)?, links: tables::read(dir, &names)? })
+            .map_err(|e| e.within(dir.display()).within(truth.display()))?;
     let weights = setup::weights(args.weights.as_deref())?;
     let scores = score_scenes(&config, &scenes, about_run(dir)?.health, &weights)?;
     let kept = scenes.first_key_value().map(|(number, (truth, run))| (format!("scene {number}"), truth, run));

@@ -194,7 +194,8 @@ fn set(cell: Cell, value: &Value, access_points: &[String]) -> bool {
         Value::Whole(v) => Some(v as f64),
         _ => None,
     };
-    let truth = whole.and_then(|v| [Some(false), Some(true)].get(usize::try_from(v).ok()?).copied().flatten());
+    let truth =
+        whole.and_then(|v| [Some(false), Some(true)].get(usize::try_from(v).ok()?).copied().flatten());
     let nothing = *value == Value::Null || matches!(value, Value::Real(v) if v.is_nan());
     let access_point = match value {
         Value::Text(name) => access_points.iter().position(|known| known == name).map(|at| at as u32),
@@ -229,7 +230,13 @@ mod tests {
     #[test]
     fn what_is_written_as_csv_or_parquet_is_read_as_the_same_rows() {
         let names = ["side".to_owned(), "centre".to_owned()];
-        let row = LinkRow { frame: 4, access_point: 1, p_now: 0.1 + 0.2, onset_s: [Some(0.3), None, None], ..LinkRow::default() };
+        let row = LinkRow {
+            frame: 4,
+            access_point: 1,
+            p_now: 0.1 + 0.2,
+            onset_s: [Some(0.3), None, None],
+            ..LinkRow::default()
+        };
         let rows = [row, LinkRow { frame: 5, p_any: [Some(0.25); 10], ..row }];
         let directory = tempfile::tempdir().unwrap();
         super::super::write(directory.path(), &names, true, &rows).unwrap();
@@ -251,7 +258,10 @@ mod tests {
         let message = told("frame,time_ns,person,track\n1,5,0,0\n\n2,6,-1,0\n").unwrap_err().to_string();
         assert_eq!(message, "line 4, column person: expected a whole number from 0 to 4294967295, found -1");
         let message = told("frame,time_ns,person\n1,5,0\n").unwrap_err().to_string();
-        assert!(message.contains("column track: expected a whole number, found no such column but frame"), "{message}");
+        assert!(
+            message.contains("column track: expected a whole number, found no such column but frame"),
+            "{message}"
+        );
         let message = told("frame,time_ns\n1,5,0\n").unwrap_err().to_string();
         assert!(message.contains("matches.csv: expected CSV with a header, found"), "{message}");
         assert!(Loose::read(Path::new("tracks.txt")).unwrap_err().to_string().contains(".csv or .parquet"));
@@ -265,7 +275,8 @@ mod tests {
         let mut columns: Vec<_> = columns.map(|name| (name.to_owned(), vec![Value::Real(1.0)])).into();
         columns.push(("access_point".to_owned(), vec![Value::Text("side".to_owned())]));
         columns.push(("self_blocked".to_owned(), vec![Value::Real(f64::NAN)]));
-        let rows = Loose::new(columns).unwrap().rows(&["side".to_owned()], PeopleLinkRow::default(), |_| false);
+        let rows =
+            Loose::new(columns).unwrap().rows(&["side".to_owned()], PeopleLinkRow::default(), |_| false);
         let rows = rows.unwrap();
         assert!(rows[0].blocked && rows[0].self_blocked.is_none() && rows[0].frame == 1);
     }

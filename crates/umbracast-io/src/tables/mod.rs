@@ -17,9 +17,9 @@ use umbracast::Error;
 
 pub use cells::{Cell, Name, Row};
 use csv_file::CsvFile;
+pub use loose::Loose;
 use parquet_file::ParquetFile;
 pub use parquet_file::TableSummary;
-pub use loose::Loose;
 pub use values::{Value, Values};
 
 /// Rows held back until they are written together.
