@@ -32,6 +32,9 @@ pub fn read(path: &Bound<PyAny>, site: Option<&Bound<PyAny>>) -> PyResult<Record
         Ok(path) => vec![path],
         Err(_) => path.extract()?,
     };
+    if let Some(path) = paths.iter().find(|path| !path.exists()) {
+        return Err(refused(Error::new("no such file or folder").within(path.display())));
+    }
     let inputs = input::scenes(&paths).map_err(refused)?;
     let site = match site {
         Some(site) => Site::given(Some(site))?,

@@ -41,10 +41,10 @@ pub struct Scene {
 /// >>> scene = umbracast.simulate(people=3, seconds=1, sensors=False)
 /// >>> scene.people["x_m"].shape
 /// (30,)
-/// >>> scene.people_links["blocked"].any()
+/// >>> bool(scene.people_links["blocked"].any())
 /// False
 #[pyfunction]
-#[pyo3(signature = (site=None, *, preset="orca-03", people=10, seed=TEST_SEEDS, scene=0, sensors=true, seconds=None))]
+#[pyo3(signature = (site=None, *, preset="orca-03", people=10, seed=200000, scene=0, sensors=true, seconds=None))]
 pub fn simulate(
     py: Python,
     site: Option<&Bound<PyAny>>,

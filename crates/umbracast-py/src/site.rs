@@ -26,7 +26,7 @@ enum Source {
 /// ['side', 'centre']
 /// >>> umbracast.Site.from_toml("[sight]")
 /// Traceback (most recent call last):
-/// ValueError: site:1:2: unknown key `sight`; expected one of mode, site, detect, track, forecast, blockage
+/// ValueError: site:1:2: unknown key `sight` in the file; expected one of: blockage, detect, forecast, mode, site, track
 #[pyclass(frozen, module = "umbracast")]
 #[derive(Debug, Clone)]
 pub struct Site {

@@ -134,7 +134,7 @@ def test_own_tracks_cast_as_the_command_casts_them(both, command):
     with open(table, "w") as file:
         file.write("id,time_s,x,y,vx,vy\n")
         for row in zip(*(people[name] for name in ["person", "time_ns", "x_m", "y_m", "vx_mps", "vy_mps"])):
-            file.write(f"{row[0]},{row[1] * 1e-9!r},{','.join(repr(float(v)) for v in row[2:])}\n")
+            file.write(f"{row[0]},{float(row[1]) * 1e-9!r},{','.join(repr(float(v)) for v in row[2:])}\n")
     command("cast", table, "--site", folder / "site.toml", "--out", folder / "cast", "--csv")
     from_file = umbracast.cast(table, scene.site)
     names = {"person": "track", "time_ns": "time_ns", "x_m": "x_m", "y_m": "y_m", "vx_mps": "vx_mps", "vy_mps": "vy_mps"}
