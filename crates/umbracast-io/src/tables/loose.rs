@@ -255,8 +255,8 @@ mod tests {
             let table = Loose::read(&path)?;
             table.rows::<MatchRow>(&[], MatchRow::default(), |name| name == "scene")
         };
-        let message = told("frame,time_ns,person,track\n1,5,0,0\n\n2,6,-1,0\n").unwrap_err().to_string();
-        assert_eq!(message, "line 4, column person: expected a whole number from 0 to 4294967295, found -1");
+        let message = told("frame,time_ns,person,track\n1,5,0,0\n2,6,-1,0\n").unwrap_err().to_string();
+        assert_eq!(message, "line 3, column person: expected a whole number from 0 to 4294967295, found -1");
         let message = told("frame,time_ns,person\n1,5,0\n").unwrap_err().to_string();
         assert!(
             message.contains("column track: expected a whole number, found no such column but frame"),
