@@ -7,7 +7,7 @@ use crate::forecast::{Forecast, Forecaster, Weights};
 use crate::lidar::{Views, is_time};
 use crate::mounting::Mountings;
 use crate::radio::{Binder, Binding, Fader, Loss, Outages, Report};
-use crate::track::{Track, Tracker};
+use crate::track::{Track, Tracker, Windows};
 use crate::{Config, Error, Frame, Health};
 
 /// Everything the stages made of one frame.
@@ -98,6 +98,8 @@ pub struct Pipeline {
     views: Views,
     priors: Vec<Prior>,
     tracker: Tracker,
+    /// Of tracks from elsewhere.
+    windows: Windows,
     forecaster: Forecaster,
     caster: Caster,
     fader: Fader,
@@ -128,6 +130,7 @@ impl Pipeline {
             views: Views::default(),
             priors: Vec::new(),
             tracker: Tracker::new(&config.track, &config.site),
+            windows: Windows::default(),
             forecaster: Forecaster::new(&config.forecast, weights)?,
             caster: Caster::new(&config.blockage, &config.site),
             fader: Fader::new(&config.site),
@@ -193,7 +196,7 @@ impl Pipeline {
     pub fn step(&mut self, frame: &Frame) -> &Outcome {
         let o = &mut self.outcome;
         if !o.begin(frame) {
-            return o;
+            return &self.outcome;
         }
         let frame = &*frame.usable(&mut o.health);
         let frame = &*self.mountings.follow(frame, &mut o.health);
@@ -207,11 +210,81 @@ impl Pipeline {
         self.views.take(frame);
         self.tracker.update(&self.views, &o.detections, &mut o.tracks);
         self.forecaster.forecast(&o.tracks, &mut o.forecasts);
+        o.health.clocks_corrected = self.clocks.corrected();
+        self.links()
+    }
+
+    /// The tracks of another program through stages 2 and 3, for who follows people by other means: positions and velocities in
+    /// the site's frame ([`Track::new`]), in order of id. The observation windows are kept here. A person who is missing in a
+    /// frame is somebody new afterwards.
+    ///
+    /// ```
+    /// use umbracast::{Config, Pipeline, geometry::DVec2, track::Track};
+    ///
+    /// let mut pipeline = Pipeline::new(&Config::default(), None)?;
+    /// for k in 0..20 {
+    ///     let walks = Track::new(3, DVec2::new(0.12 * k as f64, 0.0), DVec2::new(1.2, 0.0));
+    ///     let outcome = pipeline.step_tracks(k, (k as i64 + 1) * umbracast::STEP_NS, &[walks]);
+    ///     assert_eq!((outcome.forecasts.len(), outcome.blockages.len()), (1, 2), "two access points");
+    /// }
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    pub fn step_tracks(&mut self, frame: u64, time_ns: i64, tracks: &[Track]) -> &Outcome {
+        if !self.take_tracks(frame, time_ns, tracks) {
+            return &self.outcome;
+        }
+        self.forecaster.forecast(&self.outcome.tracks, &mut self.outcome.forecasts);
+        self.links()
+    }
+
+    /// The same with forecasts of one's own: one for each track, in the same order.
+    ///
+    /// ```
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// use umbracast::{Config, Pipeline};
+    ///
+    /// let (tracks, mut pipeline) = (two_people(), Pipeline::new(&Config::default(), None)?);
+    /// let mut forecasts = forecasts_of(&tracks);
+    /// // The one in front is about to step aside.
+    /// forecasts[1].steps[8].mean_m.y += 3.0;
+    /// assert_eq!(pipeline.step_forecasts(0, 100_000_000, &tracks, &forecasts).forecasts, forecasts);
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    pub fn step_forecasts(
+        &mut self,
+        frame: u64,
+        time_ns: i64,
+        tracks: &[Track],
+        forecasts: &[Forecast],
+    ) -> &Outcome {
+        if !self.take_tracks(frame, time_ns, tracks) {
+            return &self.outcome;
+        }
+        self.outcome.forecasts.clear();
+        self.outcome.forecasts.extend_from_slice(forecasts);
+        self.links()
+    }
+
+    /// A frame that holds nothing but tracks. False where it does not lie after the last one.
+    fn take_tracks(&mut self, frame: u64, time_ns: i64, tracks: &[Track]) -> bool {
+        let frame = Frame { index: frame, time_ns, scans: Vec::new() };
+        let later = self.outcome.begin(&frame);
+        if later {
+            self.outcome.tracks.clear();
+            self.outcome.tracks.extend_from_slice(tracks);
+            self.windows.follow(time_ns, &mut self.outcome.tracks);
+        }
+        later
+    }
+
+    /// Stage 3 and what follows it, on the outcome's tracks and forecasts.
+    fn links(&mut self) -> &Outcome {
+        let o = &mut self.outcome;
         self.caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
         self.fader.fade(&self.caster, &mut o.losses);
         self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
         self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
-        o.health.clocks_corrected = self.clocks.corrected();
         o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());
         o
     }

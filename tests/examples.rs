@@ -12,6 +12,8 @@ mod track;
 mod forecast;
 #[path = "../examples/05_own_hall.rs"]
 mod own_hall;
+#[path = "../examples/06_own_tracks.rs"]
+mod own_tracks;
 
 #[test]
 fn packets_become_a_frame() {
@@ -36,4 +38,9 @@ fn tracks_become_warnings() {
 #[test]
 fn a_hall_of_ones_own_is_watched() {
     own_hall::main().unwrap();
+}
+
+#[test]
+fn tracks_of_another_program_become_warnings() {
+    own_tracks::main().unwrap();
 }

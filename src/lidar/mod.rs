@@ -26,6 +26,7 @@ pub use packet::Packet;
 pub use scan::Azimuths;
 pub use scan::{Cloud, Column, Frame, RangeImage, Scan, SensorPoint};
 pub use table::{sensor_model, sensor_models, udp_port};
-pub(crate) use usable::is_time;
+#[doc(hidden)] // For times that other programs give.
+pub use usable::is_time;
 pub(crate) use views::sector;
 pub use views::{Fan, SECTORS, View, Views};

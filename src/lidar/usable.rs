@@ -52,7 +52,7 @@ impl Frame {
 }
 
 /// Whether a time is one: below it sums of times cannot overflow.
-pub(crate) fn is_time(time_ns: i64) -> bool {
+pub fn is_time(time_ns: i64) -> bool {
     time_ns.unsigned_abs() < TIME_LIMIT_NS
 }
 

@@ -18,6 +18,7 @@ mod height;
 pub mod width;
 mod heading;
 mod followed;
+mod given;
 mod origin;
 mod person;
 mod mixture;
@@ -25,6 +26,7 @@ mod paper;
 
 pub use crate::gait::GaitPhase;
 pub use followed::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
+pub(crate) use given::Windows;
 #[doc(hidden)] // Tests turn its numbers; `Tracker` chooses by the config.
 pub use mixture::MixtureTracker;
 #[doc(hidden)] // What tests and ablations turn.

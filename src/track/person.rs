@@ -53,7 +53,7 @@ const LAP_SHARE: f64 = 0.85;
 const LAP_M: f64 = 0.65;
 const LAP_MPS: f64 = 0.5;
 /// Mean standing height of adults in shoes.
-const HEIGHT_MEAN_M: f64 = 1.72;
+pub(super) const HEIGHT_MEAN_M: f64 = 1.72;
 /// Time over which the width of a box is averaged.
 const BOX_AVERAGE_S: f64 = 1.0;
 /// The width of a box until one was seen.

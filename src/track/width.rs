@@ -13,7 +13,7 @@ use crate::detect::Detection;
 /// One standard deviation of the scale of adults, before one was seen: of trunks' widths over heights.
 pub const PRIOR_SIGMA: f64 = 0.058;
 /// Half depth and half width of a standing body's returns together, as a share of the height.
-const SHARE_STANDING: f64 = 0.226;
+pub(super) const STANDING_SHARE: f64 = 0.226;
 /// What each m/s adds: arms and legs swing.
 const SHARE_PER_MPS: f64 = 0.032;
 /// Added by a scale of 1.
@@ -53,7 +53,7 @@ impl BodyWidth {
     pub(super) fn see(&mut self, detection: &Detection, view: &BodyView, height_m: f64, speed_mps: f64) {
         if let Some(share) = share(detection, view, height_m, speed_mps) {
             self.frames += 1.0;
-            self.sum += share - SHARE_STANDING - SHARE_PER_MPS * speed_mps;
+            self.sum += share - STANDING_SHARE - SHARE_PER_MPS * speed_mps;
         }
     }
 
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn wide_returns_seen_long_enough_are_of_a_stout_person() {
-        let usual_m = 1.8 * (SHARE_STANDING + SHARE_PER_MPS);
+        let usual_m = 1.8 * (STANDING_SHARE + SHARE_PER_MPS);
         let ((few, few_sigma), (many, many_sigma)) =
             (seen(5, 1.1 * usual_m, FREE), seen(150, 1.1 * usual_m, FREE));
         assert!(few > 1.0 && few < 1.02 && few_sigma > 0.95 * PRIOR_SIGMA, "{few} {few_sigma}");

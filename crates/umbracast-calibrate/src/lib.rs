@@ -32,6 +32,34 @@ use floor::Level;
 use people::Follower;
 use still::Still;
 
+/// Without an empty scan, what lies still is looked for in every so many-th frame.
+const EVERY: u64 = 10;
+
+/// Both looks at a recording of people who walk: at what lies still, then at the people. `empty` are frames without people; without
+/// any, the recording is looked at twice. `frames` gives every frame of it from the first on to what it is handed.
+///
+/// # Errors
+/// A floor that is not level, what `frames` fails with, and a fit without a solution.
+pub fn of_recording(
+    site: &Site,
+    empty: &[lidar::Frame],
+    mut frames: impl FnMut(&mut dyn FnMut(&lidar::Frame)) -> Result<(), Error>,
+) -> Result<Calibration, Error> {
+    let mut survey = Survey::new(site)?;
+    empty.iter().for_each(|frame| survey.take(frame));
+    if empty.is_empty() {
+        frames(&mut |frame| {
+            if frame.index.is_multiple_of(EVERY) {
+                survey.take(frame);
+            }
+        })?;
+    }
+    let mut walkers = survey.level();
+    empty.iter().for_each(|frame| walkers.learn_empty(frame));
+    frames(&mut |frame| walkers.take(frame))?;
+    walkers.finish()
+}
+
 /// The first look: what lies still. Frames without people are best; among others every tenth will do.
 #[derive(Debug)]
 pub struct Survey {

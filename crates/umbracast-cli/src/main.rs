@@ -10,8 +10,6 @@ mod run_json;
 mod progress;
 mod crowds;
 mod flags;
-mod matches;
-mod input;
 mod page;
 mod outward;
 #[cfg(feature = "node")]
@@ -25,6 +23,7 @@ use clap::{CommandFactory, FromArgMatches};
 
 use args::{Cli, Command};
 use ending::Ending;
+use umbracast_io::input;
 
 /// Zenoh is 200 crates, which most users need not build.
 #[cfg(not(feature = "node"))]
@@ -46,6 +45,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo::run(&args, &cli.common),
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Run(args) => commands::run::run(&args, &cli.common),
+        Command::Cast(args) => commands::cast::run(&args, &cli.common),
         Command::Live(args) => commands::live::run(&args, &cli.common),
         #[cfg(feature = "node")]
         Command::Node(args) => commands::node::run(&args, &cli.common),

@@ -1,4 +1,5 @@
-//! Files, tables and messages: pcap, PCD, MCAP recordings, trajectories, motion captures, Parquet and CSV.
+//! Files, tables and messages: pcap, PCD, MCAP recordings, trajectories, motion captures, Parquet and CSV; and what a run reads
+//! before it starts: configuration, weights and input.
 
 mod lzf;
 mod seam;
@@ -17,5 +18,9 @@ pub mod viewers;
 pub mod results;
 pub mod objects;
 pub mod recording;
+pub mod setup;
+pub mod input;
+pub mod outcome_tables;
+pub mod own_tracks;
 pub mod trajectories;
 pub mod bvh;

@@ -10,6 +10,7 @@ use umbracast_sim::crowd::Preset;
 mod crowd;
 mod live;
 mod calibrate;
+mod cast;
 mod network;
 #[cfg(feature = "node")]
 mod node;
@@ -17,6 +18,7 @@ mod node;
 mod fleet;
 
 pub use calibrate::Calibrate;
+pub use cast::Cast;
 use crowd::one_or_more;
 pub use crowd::{BodyArgs, CrowdArgs, Replay};
 #[cfg(feature = "node")]
@@ -61,6 +63,8 @@ pub enum Command {
     Simulate(Simulate),
     /// Run the pipeline on recordings, PCD clouds or pcap captures; write tracks and links.
     Run(Run),
+    /// Turn tracks of another program into links: CSV or Parquet with number, time, position and velocity.
+    Cast(Cast),
     /// Receive sensors' packets, run all stages as frames close, serve a page with warnings, and record.
     Live(Live),
     /// Run one process of a hall whose stages run on several hosts, over Zenoh.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use umbracast::{Config, Error, Frame, Health, Mode};
-use umbracast_calibrate::{Calibration, Frame as Held, Survey, write_into};
+use umbracast::{Config, Error, Health, Mode};
+use umbracast_calibrate::{Calibration, Frame as Held, of_recording, write_into};
 
 use crate::args::{Calibrate, Common};
 use crate::ending::Ending;
@@ -13,10 +13,7 @@ use crate::setup;
 
 mod picture;
 
-/// Without an empty scan, what lies still is looked for in every so many-th frame.
-const EVERY: u64 = 10;
-
-/// Looks at the recording twice: at what lies still, then at the people.
+/// Finds the poses and writes them.
 pub fn run(args: &Calibrate, common: &Common) -> Result<Ending, Error> {
     let inputs = input::scenes(&args.recording)?;
     let mut config = setup::config(Mode::Default, args.site.site.as_deref())?;
@@ -66,24 +63,19 @@ fn found(
         lost.extend(told);
         empty = frames;
     }
-    let mut survey = Survey::new(&config.site)?;
-    empty.iter().for_each(|frame| survey.take(frame));
-    if empty.is_empty() {
-        recording.frames(&config.site, &mut Health::default(), |frame: &Frame| {
-            if frame.index.is_multiple_of(EVERY) {
-                survey.take(frame);
-            }
+    let before = *health;
+    // The recording may be read twice: what was skipped and lost counts once.
+    let mut told = None;
+    let found = of_recording(&config.site, &empty, |take| {
+        *health = before;
+        told = recording.frames(&config.site, health, |frame| {
+            take(frame);
             Ok(())
         })?;
-    }
-    let mut walkers = survey.level();
-    empty.iter().for_each(|frame| walkers.learn_empty(frame));
-    let told = recording.frames(&config.site, health, |frame| {
-        walkers.take(frame);
         Ok(())
     })?;
     lost.extend(told);
-    walkers.finish()
+    Ok(found)
 }
 
 /// A line a sensor, then what holds them all and what is least known.

@@ -1,6 +1,6 @@
 //! `evaluate`: a run against its truth, against labels, or scenes simulated and run in memory.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use umbracast::forecast::Weights;
@@ -9,12 +9,12 @@ use umbracast::site::AccessPoint;
 use umbracast::{Config, Error, Health, Mode};
 use umbracast_eval::report::{self, Context, Kept};
 use umbracast_eval::run::chain::{self, Spec};
-use umbracast_eval::run::pooled::{self, Scores, pool};
-use umbracast_eval::run::scene_score::{ModeRun, SceneScore, score_scene};
-use umbracast_eval::score::labels;
+use umbracast_eval::run::pooled::{self, Scores};
+use umbracast_eval::run::recorded::{by_scene, score_scenes};
 use umbracast_eval::score::matching::match_scene;
 use umbracast_eval::score::scene::{SceneRun, SceneTruth};
-use umbracast_io::rows::{LinkRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow};
+use umbracast_eval::score::{labels, matches};
+use umbracast_io::rows::{MatchRow, PeopleRow, TrackRow};
 use umbracast_io::tables;
 
 use crate::args::{Common, Evaluate};
@@ -22,7 +22,7 @@ use crate::ending::Ending;
 use crate::progress::bar;
 use crate::run_json::Frames;
 use crate::setup::{self, TEST_SEED};
-use crate::{crowds, matches, say};
+use crate::{crowds, say};
 
 /// Scores what the arguments name.
 pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
@@ -105,38 +105,12 @@ fn from_tables(dir: &Path, truth: &Path, args: &Evaluate, common: &Common) -> Re
     let config = config_of(dir, args)?;
     same_access_points(&config, truth)?;
     let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
-    let mut scenes: BTreeMap<u32, (SceneTruth, SceneRun)> = BTreeMap::new();
-    for row in tables::read::<PeopleRow>(truth, &names)? {
-        scenes.entry(row.scene).or_default().0.people.push(row);
-    }
-    for row in tables::read::<PeopleLinkRow>(truth, &names)? {
-        scenes.entry(row.scene).or_default().0.links.push(row);
-    }
-    for row in tables::read::<TrackRow>(dir, &names)? {
-        scenes.entry(row.scene).or_default().1.tracks.push(row);
-    }
-    for row in tables::read::<LinkRow>(dir, &names)? {
-        scenes.entry(row.scene).or_default().1.links.push(row);
-    }
-    if let Some((number, _)) = scenes.iter().find(|(_, (truth, _))| truth.people.is_empty()) {
-        return Err(Error::new(format!(
-            "expected the truth of every scene of {}, found none of scene {number}",
-            dir.display()
-        ))
-        .within(truth.display()));
-    }
+    let all = SceneTruth { people: tables::read(truth, &names)?, links: tables::read(truth, &names)? };
+    let scenes =
+        by_scene(all, SceneRun { tracks: tables::read(dir, &names)?, links: tables::read(dir, &names)? })
+            .map_err(|e| e.within(dir.display()).within(truth.display()))?;
     let weights = setup::weights(args.weights.as_deref())?;
-    // What the whole run skipped is told with its first scene.
-    let mut told = about_run(dir)?.health;
-    let scores = scenes
-        .iter()
-        .map(|(&number, (truth, run))| {
-            let health = std::mem::take(&mut told);
-            let run = ModeRun { config: &config, rows: run, health };
-            score_scene(number, "recorded", truth, &[run], Some(&weights), None)
-        })
-        .collect::<Result<Vec<SceneScore>, _>>()?;
-    let scores = pool(&scores.iter().collect::<Vec<_>>(), &names);
+    let scores = score_scenes(&config, &scenes, about_run(dir)?.health, &weights)?;
     let kept = scenes.first_key_value().map(|(number, (truth, run))| (format!("scene {number}"), truth, run));
     let kept = kept.as_ref().map(|(label, truth, run)| Kept {
         label,

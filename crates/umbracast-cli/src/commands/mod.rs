@@ -2,6 +2,7 @@
 
 pub mod ablate;
 pub mod calibrate;
+pub mod cast;
 pub mod compare;
 pub mod config;
 pub mod coverage;

@@ -10,10 +10,9 @@ use std::time::Duration;
 use umbracast::detect::doubled;
 use umbracast::forecast::Weights;
 use umbracast::site::Sensor;
-use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline, Site};
+use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline};
+use umbracast_io::outcome_tables::{OutcomeRows, OutcomeTables};
 use umbracast_io::recording::{RecordingWriter, Results};
-use umbracast_io::rows::{self, DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
-use umbracast_io::tables::TableWriter;
 use umbracast_live::latency::Latencies;
 
 use crate::args::{Common, Run};
@@ -33,11 +32,7 @@ const DOUBLED_SHARE_MAX: f64 = 0.02;
 struct Step {
     frame: u64,
     took: Duration,
-    detections: Vec<DetectionRow>,
-    tracks: Vec<TrackRow>,
-    links: Vec<LinkRow>,
-    losses: Vec<LossRow>,
-    decisions: Vec<DecisionRow>,
+    rows: OutcomeRows,
     doubled: usize,
 }
 
@@ -48,44 +43,6 @@ struct Method<'a> {
     empty: &'a [Frame],
     /// Where recordings of the results go, and whether with points.
     recordings: Option<(&'a Path, bool)>,
-}
-
-/// The tables of a run; those of the radio where the site has one.
-struct Tables {
-    detections: TableWriter<DetectionRow>,
-    tracks: TableWriter<TrackRow>,
-    links: TableWriter<LinkRow>,
-    losses: Option<TableWriter<LossRow>>,
-    decisions: Option<TableWriter<DecisionRow>>,
-}
-
-impl Tables {
-    fn create(folder: &Path, site: &Site, csv: bool) -> Result<Self, Error> {
-        let names: Vec<String> = site.access_points.iter().map(|ap| ap.name.clone()).collect();
-        Ok(Self {
-            detections: TableWriter::create(folder, &names, csv)?,
-            tracks: TableWriter::create(folder, &names, csv)?,
-            links: TableWriter::create(folder, &names, csv)?,
-            losses: site.has_radio().then(|| TableWriter::create(folder, &names, csv)).transpose()?,
-            decisions: site.has_decisions().then(|| TableWriter::create(folder, &names, csv)).transpose()?,
-        })
-    }
-
-    fn write(&mut self, step: &Step) -> Result<(), Error> {
-        self.detections.write(&step.detections)?;
-        self.tracks.write(&step.tracks)?;
-        self.links.write(&step.links)?;
-        self.losses.as_mut().map_or(Ok(()), |table| table.write(&step.losses))?;
-        self.decisions.as_mut().map_or(Ok(()), |table| table.write(&step.decisions))
-    }
-
-    fn finish(self) -> Result<(), Error> {
-        self.detections.finish()?;
-        self.tracks.finish()?;
-        self.links.finish()?;
-        self.losses.map_or(Ok(()), TableWriter::finish)?;
-        self.decisions.map_or(Ok(()), TableWriter::finish)
-    }
 }
 
 /// Every input is a scene with a pipeline of its own. Rows are written as they come, in the order of the scenes: nothing
@@ -110,7 +67,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let recordings = args.mcap.then_some((args.out.as_path(), args.points));
     let method = Method { config: &config, weights: &weights, empty: &empty, recordings };
     let watch = Stopwatch::start();
-    let mut tables = Tables::create(&args.out, &config.site, args.csv)?;
+    let mut tables = OutcomeTables::create(&args.out, &config.site, args.csv, true)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
     let (mut steps, mut frames) = (Latencies::default(), Vec::new());
     let (mut detected, mut doubled) = (0, 0);
@@ -127,9 +84,9 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
                 for step in coming {
                     steps.add(step.took);
                     numbers.push(step.frame);
-                    detected += step.detections.len();
+                    detected += step.rows.detections.len();
                     doubled += step.doubled;
-                    tables.write(&step)?;
+                    tables.write(&step.rows)?;
                 }
                 frames.push(numbers);
                 let (scene_health, told) = scene.join().unwrap_or_else(|panic| resume_unwind(panic))?;
@@ -233,13 +190,9 @@ fn run_scene(
         let watch = Stopwatch::start();
         let outcome = pipeline.step(frame);
         let took = watch.elapsed();
-        let (mut tracks, mut links) = (Vec::new(), Vec::new());
-        rows::of_outcome(scene, outcome, &mut tracks, &mut links);
-        let detections = rows::detections(scene, outcome).collect();
-        let (losses, decisions) =
-            (rows::losses(scene, outcome).collect(), rows::decisions(scene, outcome).collect());
+        let rows = OutcomeRows::of(scene, outcome);
         let doubled = doubled(&outcome.foreground, &outcome.clusters);
-        let step = Step { frame: frame.index, took, detections, tracks, links, losses, decisions, doubled };
+        let step = Step { frame: frame.index, took, rows, doubled };
         stage_health = outcome.health;
         if let Some(recording) = &mut recording {
             recording.write(&step, outcome)?;
@@ -292,11 +245,11 @@ impl<'a> Recording<'a> {
             frame: step.frame,
             time_ns,
             logged_ns: time_ns,
-            detections: &step.detections,
-            tracks: &step.tracks,
-            links: &step.links,
-            losses: &step.losses,
-            decisions: &step.decisions,
+            detections: &step.rows.detections,
+            tracks: &step.rows.tracks,
+            links: &step.rows.links,
+            losses: &step.rows.losses,
+            decisions: &step.rows.decisions,
             foreground: self.points.then_some(&outcome.foreground),
         })
     }

@@ -5,4 +5,5 @@ pub mod chain;
 pub mod scene_file;
 pub mod experiment;
 pub mod pooled;
+pub mod recorded;
 pub mod ablate;

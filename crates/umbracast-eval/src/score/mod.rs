@@ -10,6 +10,7 @@ pub mod bootstrap;
 pub mod instances;
 pub mod link_counts;
 pub mod matching;
+pub mod matches;
 pub mod device;
 pub mod identity;
 pub mod stage1;

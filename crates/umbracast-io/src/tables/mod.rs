@@ -9,6 +9,7 @@ mod values;
 mod pages;
 mod parquet_file;
 mod csv_file;
+mod loose;
 
 use std::path::{Path, PathBuf};
 
@@ -16,9 +17,10 @@ use umbracast::Error;
 
 pub use cells::{Cell, Name, Row};
 use csv_file::CsvFile;
+pub use loose::Loose;
 use parquet_file::ParquetFile;
 pub use parquet_file::TableSummary;
-pub use values::Values;
+pub use values::{Value, Values};
 
 /// Rows held back until they are written together.
 const ROW_GROUP: usize = 65_536;

@@ -20,7 +20,7 @@ use umbracast::decide::Action;
 
 use super::cells::{Cell, Row};
 use super::pages::column_reader;
-use super::values::Values;
+use super::values::{Value, Values};
 use crate::seam::guarded;
 
 /// An open Parquet file.
@@ -283,6 +283,14 @@ fn not_parquet(found: impl std::fmt::Display) -> Error {
     Error::new(format!("expected a whole Parquet file, found: {found}"))
 }
 
+/// How many rows a group has.
+fn believed(group: &RowGroupMetaData, file: &Arc<File>) -> Result<usize, Error> {
+    let told = group.num_rows();
+    let most = file.len().saturating_mul(ROWS_A_BYTE).min(ROWS_MAX);
+    let count = u64::try_from(told).ok().filter(|count| *count <= most);
+    Ok(count.ok_or_else(|| not_parquet(format!("{told} rows in a group")))? as usize)
+}
+
 /// One row group in place of `rows`.
 fn read_group<R: Row>(
     group: &RowGroupMetaData,
@@ -290,10 +298,7 @@ fn read_group<R: Row>(
     access_points: &[String],
     rows: &mut Vec<R>,
 ) -> Result<(), Error> {
-    let told = group.num_rows();
-    let most = file.len().saturating_mul(ROWS_A_BYTE).min(ROWS_MAX);
-    let count = u64::try_from(told).ok().filter(|count| *count <= most);
-    let count = count.ok_or_else(|| not_parquet(format!("{told} rows in a group")))? as usize;
+    let count = believed(group, file)?;
     let mut columns = Vec::new();
     let mut failed = None;
     R::default().visit(&mut |name, cell| {
@@ -319,46 +324,6 @@ fn read_group<R: Row>(
         });
     }
     Ok(())
-}
-
-/// One value read, on its way into a row.
-#[derive(Debug, Clone, Copy)]
-enum Value {
-    Whole(i64),
-    Real(f64),
-    Truth(bool),
-    Null,
-}
-
-impl std::fmt::Display for Value {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Whole(v) => write!(f, "{v}"),
-            Self::Real(v) => write!(f, "{v}"),
-            Self::Truth(v) => write!(f, "{v}"),
-            Self::Null => f.write_str("null"),
-        }
-    }
-}
-
-impl Value {
-    fn put(self, cell: Cell) {
-        match (cell, self) {
-            (Cell::U32(to) | Cell::AccessPoint(to), Self::Whole(v)) => *to = v as u32,
-            (Cell::U64(to), Self::Whole(v)) => *to = v.cast_unsigned(),
-            (Cell::I64(to), Self::Whole(v)) => *to = v,
-            (Cell::F64(to), Self::Real(v)) => *to = v,
-            (Cell::Bool(to), Self::Truth(v)) => *to = v,
-            (Cell::MaybeBool(to), Self::Truth(v)) => *to = Some(v),
-            (Cell::MaybeBool(to), _) => *to = None,
-            (Cell::MaybeF64(to), Self::Real(v)) => *to = Some(v),
-            (Cell::MaybeF64(to), _) => *to = None,
-            (Cell::MaybeAccessPoint(to), Self::Whole(v)) => *to = Some(v as u32),
-            (Cell::MaybeAccessPoint(to), _) => *to = None,
-            (Cell::Action(to), Self::Whole(v)) => *to = Action::ALL[v as usize],
-            _ => {}
-        }
-    }
 }
 
 fn read_column(
@@ -444,6 +409,43 @@ fn read_column(
         return Err(Error::new(format!("expected {count} values, found {}", values.len())));
     }
     Ok(values)
+}
+
+/// Every column that holds numbers, yes or no, or text: name and values, all row groups. Others are left out.
+pub fn read_loose(path: &Path) -> Result<Vec<(String, Vec<Value>)>, Error> {
+    let open = || File::open(path).map_err(|e| Error::new(format!("cannot be opened: {e}")));
+    let (file, pages) = (open()?, Arc::new(open()?));
+    let reader = guarded(|| SerializedFileReader::new(file)).map_err(not_parquet)?.map_err(not_parquet)?;
+    let mut table: Vec<(String, Vec<Value>)> = Vec::new();
+    for i in 0..reader.num_row_groups() {
+        let group = reader.metadata().row_group(i);
+        let count = believed(group, &pages)?;
+        for column in group.columns() {
+            let name = column.column_path().string();
+            refuse_codec(column.compression()).map_err(|e| e.within(format!("column {name}")))?;
+            let found = guarded(|| loose_values(column_reader(&pages, column, count)?, count));
+            let found = found.map_err(not_parquet)?.map_err(not_parquet)?;
+            let Some(mut found) = found else { continue };
+            match table.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, values)) => values.append(&mut found),
+                None => table.push((name, found)),
+            }
+        }
+    }
+    Ok(table)
+}
+
+fn loose_values(reader: ColumnReader, count: usize) -> Result<Option<Vec<Value>>, ParquetError> {
+    let text = |v: &ByteArray| Value::Text(String::from_utf8_lossy(v.data()).into_owned());
+    Ok(Some(match reader {
+        ColumnReader::Int32ColumnReader(r) => values(r, count, |&v: &i32| Value::Whole(v.into()))?,
+        ColumnReader::Int64ColumnReader(r) => values(r, count, |&v: &i64| Value::Whole(v))?,
+        ColumnReader::FloatColumnReader(r) => values(r, count, |&v: &f32| Value::Real(v.into()))?,
+        ColumnReader::DoubleColumnReader(r) => values(r, count, |&v: &f64| Value::Real(v))?,
+        ColumnReader::BoolColumnReader(r) => values(r, count, |&v: &bool| Value::Truth(v))?,
+        ColumnReader::ByteArrayColumnReader(r) => values(r, count, text)?,
+        _ => return Ok(None),
+    }))
 }
 
 /// Who writes a table with another program may not know how it is compressed; polars does it with zstd.

@@ -2,10 +2,10 @@
 
 use umbracast::lidar::{Cloud, Frame, Scan, sensor_model};
 use umbracast::{Error, Health, STEP_NS, Site};
-use umbracast_io::point_cloud::{self, PointCloud};
-use umbracast_io::recording::{Entry, RecordingReader};
 
 use super::sink::Sink;
+use crate::point_cloud::{self, PointCloud};
+use crate::recording::{Entry, RecordingReader};
 
 /// Whether a site's input is the clouds of one sensor.
 pub fn are_all_of(site: &Site) -> bool {

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use umbracast::lidar::{Assembler, Cloud, Frame, Packet, Scan};
 use umbracast::{Config, Error, Health, STEP_NS, Site};
-use umbracast_io::pcd::read_pcd;
-use umbracast_io::recording::{Entry, RecordingReader};
 
+use crate::pcd::read_pcd;
+use crate::recording::{Entry, RecordingReader};
 use crate::setup;
 
 mod sink;

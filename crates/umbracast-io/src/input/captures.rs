@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use umbracast::lidar::{Packet, udp_port};
 use umbracast::site::Sensor;
 use umbracast::{Error, Site};
-use umbracast_io::pcap::{Datagram, PcapReader};
 
 use super::sink::PacketSink;
+use crate::pcap::{Datagram, PcapReader};
 
 /// A capture of several sensors shows more than one of them within so many nanoseconds.
 const LOOK_NS: i64 = 2_000_000_000;

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use umbracast_eval::score::matching::match_scene;
 use umbracast_io::rows::{MatchRow, PeopleRow, TrackRow};
+
+use crate::score::matching::match_scene;
 
 /// The pairs of a scene, by frame and person.
 pub fn of_scene(scene: u32, people: &[PeopleRow], tracks: &[TrackRow]) -> Vec<MatchRow> {
