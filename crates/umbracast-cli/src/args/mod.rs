@@ -11,6 +11,7 @@ mod crowd;
 mod live;
 mod calibrate;
 mod network;
+mod plan;
 #[cfg(feature = "node")]
 mod node;
 #[cfg(feature = "node")]
@@ -23,6 +24,7 @@ pub use crowd::{BodyArgs, CrowdArgs, Replay};
 pub use fleet::Fleet;
 pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
 pub use network::Network;
+pub use plan::Plan;
 #[cfg(feature = "node")]
 pub use node::Node;
 
@@ -93,6 +95,8 @@ pub enum Command {
     Ablate(Ablate),
     /// Show how many returns a person gives at each place, and which places are blind.
     Coverage(Coverage),
+    /// Plan a hall on a page before anything hangs there: what is seen, which links are blocked, the best places.
+    Plan(Plan),
     /// Play a radio network in closed loop: what forecasts of blockage gain it, beside other policies and an oracle.
     Network(Network),
     /// Run the paper's whole experiment: 500 scenes, every mode, AABB and OBB. A stopped run resumes.

@@ -294,7 +294,7 @@ async fn page(State(shared): State<Arc<Shared>>, request: Request) -> impl IntoR
     let page = if shared.watched.planner.is_some() { pages::PLAN } else { pages::WATCH };
     let cookie = given(&request).map(|token| format!("{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"));
     let policy = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; \
-                  img-src data: blob:; frame-ancestors 'none'";
+                  img-src data:; frame-ancestors 'none'";
     let heads = [(header::CONTENT_SECURITY_POLICY, policy), (header::CACHE_CONTROL, "no-store")];
     (heads, cookie.map(|cookie| [(header::SET_COOKIE, cookie)]).map(AppendHeaders), Html(page))
 }

@@ -39,8 +39,8 @@ function drawBoard(frame) {
     say(own.soon, state === "blocked" ? "now" : onset_s == null ? "" : Math.round(1000 * onset_s) + " ms");
     say(own.by, cause);
     own.by.title = causes(link, state === "blocked" ? 0 : 9).filter(([, p]) => p != null).map(([name, p]) => `${name} ${Math.round(100 * p)} %`).join(", ");
-    const truth = truthOf(frame, link);
-    say(own.more, [loss ? dB(loss).text : "", decision ? adviceOf(decision) : "", truth].filter(Boolean).join(" \u00b7 "));
+    const truth = truthOf(frame, link), other = besideOf(frame, link);
+    say(own.more, [loss ? dB(loss).text : "", decision ? adviceOf(decision) : "", other, truth].filter(Boolean).join(" \u00b7 "));
     own.more.title = loss ? dB(loss).title : "";
     strip(own.strip, kept, frame.time_ns);
   });
@@ -51,6 +51,14 @@ function drawBoard(frame) {
     : picked == null ? "Pick a person in the picture or a row." : `Person ${picked} is not in sight.`);
   if (frame && frame.judged) { const { true: hit, false: wrong, missed } = frame.judged;
     say($("judged"), `last minute: ${hit} came true, ${wrong} false, ${missed} missed`); }
+}
+// What the mode beside says of the link: of the person who is nearest to the track.
+function besideOf(frame, link) {
+  if (!beside || frame !== shown) return "";
+  const track = frame.tracks.find(t => t.track === link.track);
+  const near = track && beside.tracks.filter(t => t.confirmed).map(t => [Math.hypot(t.x_m - track.x_m, t.y_m - track.y_m), t]).sort((a, b) => a[0] - b[0])[0];
+  const look = near && near[0] < .5 && beside.looks.get(key({ access_point: link.access_point, track: near[1].track }));
+  return `${beside.mode}: ${look ? look.state + (look.cause ? " by " + look.cause : "") : "nobody there"}`;
 }
 // What the truth says of a link now: of the person who is nearest to the track.
 function truthOf(frame, link) {

@@ -26,11 +26,12 @@ const causeOf = (link, state) => {
 
 // The last minute of every link. Frames come in order; another order begins anew.
 class Links {
-  constructor() { this.of = new Map(); this.events = []; this.time_ns = -Infinity; this.begun_ns = null; }
+  constructor() { this.of = new Map(); this.events = []; this.begin(); }
+  begin() { this.of.clear(); this.events.length = 0; this.time_ns = -Infinity; }
   // What is shown of each link of a frame: kept with the frame.
   take(frame) {
     const now = frame.time_ns;
-    if (now < this.time_ns || now - this.time_ns > 5e9) { this.of.clear(); this.events.length = 0; this.begun_ns = now; }
+    if (now < this.time_ns || now - this.time_ns > 5e9) this.begin();
     this.time_ns = now;
     const aps = new Map(site.access_points.map(ap => [ap.name, ap])), tracks = new Map(frame.tracks.map(t => [t.track, t]));
     const losses = new Map((frame.losses || []).map(l => [key(l), l])), advice = new Map((frame.decisions || []).map(d => [d.track, d]));

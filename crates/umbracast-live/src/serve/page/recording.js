@@ -1,10 +1,11 @@
 // ---------------------------------------------------------------- a recording: any place, any speed
 const CHUNK = 20;                    // frames that are asked for at once
 const CHUNKS_KEPT = 30;
+const BEFORE = 5;                    // chunks before a jump that histories are made of
 let recording = null;
 async function openRecording() {
   const about = await (await fetch("/api/recording")).json();
-  recording = { about, at: 0, chunks: new Map(), asked: new Set(), taken: -1, near: () => [] };
+  recording = { about, at: 0, chunks: new Map(), asked: new Set(), taken: -1, before: false, near: () => [] };
   $("speed").value = [...$("speed").options].map(o => +o.value).reduce((a, b) => Math.abs(b - about.rate) < Math.abs(a - about.rate) ? b : a);
   document.body.classList.add("recorded");
   document.body.classList.toggle("has-truth", about.truth);
@@ -24,7 +25,7 @@ async function load(number) {
 }
 function seek(k) {
   recording.at = Math.min(Math.max(k, 0), Math.max(recording.about.frames - 1, 0));
-  recording.taken = Math.floor(recording.at) - 1;   // histories begin here
+  recording.before = true;
   boarded = 0; wake();
 }
 function play(passed_s) {
@@ -41,7 +42,10 @@ function play(passed_s) {
   }
   const now = Math.floor(r.at);
   if (!there(now)) return;
-  // Histories take every frame on the way, in order.
+  // Histories take every frame on the way, in order; after a jump those of the seconds before it, once they are there.
+  const first = Math.max(0, chunk - BEFORE);
+  if (r.before) for (let k = first; k < chunk; k++) load(k);
+  if (r.before && Array.from({ length: chunk - first }, (_, i) => there((first + i) * CHUNK)).every(Boolean)) { r.before = false; r.taken = first * CHUNK - 1; links.forEach(l => l.begin()); }
   if (now < r.taken || now - r.taken > 200) r.taken = now - 1;
   for (let k = r.taken + 1; k <= now; k++) { const e = entry(k); if (e) e.frames.forEach((frame, i) => { frame.truth = e.truth; frame.mode = r.about.modes[i]; links[i].take(frame); }); }
   r.taken = now;

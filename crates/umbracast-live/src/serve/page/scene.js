@@ -132,7 +132,7 @@ class Scene {
       c.fillText(length + " m", left + 12 * scale, height - 18 * scale);
     }
     if (this.rects.length > 1 && frame) { c.textAlign = "center"; c.fillStyle = css("ink"); c.fillText(frame.mode || "", left + width / 2, 18 * scale);
-      c.fillRect(left, 0, scale, height); }
+      if (left) c.fillRect(left, 0, scale, height); }
     if (this.extra && this.extra.letters) this.extra.letters(c, camera, scale);
     c.restore();
   }

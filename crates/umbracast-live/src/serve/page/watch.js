@@ -109,7 +109,7 @@ let pictures = 0, counted = 0;
 function draw(now) {
   requestAnimationFrame(draw);
   if (!site || now - pictured < PICTURE_MS) return;
-  const passed_s = Math.min(.25, (now - pictured) / 1000);
+  const passed_s = Math.min(1, (now - pictured) / 1000);
   pictured = now;
   if (recording) play(passed_s);
   tell();
