@@ -85,7 +85,9 @@ fn people_move_links_turn_and_the_last_minute_can_be_gone_back_through() {
     page.until("$('person').textContent.includes('m/s')");
 
     // Whoever asks gets the whole scan, in a bounded number of points; every camera draws.
-    page.value("$('scan').value = 'whole'; $('scan').dispatchEvent(new Event('change')); way('corner'); true");
+    page.value(
+        "$('scan').value = 'whole'; $('scan').dispatchEvent(new Event('change')); way('corner'); true",
+    );
     page.until("+document.body.dataset.scanned > 10000 && +document.body.dataset.scanned <= 30000");
     page.screenshot("scan.png");
     for key in ["4", "5", "v", "2", "1"] {
@@ -105,7 +107,9 @@ fn people_move_links_turn_and_the_last_minute_can_be_gone_back_through() {
     page.until("document.querySelectorAll('#told li.kind-true').length > 0 && document.querySelectorAll('#sensors li').length === 2");
 
     // All of the window is used, and on a telephone nothing stands beyond the edge.
-    page.until("$('view').getBoundingClientRect().bottom > 880 && $('sensors').getBoundingClientRect().bottom > 880");
+    page.until(
+        "$('view').getBoundingClientRect().bottom > 880 && $('sensors').getBoundingClientRect().bottom > 880",
+    );
     page.size(390, 844);
     page.until("document.documentElement.scrollWidth <= 390 && $('overlay').clientWidth > 300");
     page.until("[...document.querySelectorAll('.link:not([hidden])')].every(row => row.getBoundingClientRect().right <= 390)");

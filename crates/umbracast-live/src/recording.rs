@@ -55,8 +55,9 @@ impl Recording {
     /// # Errors
     /// A folder for temporary files that cannot be written to.
     pub fn new(modes: Vec<String>, rate: f64, again: bool, truth: bool) -> Result<Self, Error> {
-        let file = tempfile::tempfile()
-            .map_err(|e| Error::new(e.to_string()).within("a temporary file for the frames of the recording"))?;
+        let file = tempfile::tempfile().map_err(|e| {
+            Error::new(e.to_string()).within("a temporary file for the frames of the recording")
+        })?;
         let kept = Kept { file, frames: Vec::new(), scans: Vec::new(), length: 0, done: false, told: None };
         Ok(Self { modes, rate, again, truth, kept: Mutex::new(kept) })
     }
@@ -163,7 +164,9 @@ impl Kept {
         let read = (&mut self.file).take(piece.bytes).read_to_end(into).map_err(failed)?;
         match read as u64 == piece.bytes {
             true => Ok(()),
-            false => Err(Error::new("expected all of what was written, found less").within("the temporary file")),
+            false => {
+                Err(Error::new("expected all of what was written, found less").within("the temporary file"))
+            }
         }
     }
 }
@@ -187,7 +190,10 @@ mod tests {
             let frames: Value = serde_json::from_slice(&recording.frames(from, count).unwrap()).unwrap();
             frames.as_array().unwrap().len()
         };
-        assert_eq!([count(0, u64::MAX), count(99, 5), count(100, 5), count(u64::MAX, u64::MAX)], [64, 1, 0, 0]);
+        assert_eq!(
+            [count(0, u64::MAX), count(99, 5), count(100, 5), count(u64::MAX, u64::MAX)],
+            [64, 1, 0, 0]
+        );
         assert_eq!(recording.scan(14).unwrap(), Some(vec![10; 3]));
         assert_eq!([recording.scan(100).unwrap(), recording.scan(u64::MAX).unwrap()], [None, None]);
         assert_eq!((&recording.about()["frames"], &recording.about()["done"]), (&json!(100), &json!(true)));

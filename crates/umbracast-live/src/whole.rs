@@ -110,7 +110,8 @@ mod tests {
     use super::*;
 
     fn frame(points: usize) -> Frame {
-        let point = |i| SensorPoint { position_m: [i as f32 * 0.001, -2.5, 1.0], time_ns: 0, reflectivity: 300.0 };
+        let point =
+            |i| SensorPoint { position_m: [i as f32 * 0.001, -2.5, 1.0], time_ns: 0, reflectivity: 300.0 };
         let cloud = Cloud::Unorganised((0..points).map(point).collect());
         let scans = vec![Scan { sensor: 1, site_from_sensor: Pose::IDENTITY, cloud }];
         Frame { index: 7, time_ns: 800_000_000, scans }

@@ -57,7 +57,8 @@ pub fn best<T: Placed>(site: &Site, wanted: Wanted, people: f64, height_m: f64) 
     let search = Search::new(site, wanted.beside, people, height_m)?;
     let like = search.like::<T>()?;
     let candidates = like.candidates(site);
-    let values = candidates.par_iter().map(|candidate| search.value(candidate)).collect::<Result<Vec<_>, Error>>()?;
+    let values =
+        candidates.par_iter().map(|candidate| search.value(candidate)).collect::<Result<Vec<_>, Error>>()?;
     let choice = choose(&values, &search.unserved::<T>()?, wanted.count, EXACT_MOST);
     let mut placed: Vec<T> = choice.picked.iter().map(|&c| candidates[c].clone()).collect();
     let reached = search.moved(&mut placed)?;
@@ -89,7 +90,9 @@ pub fn versus_random<T: Placed>(
     let (like, unserved) = (search.like::<T>()?, search.unserved::<T>()?);
     let value = |number: usize| {
         let mut draws = Pcg64::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(number as u64));
-        let values = (0..count).map(|_| search.value(&like.random(site, &mut draws))).collect::<Result<Vec<_>, _>>()?;
+        let values = (0..count)
+            .map(|_| search.value(&like.random(site, &mut draws)))
+            .collect::<Result<Vec<_>, _>>()?;
         Ok(value_of(&values, &unserved, &(0..count).collect::<Vec<_>>()))
     };
     let values = (0..placements).into_par_iter().map(value).collect::<Result<Vec<f64>, Error>>()?;
@@ -193,7 +196,8 @@ impl<'a> Search<'a> {
     }
 
     fn like<T: Placed>(&self) -> Result<T, Error> {
-        let none = || Error::new(format!("expected one {} in the site to place more like it, found none", T::STEM));
+        let none =
+            || Error::new(format!("expected one {} in the site to place more like it, found none", T::STEM));
         T::of(self.site).first().cloned().ok_or_else(none)
     }
 
@@ -217,7 +221,8 @@ impl<'a> Search<'a> {
         let mut reached = value_of(&values, &unserved, &all);
         for by in NEARER {
             for i in 0..placed.len() {
-                let near: Vec<T> = (0..T::WAYS).filter_map(|way| placed[i].near(self.site, way, by)).collect();
+                let near: Vec<T> =
+                    (0..T::WAYS).filter_map(|way| placed[i].near(self.site, way, by)).collect();
                 let tried = near.par_iter().map(|one| self.value(one)).collect::<Result<Vec<_>, Error>>()?;
                 for (one, value) in near.into_iter().zip(tried) {
                     let before = std::mem::replace(&mut values[i], value);

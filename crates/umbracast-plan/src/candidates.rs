@@ -103,9 +103,12 @@ impl Hangs for AccessPoint {
         let [least_m, most_m] = site.hall.bounds_m();
         let apart_m = ((most_m - least_m).max_element() / BELOW_CEILING).max(1.0);
         let counts = ((most_m - least_m) / apart_m).floor().max(DVec2::ONE);
-        let ceiling = (0..counts.y as usize).flat_map(|j| (0..counts.x as usize).map(move |i| DVec2::new(i as f64, j as f64)));
+        let ceiling = (0..counts.y as usize)
+            .flat_map(|j| (0..counts.x as usize).map(move |i| DVec2::new(i as f64, j as f64)));
         let ceiling = ceiling.map(|cell| least_m + (cell + 0.5) / counts * (most_m - least_m));
-        let below = ceiling.filter(|&place_m| site.hall.contains(place_m)).map(|place_m| self.below_ceiling(site, place_m));
+        let below = ceiling
+            .filter(|&place_m| site.hall.contains(place_m))
+            .map(|place_m| self.below_ceiling(site, place_m));
         let walls = at_walls(site).into_iter().map(|at| self.on_wall(at.place_m));
         walls.chain(below).collect()
     }
@@ -131,7 +134,8 @@ impl Hangs for AccessPoint {
         let is_below = z >= site.hall.height_m - BELOW_CEILING_M - 1e-9;
         let clear_m = site.hall.clearance_m(place_m);
         let stays = is_below || (clear_m - BEFORE_WALL_M).abs() < 1e-6;
-        (site.hall.contains(place_m) && stays).then(|| Self { position_m: [rounded(place_m.x), rounded(place_m.y), z], ..self.clone() })
+        (site.hall.contains(place_m) && stays)
+            .then(|| Self { position_m: [rounded(place_m.x), rounded(place_m.y), z], ..self.clone() })
     }
 }
 
@@ -143,7 +147,10 @@ trait OnWallOrCeiling {
 
 impl OnWallOrCeiling for AccessPoint {
     fn on_wall(&self, place_m: DVec2) -> AccessPoint {
-        AccessPoint { position_m: [rounded(place_m.x), rounded(place_m.y), self.position_m[2]], ..self.clone() }
+        AccessPoint {
+            position_m: [rounded(place_m.x), rounded(place_m.y), self.position_m[2]],
+            ..self.clone()
+        }
     }
 
     fn below_ceiling(&self, site: &Site, place_m: DVec2) -> AccessPoint {

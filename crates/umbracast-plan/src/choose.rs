@@ -171,7 +171,9 @@ mod tests {
         let mut draws = Pcg64::seed_from_u64(seed);
         let mut one = || {
             let middle: f32 = draws.random();
-            (0..places).map(|p| (1.2 - 4.0 * (p as f32 / places as f32 - middle).abs()).clamp(0.0, 1.0)).collect()
+            (0..places)
+                .map(|p| (1.2 - 4.0 * (p as f32 / places as f32 - middle).abs()).clamp(0.0, 1.0))
+                .collect()
         };
         (0..candidates).map(|_| one()).collect()
     }

@@ -42,7 +42,10 @@ impl Floor {
         let mut floor = Self { from_m, step_m, columns, rows, open: Vec::new() };
         floor.open = (0..columns * rows).map(|cell| is_floor(site, floor.place_m(cell))).collect();
         if !floor.open.contains(&true) {
-            let found = format!("site.hall: expected a floor for a person to stand on, found {} x {} m", size_m.x, size_m.y);
+            let found = format!(
+                "site.hall: expected a floor for a person to stand on, found {} x {} m",
+                size_m.x, size_m.y
+            );
             return Err(Error::new(found));
         }
         Ok(floor)

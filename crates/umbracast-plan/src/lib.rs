@@ -19,7 +19,7 @@ mod best;
 mod site_file;
 mod questions;
 
-pub use best::{Best, Wanted, best, versus_random};
+pub use best::{Best, Placed, Wanted, best, versus_random};
 pub use choose::{Choice, EXACT_MOST, choose};
 pub use crowd::Crowd;
 pub use floor::Floor;

@@ -57,7 +57,9 @@ pub fn map(site: &Site, people: f64, height_m: f64, step_m: Option<f64>) -> Resu
     let cells = 0..floor.open.len();
     let sum = |cell: usize| of_sensors.iter().map(|(returns, _)| returns[cell]).sum::<f32>();
     let returns = cells.clone().map(|cell| if floor.open[cell] { sum(cell) } else { -1.0 }).collect();
-    let seeing = |cell: usize| of_sensors.iter().filter(|(returns, _)| f64::from(returns[cell]) >= SEEN_RETURNS).count();
+    let seeing = |cell: usize| {
+        of_sensors.iter().filter(|(returns, _)| f64::from(returns[cell]) >= SEEN_RETURNS).count()
+    };
     let sensors_seeing: Vec<u8> = cells.clone().map(|cell| seeing(cell).min(255) as u8).collect();
     let unseen = |cell: usize| of_sensors.iter().map(|(_, sees)| 1.0 - sees[cell]).product::<f32>();
     let seen: Vec<f32> = cells.clone().map(|cell| 1.0 - unseen(cell)).collect();
@@ -70,7 +72,17 @@ pub fn map(site: &Site, people: f64, height_m: f64, step_m: Option<f64>) -> Resu
     ];
     let blocked_means = blocked.iter().map(|blocked| floor.mean(|cell| f64::from(blocked[cell]))).collect();
     let density_per_m2 = crowd.density_per_m2;
-    Ok(Map { floor, density_per_m2, returns, sensors_seeing, seen, blocked, all_blocked, means, blocked_means })
+    Ok(Map {
+        floor,
+        density_per_m2,
+        returns,
+        sensors_seeing,
+        seen,
+        blocked,
+        all_blocked,
+        means,
+        blocked_means,
+    })
 }
 
 /// Share of time in which this sensor sees a person in each cell.

@@ -96,16 +96,19 @@ fn checked(question: &Question) -> Result<Site, Error> {
     bounded("sensors", *sensors as f64, 0.0, PLACED_MOST as f64)?;
     bounded("access_points", *access_points as f64, 0.0, PLACED_MOST as f64)?;
     step_m.map_or(Ok(()), |step_m| bounded("step_m", step_m, 0.1, 100.0))?;
-    let site: Site = serde_json::from_value(question.site.clone()).map_err(|e| Error::new(e.to_string()).within("site"))?;
+    let site: Site = serde_json::from_value(question.site.clone())
+        .map_err(|e| Error::new(e.to_string()).within("site"))?;
     let things = [site.sensors.len(), site.access_points.len()];
-    let corners = site.hall.walls().count() + site.pillars.len() + site.furniture.len() + site.hall.floors.len();
+    let corners =
+        site.hall.walls().count() + site.pillars.len() + site.furniture.len() + site.hall.floors.len();
     bounded("site: sensors, and access points", things[0].max(things[1]) as f64, 0.0, THINGS_MOST as f64)?;
     bounded("site: corners, pillars and furniture", corners as f64, 0.0, CORNERS_MOST as f64)?;
     #[derive(serde::Serialize)]
     struct Overlay<'a> {
         site: &'a Site,
     }
-    let text = toml::to_string(&Overlay { site: &site }).map_err(|e| Error::new(e.to_string()).within("site"))?;
+    let text =
+        toml::to_string(&Overlay { site: &site }).map_err(|e| Error::new(e.to_string()).within("site"))?;
     Ok(Config::with_overlay(Mode::Default, &text, "plan")?.site)
 }
 
@@ -130,7 +133,8 @@ mod tests {
 
     fn ask(name: &str, question: &Value) -> Result<Value, String> {
         let plan = Plan { file: None, text: Mutex::default() };
-        let answer = answer(&plan, name, question.to_string().as_bytes()).map_err(|error| error.to_string())?;
+        let answer =
+            answer(&plan, name, question.to_string().as_bytes()).map_err(|error| error.to_string())?;
         Ok(serde_json::from_str(&answer).unwrap())
     }
 

@@ -12,7 +12,7 @@ use umbracast::{Error, Site};
 use crate::floor::Floor;
 
 /// Half of a body's mean width, metres.
-const RADIUS_M: f64 = 0.19;
+const RADIUS_M: f64 = 0.165;
 /// Share of a body's height above which the head is narrower than the body.
 const HEAD: f64 = 0.96;
 /// More rays than that are thinned, and each counts for several.
@@ -25,19 +25,28 @@ const MEETINGS_MOST: usize = 20_000_000;
 ///
 /// # Errors
 /// A sensor whose beams nobody knows.
-pub fn returns(site: &Site, sensor: &Sensor, floor: &Floor, height_m: f64, rays: Option<usize>) -> Result<Vec<f32>, Error> {
-    let model = Model::of_sensor(sensor).map_err(|error| error.within(format!("sensor {:?}", sensor.name)))?;
+pub fn returns(
+    site: &Site,
+    sensor: &Sensor,
+    floor: &Floor,
+    height_m: f64,
+    rays: Option<usize>,
+) -> Result<Vec<f32>, Error> {
+    let model =
+        Model::of_sensor(sensor).map_err(|error| error.within(format!("sensor {:?}", sensor.name)))?;
     let columns = match model.turn {
         Some(turn) => turn.columns as usize,
         None => (1e9 / sensor.rate_hz / model.column_period_ns).round().max(1.0) as usize,
     };
     let things = site.hall.walls().count() + site.pillars.len() + site.furniture.len();
-    let most = rays.unwrap_or(RAYS_MOST).min(RAYS_MOST).min(MEETINGS_MOST / things.max(1)).max(model.beams.len());
+    let most =
+        rays.unwrap_or(RAYS_MOST).min(RAYS_MOST).min(MEETINGS_MOST / things.max(1)).max(model.beams.len());
     let every = (columns * model.beams.len()).div_ceil(most);
     let taken = columns.div_ceil(every);
     let (pose, kept) = (sensor.site_from_sensor(), 1.0 - site.simulation.dropout);
     let weight = kept * columns as f64 / taken as f64;
-    let mut walk = Walk { site, floor, height_m, levels_m: levels_m(site), returns: vec![0.0; floor.open.len()] };
+    let mut walk =
+        Walk { site, floor, height_m, levels_m: levels_m(site), returns: vec![0.0; floor.open.len()] };
     for column in 0..taken {
         let azimuth = (column as f64 / taken as f64 * std::f64::consts::TAU).sin_cos();
         for beam in model.beams.iter() {
@@ -50,9 +59,10 @@ pub fn returns(site: &Site, sensor: &Sensor, floor: &Floor, height_m: f64, rays:
 
 /// The lowest and the highest floor, metres.
 fn levels_m(site: &Site) -> [f64; 2] {
-    let corners = site.hall.floors.iter().flat_map(|floor| {
-        floor.outline_m.iter().map(|&corner| floor.height_at_m(DVec2::from_array(corner)))
-    });
+    let corners =
+        site.hall.floors.iter().flat_map(|floor| {
+            floor.outline_m.iter().map(|&corner| floor.height_at_m(DVec2::from_array(corner)))
+        });
     corners.fold([0.0, 0.0], |[low, high], m| [low.min(m), high.max(m)])
 }
 
@@ -88,14 +98,19 @@ impl Walk<'_> {
         // Along the axis that it runs along more, one line of cells after the other.
         let along_x = flat.x.abs() >= flat.y.abs();
         let [ahead, aside] = if along_x { [flat.x, flat.y] } else { [flat.y, flat.x] };
-        let [from_ahead, from_aside] = if along_x { [origin_m.x, origin_m.y] } else { [origin_m.y, origin_m.x] };
+        let [from_ahead, from_aside] =
+            if along_x { [origin_m.x, origin_m.y] } else { [origin_m.y, origin_m.x] };
         let [cell_ahead, cell_aside] =
             if along_x { self.floor.from_m } else { [self.floor.from_m[1], self.floor.from_m[0]] };
-        let (lines, across) =
-            if along_x { (self.floor.columns, self.floor.rows) } else { (self.floor.rows, self.floor.columns) };
+        let (lines, across) = if along_x {
+            (self.floor.columns, self.floor.rows)
+        } else {
+            (self.floor.rows, self.floor.columns)
+        };
         let line_of = |t: f64| (from_ahead + t * ahead - cell_ahead) / self.floor.step_m;
         let reach = (RADIUS_M / self.floor.step_m).max(0.0) + 1.0;
-        let [first, last] = if ahead > 0.0 { [line_of(near), line_of(far)] } else { [line_of(far), line_of(near)] };
+        let [first, last] =
+            if ahead > 0.0 { [line_of(near), line_of(far)] } else { [line_of(far), line_of(near)] };
         let [first, last] = [(first - reach).ceil().max(0.0), (last + reach).floor().min(lines as f64 - 1.0)];
         if first.is_nan() || last.is_nan() || first > last {
             return;
@@ -104,19 +119,33 @@ impl Walk<'_> {
         for line in first as usize..=last as usize {
             let t = (cell_ahead + line as f64 * self.floor.step_m - from_ahead) / ahead;
             let middle = (from_aside + t * aside - cell_aside) / self.floor.step_m;
-            let [low, high] = [(middle - half).ceil().max(0.0), (middle + half).floor().min(across as f64 - 1.0)];
+            let [low, high] =
+                [(middle - half).ceil().max(0.0), (middle + half).floor().min(across as f64 - 1.0)];
             if low.is_nan() || high.is_nan() || low > high {
                 continue;
             }
             for beside in low as usize..=high as usize {
-                let cell = if along_x { beside * self.floor.columns + line } else { line * self.floor.columns + beside };
+                let cell = if along_x {
+                    beside * self.floor.columns + line
+                } else {
+                    line * self.floor.columns + beside
+                };
                 self.meet(cell, origin_m, way, flat / pace, pace, [near, far], weight);
             }
         }
     }
 
     /// One cell: the ray meets the front of the body there.
-    fn meet(&mut self, cell: usize, origin_m: DVec3, way: DVec3, flat: DVec2, pace: f64, [near, far]: [f64; 2], weight: f32) {
+    fn meet(
+        &mut self,
+        cell: usize,
+        origin_m: DVec3,
+        way: DVec3,
+        flat: DVec2,
+        pace: f64,
+        [near, far]: [f64; 2],
+        weight: f32,
+    ) {
         if !self.floor.open[cell] {
             return;
         }
@@ -167,7 +196,11 @@ pub(crate) fn hits_at(site: &Site, origin_m: DVec3, way: DVec3, most: f64) -> f6
         let own_way = turn.rotate(flat);
         let base_m = site.hall.floor_m(DVec2::from_array(piece.position_m));
         let [l, w, h] = piece.size_m;
-        let slabs = [(own.x, own_way.x, -0.5 * l, 0.5 * l), (own.y, own_way.y, -0.5 * w, 0.5 * w), (origin_m.z, way.z, base_m, base_m + h)];
+        let slabs = [
+            (own.x, own_way.x, -0.5 * l, 0.5 * l),
+            (own.y, own_way.y, -0.5 * w, 0.5 * w),
+            (origin_m.z, way.z, base_m, base_m + h),
+        ];
         let (mut enters, mut leaves) = (0.0_f64, far);
         for (p, v, low, high) in slabs {
             let (a, b) = ((low - p) / v, (high - p) / v);

@@ -1,7 +1,7 @@
 //! Writes a plan into a site file: what did not change stays as it stands, with its comments.
 
-use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, TableLike, Value, value};
 use serde::Serialize;
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, TableLike, Value, value};
 use umbracast::site::{AccessPoint, Furniture, Pillar, Sensor};
 use umbracast::{Config, Error, Mode, Site};
 
@@ -25,11 +25,21 @@ pub fn write_into(text: &str, site: &Site, file: &str) -> Result<String, Error> 
     let name = |sensor: &Sensor| sensor.name.clone();
     list(place, "sensors", &before.sensors, &site.sensors, |sensor: &Sensor| pairs(sensor), Some(&name))?;
     let name = |ap: &AccessPoint| ap.name.clone();
-    list(place, "access_points", &before.access_points, &site.access_points, |ap: &AccessPoint| pairs(ap), Some(&name))?;
+    list(
+        place,
+        "access_points",
+        &before.access_points,
+        &site.access_points,
+        |ap: &AccessPoint| pairs(ap),
+        Some(&name),
+    )?;
     let written = document.to_string();
     match Config::with_overlay(Mode::Default, &written, file)?.site == *site {
         true => Ok(written),
-        false => Err(Error::new("expected a plan that a site file can say, found one that reads back as another").within(file)),
+        false => {
+            Err(Error::new("expected a plan that a site file can say, found one that reads back as another")
+                .within(file))
+        }
     }
 }
 
@@ -46,15 +56,18 @@ fn hall(place: &mut dyn TableLike, before: &Site, site: &Site) -> Result<(), Err
     }
     let hall = place.entry("hall").or_insert(Item::Table(Table::new()));
     let hall = hall.as_table_like_mut().ok_or_else(|| Error::new("site.hall: expected a table"))?;
-    for (key, old, new) in
-        [("length_m", old.length_m, new.length_m), ("width_m", old.width_m, new.width_m), ("height_m", old.height_m, new.height_m)]
-    {
+    for (key, old, new) in [
+        ("length_m", old.length_m, new.length_m),
+        ("width_m", old.width_m, new.width_m),
+        ("height_m", old.height_m, new.height_m),
+    ] {
         if old != new {
             set(hall, key, Value::from(new));
         }
     }
     if old.outline_m != new.outline_m {
-        let corners: Array = new.outline_m.iter().map(|corner| corner.iter().copied().collect::<Array>()).collect();
+        let corners: Array =
+            new.outline_m.iter().map(|corner| corner.iter().copied().collect::<Array>()).collect();
         set(hall, "outline_m", Value::Array(corners));
     }
     Ok(())
@@ -81,7 +94,9 @@ fn list<T: PartialEq>(
     for (number, one) in after.iter().enumerate() {
         let index = match name {
             Some(name) => before.iter().position(|old| name(old) == name(one)),
-            None => Some(number).filter(|_| before.len() == after.len()).or_else(|| before.iter().position(|old| old == one)),
+            None => Some(number)
+                .filter(|_| before.len() == after.len())
+                .or_else(|| before.iter().position(|old| old == one)),
         };
         let table = index.filter(|_| is_written).and_then(|index| left[index].take());
         let (new, unchanged) = (pairs(one)?, index.is_some_and(|index| before[index] == *one));
@@ -166,7 +181,11 @@ mod tests {
     fn things_come_and_go_and_comments_of_the_others_stay() {
         let mut plan = site();
         plan.sensors.remove(0);
-        plan.sensors.push(Sensor { name: "third".to_owned(), position_m: [0.0, 12.0, 5.0], ..plan.sensors[0].clone() });
+        plan.sensors.push(Sensor {
+            name: "third".to_owned(),
+            position_m: [0.0, 12.0, 5.0],
+            ..plan.sensors[0].clone()
+        });
         plan.furniture.clear();
         plan.access_points[0].position_m = [1.0, 2.0, 3.0];
         plan.hall.outline_m = vec![[-17.0, -17.0], [17.0, -17.0], [17.0, 17.0], [-17.0, 16.0]];

@@ -20,7 +20,8 @@ fn the_map_agrees_with_the_simulated_sensors() {
         let (mut same, mut ratios, mut places) = (0, Vec::new(), 0);
         for place in &truth.places {
             let floor = &planned.floor;
-            let cell = (place.position_m - umbracast::geometry::DVec2::from_array(floor.from_m)) / floor.step_m;
+            let cell =
+                (place.position_m - umbracast::geometry::DVec2::from_array(floor.from_m)) / floor.step_m;
             let cell = cell.round().as_usizevec2();
             let index = cell.y.min(floor.rows - 1) * floor.columns + cell.x.min(floor.columns - 1);
             if !floor.open[index] {
@@ -50,12 +51,18 @@ fn the_best_places_beat_luck() {
         let sensors = best::<Sensor>(&site, wanted, 20.0, 1.75).unwrap();
         let [lucky, mean] = versus_random::<Sensor>(&site, 2, 20.0, 1.75, (40, 1)).unwrap();
         let reached = *sensors.values.last().unwrap();
-        println!("{name}: sensors {reached:.4}, best of 40 random {lucky:.4}, mean {mean:.4}, exact {}", sensors.exact);
+        println!(
+            "{name}: sensors {reached:.4}, best of 40 random {lucky:.4}, mean {mean:.4}, exact {}",
+            sensors.exact
+        );
         assert!(reached >= lucky && sensors.bound >= reached, "{name}: {reached} {lucky}");
         let aps = best::<AccessPoint>(&site, wanted, 20.0, 1.75).unwrap();
         let [lucky, _] = versus_random::<AccessPoint>(&site, 2, 20.0, 1.75, (40, 1)).unwrap();
         let reached = *aps.values.last().unwrap();
-        assert!(reached >= lucky && aps.further.windows(2).all(|two| two[0] <= two[1] + 1e-9), "{name}: {reached} {lucky}");
+        assert!(
+            reached >= lucky && aps.further.windows(2).all(|two| two[0] <= two[1] + 1e-9),
+            "{name}: {reached} {lucky}"
+        );
         assert!(aps.placed.iter().all(|ap| ap.name.starts_with("ap_")));
     }
 }

@@ -24,9 +24,9 @@ pub use crowd::{BodyArgs, CrowdArgs, Replay};
 pub use fleet::Fleet;
 pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
 pub use network::Network;
-pub use plan::Plan;
 #[cfg(feature = "node")]
 pub use node::Node;
+pub use plan::Plan;
 
 /// Detects people with LiDARs, forecasts where they walk, and says which radio links they will block.
 #[derive(Debug, Parser)]

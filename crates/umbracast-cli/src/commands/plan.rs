@@ -27,7 +27,10 @@ pub fn run(args: &Plan, common: &Common) -> Result<Ending, Error> {
     let sensors = placed::<Sensor>(&site, args.sensors, args, common)?;
     let access_points = placed::<AccessPoint>(&site, args.access_points, args, common)?;
     if common.json {
-        say::line(format_args!("{:#}", json!({ "site": site.name, "sensors": sensors, "access_points": access_points })));
+        say::line(format_args!(
+            "{:#}",
+            json!({ "site": site.name, "sensors": sensors, "access_points": access_points })
+        ));
     }
     Ok(Ending::Done)
 }
@@ -71,7 +74,9 @@ fn placed<T: Placed + serde::Serialize>(
         let best = best::<T>(site, Wanted { count, beside: args.beside }, people, height_m)?;
         let random = match args.against {
             0 => None,
-            placements => Some(versus_random::<T>(site, count, people, height_m, (placements as usize, SEED))?),
+            placements => {
+                Some(versus_random::<T>(site, count, people, height_m, (placements as usize, SEED))?)
+            }
         };
         Ok::<_, Error>((best, random))
     };
@@ -79,25 +84,46 @@ fn placed<T: Placed + serde::Serialize>(
     if !common.json {
         tell(site, &best, random, args);
     }
-    Ok(Some(json!({ "best": best, "random_best": random.map(|r| r[0]), "random_mean": random.map(|r| r[1]) })))
+    Ok(Some(
+        json!({ "best": best, "random_best": random.map(|r| r[0]), "random_mean": random.map(|r| r[1]) }),
+    ))
 }
 
 fn tell<T: Placed + serde::Serialize>(site: &Site, best: &Best<T>, random: Option<[f64; 2]>, args: &Plan) {
     let sees = if T::STEM == "lidar" { "a person is seen" } else { "some link of a person is free" };
-    say::line(format_args!("{}: share of time in which {sees}, mean over the floor, {} people", site.name, args.people));
+    say::line(format_args!(
+        "{}: share of time in which {sees}, mean over the floor, {} people",
+        site.name, args.people
+    ));
     for (one, value) in best.placed.iter().zip(&best.values) {
         let text = serde_json::to_value(one).unwrap_or_default();
-        let turn = text.get("rotation_deg").map(|turn| format!(", yaw {}, pitch {} degrees", turn["yaw"], turn["pitch"]));
-        say::line(format_args!("  {:.4} with {} at {} m{}", value, one.name(), text["position_m"], turn.unwrap_or_default()));
+        let turn = text
+            .get("rotation_deg")
+            .map(|turn| format!(", yaw {}, pitch {} degrees", turn["yaw"], turn["pitch"]));
+        say::line(format_args!(
+            "  {:.4} with {} at {} m{}",
+            value,
+            one.name(),
+            text["position_m"],
+            turn.unwrap_or_default()
+        ));
     }
     let how = match best.exact {
-        true => format!("the best choice of {} places, then moved to better ones beside them", best.candidates),
-        false => format!("chosen one by one of {} places; no choice of them reaches {:.4}", best.candidates, best.bound),
+        true => {
+            format!("the best choice of {} places, then moved to better ones beside them", best.candidates)
+        }
+        false => format!(
+            "chosen one by one of {} places; no choice of them reaches {:.4}",
+            best.candidates, best.bound
+        ),
     };
     say::line(format_args!("  {how}"));
     let further: Vec<String> = best.further.iter().map(|value| format!("{value:.4}")).collect();
     say::line(format_args!("  with one, two, three more: {}", further.join(", ")));
     if let Some([most, mean]) = random {
-        say::line(format_args!("  {} random placements reach {most:.4} at best, {mean:.4} in the mean", args.against));
+        say::line(format_args!(
+            "  {} random placements reach {most:.4} at best, {mean:.4} in the mean",
+            args.against
+        ));
     }
 }

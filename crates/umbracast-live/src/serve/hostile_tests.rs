@@ -16,7 +16,8 @@ const UPGRADE: &str = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocke
                        Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
 
 fn server(limits: Limits) -> Server {
-    let watched = Watched::new(Config::default().site, Arc::new(Counters::default()), HostClock::start(), "a test");
+    let watched =
+        Watched::new(Config::default().site, Arc::new(Counters::default()), HostClock::start(), "a test");
     start_with(limits, Door::at(SocketAddr::from(([127, 0, 0, 1], 0))), watched).unwrap()
 }
 

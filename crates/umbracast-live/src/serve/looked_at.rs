@@ -45,7 +45,8 @@ pub(super) fn fields_deg(site: &Site) -> Vec<Option<[f64; 2]>> {
     let of = |sensor: &Sensor| {
         let beams = Model::of_sensor(sensor).ok()?.beams;
         let elevations = beams.iter().map(|beam| beam.elevation_rad.to_degrees());
-        let bounds = elevations.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], e| [low.min(e), high.max(e)]);
+        let bounds =
+            elevations.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], e| [low.min(e), high.max(e)]);
         (bounds[0] <= bounds[1]).then_some(bounds)
     };
     site.sensors.iter().map(of).collect()
@@ -68,14 +69,20 @@ pub(super) async fn about(State(shared): State<Arc<Shared>>) -> Result<Json<Valu
 }
 
 /// `/api/recording/frames?from=&count=`
-pub(super) async fn frames(State(shared): State<Arc<Shared>>, Query(span): Query<Span>) -> Result<Response, Response> {
+pub(super) async fn frames(
+    State(shared): State<Arc<Shared>>,
+    Query(span): Query<Span>,
+) -> Result<Response, Response> {
     let recording = recording(&shared)?;
     let text = read(move || recording.frames(span.from, span.count)).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }
 
 /// `/api/recording/scan?frame=`: 204 where it is not there yet.
-pub(super) async fn recorded_scan(State(shared): State<Arc<Shared>>, Query(at): Query<At>) -> Result<Response, Response> {
+pub(super) async fn recorded_scan(
+    State(shared): State<Arc<Shared>>,
+    Query(at): Query<At>,
+) -> Result<Response, Response> {
     let recording = recording(&shared)?;
     let scan = read(move || recording.scan(at.frame)).await?;
     Ok(scan.map_or_else(|| StatusCode::NO_CONTENT.into_response(), |bytes| octets(bytes.into())))
@@ -87,7 +94,9 @@ fn recording(shared: &Shared) -> Result<Arc<Recording>, Response> {
 }
 
 /// Reads from disk beside the server's thread.
-async fn read<T: Send + 'static>(reads: impl FnOnce() -> Result<T, Error> + Send + 'static) -> Result<T, Response> {
+async fn read<T: Send + 'static>(
+    reads: impl FnOnce() -> Result<T, Error> + Send + 'static,
+) -> Result<T, Response> {
     let failed = |told: String| (StatusCode::INTERNAL_SERVER_ERROR, told).into_response();
     match tokio::task::spawn_blocking(reads).await {
         Ok(read) => read.map_err(|error| failed(format!("{error}\n"))),
@@ -96,5 +105,6 @@ async fn read<T: Send + 'static>(reads: impl FnOnce() -> Result<T, Error> + Send
 }
 
 fn octets(bytes: Bytes) -> Response {
-    ([(header::CONTENT_TYPE, "application/octet-stream"), (header::CACHE_CONTROL, "no-store")], bytes).into_response()
+    ([(header::CONTENT_TYPE, "application/octet-stream"), (header::CACHE_CONTROL, "no-store")], bytes)
+        .into_response()
 }

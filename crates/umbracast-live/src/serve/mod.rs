@@ -50,8 +50,8 @@ use umbracast::{Error, Site};
 use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
 use doors::{Doors, Names};
-use tls::Tls;
 pub use planned::Planner;
+use tls::Tls;
 pub use watched::Watched;
 
 /// The cookie that holds the page's token.
@@ -216,7 +216,10 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/api/recording", get(looked_at::about))
         .route("/api/recording/frames", get(looked_at::frames))
         .route("/api/recording/scan", get(looked_at::recorded_scan))
-        .route("/api/plan/{name}", post(planned::answer).layer(DefaultBodyLimit::max(planned::QUESTION_BYTES)))
+        .route(
+            "/api/plan/{name}",
+            post(planned::answer).layer(DefaultBodyLimit::max(planned::QUESTION_BYTES)),
+        )
         .route("/api/events", get(events))
         .route("/api/openapi.json", get(async || Json(openapi::document())))
         .route("/health", get(health))

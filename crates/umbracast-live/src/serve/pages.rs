@@ -22,8 +22,17 @@ pub(super) const WATCH: &str = page!(
     ["style.css"],
     "watch.html",
     [
-        "base.js", "gl.js", "flat.js", "camera.js", "hall.js", "people.js", "links.js", "scene.js", "board.js",
-        "recording.js", "watch.js"
+        "base.js",
+        "gl.js",
+        "flat.js",
+        "camera.js",
+        "hall.js",
+        "people.js",
+        "links.js",
+        "scene.js",
+        "board.js",
+        "recording.js",
+        "watch.js"
     ]
 );
 
@@ -31,5 +40,15 @@ pub(super) const WATCH: &str = page!(
 pub(super) const PLAN: &str = page!(
     ["style.css", "plan.css"],
     "plan.html",
-    ["base.js", "gl.js", "flat.js", "camera.js", "hall.js", "people.js", "scene.js", "plan.js", "plan_draw.js"]
+    [
+        "base.js",
+        "gl.js",
+        "flat.js",
+        "camera.js",
+        "hall.js",
+        "people.js",
+        "scene.js",
+        "plan.js",
+        "plan_draw.js"
+    ]
 );

@@ -34,7 +34,11 @@ impl Planner {
 }
 
 /// `/api/plan/NAME`: 200 with JSON, or 400 with a sentence that says what was expected.
-pub(super) async fn answer(State(shared): State<Arc<Shared>>, Path(name): Path<String>, body: Bytes) -> Response {
+pub(super) async fn answer(
+    State(shared): State<Arc<Shared>>,
+    Path(name): Path<String>,
+    body: Bytes,
+) -> Response {
     let Some(planner) = shared.watched.planner.clone() else {
         return (StatusCode::NOT_FOUND, "nothing is planned here\n").into_response();
     };
@@ -43,6 +47,8 @@ pub(super) async fn answer(State(shared): State<Arc<Shared>>, Path(name): Path<S
     match told {
         Ok(Ok(json)) => ([(header::CONTENT_TYPE, "application/json")], json).into_response(),
         Ok(Err(error)) => (StatusCode::BAD_REQUEST, format!("{error}\n")).into_response(),
-        Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "the computation ended; this is a bug\n").into_response(),
+        Err(_) => {
+            (StatusCode::INTERNAL_SERVER_ERROR, "the computation ended; this is a bug\n").into_response()
+        }
     }
 }

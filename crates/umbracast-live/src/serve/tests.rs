@@ -98,11 +98,13 @@ fn the_whole_scan_comes_only_while_somebody_asks_and_a_recording_only_where_ther
     assert_eq!(get(&server, "/api/recording/frames?from=-1&count=5", "").0, 400);
     server.stop();
     let mut watched = Watched::new(Config::default().site, Arc::default(), HostClock::start(), "a recording");
-    let recording = Arc::new(crate::recording::Recording::new(vec!["default".to_owned()], 2.0, false, false).unwrap());
+    let recording =
+        Arc::new(crate::recording::Recording::new(vec!["default".to_owned()], 2.0, false, false).unwrap());
     recording.add(&[Published { frame: 9, ..Published::default() }], None, || vec![1, 2, 3]);
     watched.recording = Some(recording);
     let server = start(Door::at(SocketAddr::from(([127, 0, 0, 1], 0))), watched).unwrap();
-    let frames: Value = serde_json::from_str(&get(&server, "/api/recording/frames?from=0&count=5", "").1).unwrap();
+    let frames: Value =
+        serde_json::from_str(&get(&server, "/api/recording/frames?from=0&count=5", "").1).unwrap();
     assert_eq!((&frames[0]["frames"][0]["frame"], frames.as_array().unwrap().len()), (&json!(9), 1));
     assert_eq!(get(&server, "/health", "").0, 200, "a recording is never late");
     server.stop();
@@ -227,7 +229,12 @@ fn a_name_that_was_made_to_lead_here_is_refused_with_a_token_too() {
 
 #[test]
 fn a_host_that_is_no_name_is_refused_at_the_start() {
-    let watched = Watched::new(Config::default().site, Arc::new(Counters::default()), HostClock::start(), String::new());
+    let watched = Watched::new(
+        Config::default().site,
+        Arc::new(Counters::default()),
+        HostClock::start(),
+        String::new(),
+    );
     let door = Door::at(SocketAddr::from(([127, 0, 0, 1], 0)));
     let door = Door { hosts: vec!["https://hall.example".to_owned()], ..door };
     let message = start(door, watched).err().unwrap().to_string();
@@ -236,7 +243,12 @@ fn a_host_that_is_no_name_is_refused_at_the_start() {
 
 #[test]
 fn an_address_that_others_reach_needs_a_token() {
-    let watched = Watched::new(Config::default().site, Arc::new(Counters::default()), HostClock::start(), String::new());
+    let watched = Watched::new(
+        Config::default().site,
+        Arc::new(Counters::default()),
+        HostClock::start(),
+        String::new(),
+    );
     let message = start(Door::at(SocketAddr::from(([0, 0, 0, 0], 0))), watched).err().unwrap().to_string();
     assert!(message.contains("UMBRACAST_TOKEN"), "{message}");
 }

@@ -144,7 +144,7 @@ class Gl {
     gl.bindBuffer(gl.ARRAY_BUFFER, held.buffer); this.give(0, [3, 4], 0);
     gl.drawArrays(gl.TRIANGLES, 0, held.count); gl.depthMask(true);
   }
-  keep(list, floats, before) { return { buffer: this.buffer(list.data(), before && before.buffer), count: list.count / floats }; }
+  keep(list, floats, before) { return { buffer: this.buffer(list.data(), (before && before.buffer) || undefined), count: list.count / floats }; }
 }
 
 // Floats that grow and are filled anew for every picture.

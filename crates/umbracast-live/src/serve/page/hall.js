@@ -82,7 +82,7 @@ function cut(site, a, b) {
 
 // Faces and lines of all that stays; made once a site and theme.
 class Stays {
-  constructor(draws, site, origin, fields) {
+  constructor(draws, site, origin, fields, before) {
     const { corners, x0, x1, y0, y1 } = hallOf(site), h = site.hall.height_m;
     const faces = new Floats(origin), lines = this.lines = new Floats(origin), seen = new Floats(origin);
     const [floor, thing, line, faint] = ["floor", "thing", "line", "faint"].map(tintOf);
@@ -116,7 +116,7 @@ class Stays {
       low.forEach((p, k) => { if (k + 1 < low.length) seen.face([p, low[k + 1], high[k + 1], high[k]], [...hue, .13]); });
       this.fields.way(low, [...hue, .9], 1.5); this.fields.way(high, [...hue, .9], 1.5, 8);
       low.forEach((p, k) => { if (k % 9 === 0) this.fields.line(sensor.position_m, p, [...hue, .35]); }); });
-    this.faces = draws.keep(faces, 7); this.seen = draws.keep(seen, 7);
+    this.faces = draws.keep(faces, 7, before && before.faces); this.seen = draws.keep(seen, 7, before && before.seen);
   }
 }
 // Sensors are told apart by colour in the whole scan; names stand beside them.

@@ -16,7 +16,7 @@ class Scene {
     [this.floats, this.bodies, this.marks, this.over] = [0, 0, 0, 0].map(() => new Floats(this.origin));
     this.themed();
   }
-  themed() { this.stays = new Stays(this.draws, site, this.origin, this.fields); }
+  themed() { this.stays = new Stays(this.draws, site, this.origin, this.fields, this.stays); }
   fit() {
     const scale = Math.min(window.devicePixelRatio || 1, 2);
     for (const c of [this.canvas, this.overlay]) {
@@ -108,8 +108,9 @@ class Scene {
       if (!must && taken.some(b => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3])) return;
       taken.push(box);
       c.fillStyle = tint;
-      if (mark === "ap") c.fillRect(left + p[0] - 4 * scale, p[1] - 4 * scale, 8 * scale, 8 * scale);
-      if (mark === "sensor") { c.beginPath(); c.moveTo(left + p[0], p[1] - 5 * scale); c.lineTo(left + p[0] + 5 * scale, p[1] + 5 * scale); c.lineTo(left + p[0] - 5 * scale, p[1] + 5 * scale); c.fill(); }
+      // A diamond and a square, as in reports.
+      if (mark === "ap") { const r = 6 * scale; c.beginPath(); c.moveTo(left + p[0], p[1] - r); c.lineTo(left + p[0] + r, p[1]); c.lineTo(left + p[0], p[1] + r); c.lineTo(left + p[0] - r, p[1]); c.closePath(); c.fillStyle = "#f0e442"; c.fill(); c.strokeStyle = "#1f242b"; c.lineWidth = 1.3 * scale; c.stroke(); c.fillStyle = tint; }
+      if (mark === "sensor") c.fillRect(left + p[0] - 4 * scale, p[1] - 4 * scale, 8 * scale, 8 * scale);
       c.strokeStyle = css("sky"); c.lineWidth = 3 * scale; c.strokeText(text, left + u, v); c.fillText(text, left + u, v);
     };
     c.save(); c.beginPath(); c.rect(left, 0, width, height); c.clip();
