@@ -114,7 +114,8 @@ impl Recording {
         let first = usize::try_from(from).unwrap_or(usize::MAX).min(kept.frames.len());
         let last = first.saturating_add(count.min(FRAMES_MAX) as usize).min(kept.frames.len());
         let (mut text, mut begun) = (b"[".to_vec(), false);
-        for piece in kept.frames[first..last].to_vec() {
+        for number in first..last {
+            let piece = kept.frames[number];
             if begun && text.len() as u64 + piece.bytes > ANSWER_BYTES {
                 break;
             }

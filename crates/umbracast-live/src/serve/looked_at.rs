@@ -19,6 +19,9 @@ use super::Shared;
 use crate::recording::Recording;
 use crate::whole;
 
+/// A status and a sentence.
+type Refusal = (StatusCode, String);
+
 /// The last scan that was encoded, by its frame's time.
 #[derive(Debug, Default)]
 pub(super) struct Encoded(Mutex<Option<(i64, Bytes)>>);
@@ -64,7 +67,7 @@ pub(super) struct At {
 }
 
 /// `/api/recording`
-pub(super) async fn about(State(shared): State<Arc<Shared>>) -> Result<Json<Value>, Response> {
+pub(super) async fn about(State(shared): State<Arc<Shared>>) -> Result<Json<Value>, Refusal> {
     Ok(Json(recording(&shared)?.about()))
 }
 
@@ -72,7 +75,7 @@ pub(super) async fn about(State(shared): State<Arc<Shared>>) -> Result<Json<Valu
 pub(super) async fn frames(
     State(shared): State<Arc<Shared>>,
     Query(span): Query<Span>,
-) -> Result<Response, Response> {
+) -> Result<Response, Refusal> {
     let recording = recording(&shared)?;
     let text = read(move || recording.frames(span.from, span.count)).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
@@ -82,22 +85,22 @@ pub(super) async fn frames(
 pub(super) async fn recorded_scan(
     State(shared): State<Arc<Shared>>,
     Query(at): Query<At>,
-) -> Result<Response, Response> {
+) -> Result<Response, Refusal> {
     let recording = recording(&shared)?;
     let scan = read(move || recording.scan(at.frame)).await?;
     Ok(scan.map_or_else(|| StatusCode::NO_CONTENT.into_response(), |bytes| octets(bytes.into())))
 }
 
-fn recording(shared: &Shared) -> Result<Arc<Recording>, Response> {
-    let none = || (StatusCode::NOT_FOUND, "no recording is looked at here\n").into_response();
+fn recording(shared: &Shared) -> Result<Arc<Recording>, Refusal> {
+    let none = || (StatusCode::NOT_FOUND, "no recording is looked at here\n".to_owned());
     shared.watched.recording.clone().ok_or_else(none)
 }
 
 /// Reads from disk beside the server's thread.
 async fn read<T: Send + 'static>(
     reads: impl FnOnce() -> Result<T, Error> + Send + 'static,
-) -> Result<T, Response> {
-    let failed = |told: String| (StatusCode::INTERNAL_SERVER_ERROR, told).into_response();
+) -> Result<T, Refusal> {
+    let failed = |told: String| (StatusCode::INTERNAL_SERVER_ERROR, told);
     match tokio::task::spawn_blocking(reads).await {
         Ok(read) => read.map_err(|error| failed(format!("{error}\n"))),
         Err(_) => Err(failed("the reading ended; this is a bug\n".to_owned())),

@@ -46,13 +46,17 @@ in vec4 v_tint; out vec4 tint; void main() { tint = v_tint; }`],
 
 class Gl {
   constructor(canvas) {
-    const gl = this.gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
+    // Where software draws, edges are left as they are: smooth ones cost several times as much.
+    const probe = document.createElement("canvas").getContext("webgl2"), about = probe && probe.getExtension("WEBGL_debug_renderer_info");
+    this.soft = !!about && /swiftshader|llvmpipe|software/i.test(probe.getParameter(about.UNMASKED_RENDERER_WEBGL));
+    if (probe) probe.getExtension("WEBGL_lose_context")?.loseContext();
+    const gl = this.gl = canvas.getContext("webgl2", { antialias: !this.soft, alpha: false });
     if (!gl) throw new Error("no WebGL2");
     this.origin = [0, 0, 0];
     this.programs = {};
     for (const [name, [vertex, fragment]] of Object.entries(SHADERS)) this.programs[name] = this.program(vertex, fragment);
     this.quad = this.buffer(new Float32Array([0, -1, 1, -1, 0, 1, 1, 1]));
-    this.shape = this.capsule(10);
+    this.shape = this.capsule(this.soft ? 7 : 10);
     this.moving = gl.createBuffer();
     gl.enable(gl.DEPTH_TEST); gl.enable(gl.BLEND); gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
   }
