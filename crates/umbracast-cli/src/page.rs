@@ -27,6 +27,14 @@ pub struct Shown<'a> {
     pub recording: Option<Arc<Recording>>,
 }
 
+impl<'a> Shown<'a> {
+    /// A hall that is watched as it is.
+    pub fn live(site: &'a Site, counters: &Arc<Counters>, clock: HostClock, title: &str) -> Self {
+        let (counters, title) = (counters.clone(), title.to_owned());
+        Self { site, counters, clock, title, whole: Arc::default(), recording: None }
+    }
+}
+
 /// What gives frames to the page; to nobody where there is none.
 #[derive(Default)]
 pub struct Page {

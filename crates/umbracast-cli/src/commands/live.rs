@@ -53,7 +53,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
         whole: whole.clone(),
     };
     let title = if args.demo { format!("{}, simulated", config.site.name) } else { config.site.name.clone() };
-    let shown = Shown { site: &config.site, counters, clock, title, whole, recording: None };
+    let shown = Shown { whole, ..Shown::live(&config.site, &counters, clock, &title) };
     let page = Page::open(&args.page, shown)?;
     let (form, quiet) = log_of(args, common);
     let told = say::events(form, quiet, clock);

@@ -41,14 +41,8 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
     let modes = configs.iter().map(|config| config.mode.name().to_owned()).collect();
     let recording = Arc::new(Recording::new(modes, args.rate, args.again, truth.is_some())?);
-    let shown = Shown {
-        site: &site,
-        counters: counters.clone(),
-        clock,
-        title: inputs[0].to_string(),
-        whole: Arc::default(),
-        recording: Some(recording.clone()),
-    };
+    let recorded = Shown::live(&site, &counters, clock, &inputs[0].to_string());
+    let shown = Shown { recording: Some(recording.clone()), ..recorded };
     let page = Page::open(&args.page, shown)?;
     let (publish, middle_m) = (page.listener(), whole::middle_m(&site));
     let mut lost = Vec::new();
