@@ -33,8 +33,11 @@ class Flat {
     this.context.lineCap = "butt";
   }
   points(held, tints, thick) {
-    const c = this.context; c.globalAlpha = 1; c.fillStyle = this.tint(tints[0]);
+    const c = this.context; c.globalAlpha = 1;
+    let last = -1;
     for (let i = 0; i < held.count; i++) {
+      const kind = held.short ? (held.data[i * 4 + 3] & 255) % 6 : 0;
+      if (kind !== last) c.fillStyle = this.tint(tints[last = kind]);
       const [x, y, z] = [0, 1, 2].map(k => held.data[i * held.stride + k] / 100 + held.from_m[k] - this.origin[k]), p = this.at(x, y, z);
       if (p) c.fillRect(p[0], p[1], thick, thick);
     }
