@@ -25,7 +25,8 @@ fn recorded(folder: &Path) {
     let mut text = "t_s,id,x_m,y_m\n".to_owned();
     for k in 0..40 {
         let x = -2.5 + 0.12 * f64::from(k);
-        text += &format!("{:.1},1,{x:.2},0.5\n{:.1},2,{:.2},-0.8\n", 0.1 * f64::from(k), 0.1 * f64::from(k), -x);
+        text +=
+            &format!("{:.1},1,{x:.2},0.5\n{:.1},2,{:.2},-0.8\n", 0.1 * f64::from(k), 0.1 * f64::from(k), -x);
     }
     let walks = folder.join("walks.csv");
     std::fs::create_dir_all(folder).expect("a folder");

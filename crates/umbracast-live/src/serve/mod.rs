@@ -33,7 +33,7 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Duration;
 
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{DefaultBodyLimit, Query, Request, State};
+use axum::extract::{Query, Request, State};
 use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
@@ -216,10 +216,7 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/api/recording", get(looked_at::about))
         .route("/api/recording/frames", get(looked_at::frames))
         .route("/api/recording/scan", get(looked_at::recorded_scan))
-        .route(
-            "/api/plan/{name}",
-            post(planned::answer).layer(DefaultBodyLimit::max(planned::QUESTION_BYTES)),
-        )
+        .route("/api/plan/{name}", post(planned::answer))
         .route("/api/events", get(events))
         .route("/api/openapi.json", get(async || Json(openapi::document())))
         .route("/health", get(health))

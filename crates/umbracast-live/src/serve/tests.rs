@@ -122,7 +122,7 @@ fn a_planner_answers_and_says_what_is_wrong() {
         let mut stream = TcpStream::connect(server.address()).unwrap();
         let host = server.address();
         write!(stream, "POST /api/plan/{name} HTTP/1.1\r\nHost: {host}\r\nContent-Length: {length}\r\nConnection: close\r\n{heads}\r\n").unwrap();
-        let _ = stream.write_all(&vec![b'x'; length.min(1 << 20)]);
+        let _ = stream.write_all(&vec![b'x'; if length < 1000 { length } else { 0 }]);
         let mut answer = String::new();
         let _ = stream.read_to_string(&mut answer);
         answer
