@@ -61,6 +61,7 @@ fn main() -> ExitCode {
         Command::Compare(args) => commands::compare::run(&args, &cli.common),
         Command::Ablate(args) => commands::ablate::run(&args, &cli.common),
         Command::Coverage(args) => commands::coverage::run(&args, &cli.common),
+        Command::Plan(args) => commands::plan::run(&args, &cli.common),
         Command::Network(args) => commands::network::run(&args, &cli.common),
         Command::Reproduce(args) => commands::reproduce::run(&args, &cli.common),
         Command::Inspect(args) => commands::inspect::run(&args, &cli.common),

@@ -1,12 +1,39 @@
-//! The page of `live` and `view`, if the build has it.
+//! The page of `live`, `view` and `plan`, if the build has it.
 
 use std::sync::Arc;
 
 use umbracast::{Error, Site};
+use umbracast_live::recording::Recording;
 use umbracast_live::run::Counters;
+use umbracast_live::whole::Whole;
 use umbracast_live::{HostClock, Published};
 
 use crate::args::PageArgs;
+
+/// What the page is about.
+#[cfg_attr(not(feature = "serve"), expect(dead_code, reason = "nobody looks"))]
+pub struct Shown<'a> {
+    /// Where everything stands.
+    pub site: &'a Site,
+    /// What is counted.
+    pub counters: Arc<Counters>,
+    /// The clock of the run.
+    pub clock: HostClock,
+    /// What it is called.
+    pub title: String,
+    /// Where whole frames are left while somebody looks at them.
+    pub whole: Arc<Whole>,
+    /// The frames of a recording, where one is looked at.
+    pub recording: Option<Arc<Recording>>,
+}
+
+impl<'a> Shown<'a> {
+    /// A hall that is watched as it is.
+    pub fn live(site: &'a Site, counters: &Arc<Counters>, clock: HostClock, title: &str) -> Self {
+        let (counters, title) = (counters.clone(), title.to_owned());
+        Self { site, counters, clock, title, whole: Arc::default(), recording: None }
+    }
+}
 
 /// What gives frames to the page; to nobody where there is none.
 #[derive(Default)]
@@ -21,22 +48,36 @@ impl Page {
     /// # Errors
     /// An address that is taken, or that needs a token; a host that is no name.
     #[cfg(feature = "serve")]
-    pub fn open(
-        args: &PageArgs,
-        site: &Site,
-        counters: &Arc<Counters>,
-        clock: HostClock,
-        title: &str,
-    ) -> Result<Self, Error> {
+    pub fn open(args: &PageArgs, shown: Shown) -> Result<Self, Error> {
         if args.no_serve {
             return Ok(Self::default());
         }
-        let watched = umbracast_live::serve::Watched {
-            site: site.clone(),
-            counters: counters.clone(),
-            clock,
-            title: title.to_owned(),
-        };
+        let mut watched =
+            umbracast_live::serve::Watched::new(shown.site.clone(), shown.counters, shown.clock, shown.title);
+        watched.whole = shown.whole;
+        watched.recording = shown.recording;
+        Self::serve(args, watched)
+    }
+
+    /// Serves the page of `plan`, with who answers it.
+    ///
+    /// # Errors
+    /// As [`Page::open`].
+    #[cfg(feature = "serve")]
+    pub fn plan(
+        args: &PageArgs,
+        site: Site,
+        title: &str,
+        answers: impl Fn(&str, &[u8]) -> Result<String, Error> + Send + Sync + 'static,
+    ) -> Result<Self, Error> {
+        let clock = HostClock::start();
+        let mut watched = umbracast_live::serve::Watched::new(site, Arc::default(), clock, title);
+        watched.planner = Some(umbracast_live::serve::Planner::new(answers));
+        Self::serve(args, watched)
+    }
+
+    #[cfg(feature = "serve")]
+    fn serve(args: &PageArgs, watched: umbracast_live::serve::Watched) -> Result<Self, Error> {
         let token = std::env::var("UMBRACAST_TOKEN").ok().filter(|token| !token.is_empty());
         let tls = args.tls_cert.clone().zip(args.tls_key.clone());
         let scheme = if tls.is_some() { "https" } else { "http" };
@@ -51,13 +92,7 @@ impl Page {
     /// # Errors
     /// None.
     #[cfg(not(feature = "serve"))]
-    pub fn open(
-        args: &PageArgs,
-        _site: &Site,
-        _counters: &Arc<Counters>,
-        _clock: HostClock,
-        _title: &str,
-    ) -> Result<Self, Error> {
+    pub fn open(args: &PageArgs, _shown: Shown) -> Result<Self, Error> {
         if !args.no_serve {
             crate::say::note("no page: this program was built without the feature `serve`");
         }

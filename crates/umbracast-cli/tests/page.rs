@@ -1,5 +1,5 @@
 //! The page as somebody sees it, in a headless Chromium: people move, a link turns red after it turned amber, the last
-//! minute can be gone back through, a telephone's width holds.
+//! minute can be gone back through, the whole scan comes when it is asked for, warnings hold, a telephone's width holds.
 
 #[path = "chromium/mod.rs"]
 mod chromium;
@@ -61,7 +61,7 @@ fn people_move_links_turn_and_the_last_minute_can_be_gone_back_through() {
     );
     page.until("document.body.dataset.blocked > 0");
     page.screenshot("page.png");
-    page.until("document.querySelectorAll('#links tbody tr.blocked').length > 0");
+    page.until("document.querySelectorAll('#links .link.blocked').length > 0");
 
     // A frame before now stays while new ones come.
     page.until("kept.length > 25");
@@ -73,17 +73,46 @@ fn people_move_links_turn_and_the_last_minute_can_be_gone_back_through() {
     page.value("$('pause').click(); true");
     page.until(&format!("+document.body.dataset.frame > {held} + 25"));
 
-    // A person is picked by a click on the plan.
-    let click = "(() => { const t = shown.tracks.find(t => t.confirmed), { at } = planView($('plan').clientWidth), \
-                 [x, y] = at(t.x_m, t.y_m), corner = $('plan').getBoundingClientRect(); \
-                 $('plan').dispatchEvent(new MouseEvent('click', { clientX: corner.left + x, clientY: corner.top + y })); \
+    // A person is picked by a click, in the plan and in a row.
+    page.value("way('plan'); true");
+    page.until("scene.camera.flat && !scene.fresh && shown.placed && shown.placed.size > 0");
+    let click = "(() => { picked = null; scene.steer(shown); scene.draw([shown], 0); \
+                 const [track, [x, y, z]] = [...shown.placed][0], [u, v] = scene.camera.project(x, y, z + 0.9), o = $('overlay'), \
+                 corner = o.getBoundingClientRect(), at = { clientX: corner.left + u, clientY: corner.top + v, pointerId: 1, bubbles: true }; \
+                 o.setPointerCapture = () => {}; o.dispatchEvent(new PointerEvent('pointerdown', at)); o.dispatchEvent(new PointerEvent('pointerup', at)); \
                  return picked != null; })()";
     assert_eq!(page.value(click), true);
     page.until("$('person').textContent.includes('m/s')");
 
-    // On a telephone nothing stands beyond the edge.
+    // Whoever asks gets the whole scan, in a bounded number of points; every camera draws.
+    page.value(
+        "$('scan').value = 'whole'; $('scan').dispatchEvent(new Event('change')); way('corner'); true",
+    );
+    page.until("+document.body.dataset.scanned > 10000 && +document.body.dataset.scanned <= 30000");
+    page.screenshot("scan.png");
+    for key in ["4", "5", "v", "2", "1"] {
+        page.value(&format!("dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}' }})); true"));
+        page.until("drawn && performance.now() > boarded");
+    }
+    page.until("scheme.way === 'fit' && scheme.fields");
+    page.value("$('scan').value = 'none'; $('scan').dispatchEvent(new Event('change')); turn('fields', 'fields'); true");
+
+    // A warning stays for 0.8 s unless the link is blocked, and nothing that is blocked looks clear.
+    let hold = "(() => { const until = new Map(); for (const frame of kept) for (const [name, { state, link }] of frame.looks) { \
+                if (steps(link, 0) >= 0.5 && state !== 'blocked') return `${name} ${state}`; const before = until.get(name); \
+                if (state === 'warning' && !before) until.set(name, frame.time_ns); \
+                if (state === 'clear' && before && frame.time_ns - before < 0.75e9 && kept[0].time_ns < before - 1e9) return `${name} held ${frame.time_ns - before}`; \
+                if (state !== 'warning') until.delete(name); } return 'well'; })()";
+    assert_eq!(page.value(hold), "well");
+    page.until("document.querySelectorAll('#told li.kind-true').length > 0 && document.querySelectorAll('#sensors li').length === 2");
+
+    // All of the window is used, and on a telephone nothing stands beyond the edge.
+    page.until(
+        "$('view').getBoundingClientRect().bottom > 880 && $('sensors').getBoundingClientRect().bottom > 880",
+    );
     page.size(390, 844);
-    page.until("document.documentElement.scrollWidth <= 390 && $('plan').clientWidth > 300");
+    page.until("document.documentElement.scrollWidth <= 390 && $('overlay').clientWidth > 300");
+    page.until("[...document.querySelectorAll('.link:not([hidden])')].every(row => row.getBoundingClientRect().right <= 390)");
     page.screenshot("telephone.png");
 
     // Both themes.

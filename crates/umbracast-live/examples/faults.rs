@@ -137,6 +137,7 @@ fn run(fault: &Fault, config: &Config, sensors: &Sensors, empty: &[Frame]) -> Re
         }),
         clock,
         counters: counters.clone(),
+        whole: Arc::default(),
     };
     let seen = Arc::new(Mutex::new(Vec::new()));
     let told = seen.clone();

@@ -17,6 +17,8 @@ pub mod warnings;
 pub mod advice;
 pub mod receive;
 pub mod published;
+pub mod whole;
+pub mod recording;
 pub mod record;
 pub mod run;
 pub mod log;

@@ -17,6 +17,7 @@ use crate::queue::{Queue, WhenFull};
 use crate::receive::{Arrived, Door, Receivers};
 use crate::record::{RecordSettings, RecordStatus, Recorder};
 use crate::warnings::{Event, Warnings};
+use crate::whole::Whole;
 
 /// Packets that wait for the assembler: a second of four HDL-32E.
 const PACKETS_WAITING: usize = 8192;
@@ -40,6 +41,8 @@ pub struct Settings {
     pub clock: HostClock,
     /// Where it counts.
     pub counters: Arc<Counters>,
+    /// Where whole frames are left for somebody who looks at them.
+    pub whole: Arc<Whole>,
 }
 
 /// Who is told of every frame. Called on the pipeline's thread: it must not wait for anybody.
@@ -136,7 +139,7 @@ impl Live {
     /// # Errors
     /// A setting that cannot work, a port that is taken, a folder that cannot be made.
     pub fn start(settings: Settings, listener: Listener) -> Result<Self, Error> {
-        let Settings { config, weights, empty, doors, record, clock, counters } = settings;
+        let Settings { config, weights, empty, doors, record, clock, counters, whole } = settings;
         let mut pipeline = Pipeline::new(&config, weights.as_ref())?;
         empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let assembler = Assembler::new(&config.site)?;
@@ -171,6 +174,7 @@ impl Live {
                 access_points: published::access_points(&config.site),
                 reloads: 0,
                 next: next.clone(),
+                whole,
                 left: Vec::new(),
             };
             std::thread::spawn(move || step(pipeline, &frames, publish))
@@ -309,6 +313,7 @@ struct Publish {
     access_points: Arc<[String]>,
     reloads: u64,
     next: Arc<Mutex<Option<Config>>>,
+    whole: Arc<Whole>,
     /// What happened to links that are no more, told with the next frame.
     left: Vec<Event>,
 }
@@ -331,6 +336,7 @@ fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
         published.published_ns = publish.clock.now_ns();
         published.latency = Duration::from_nanos((published.published_ns - arrived_ns).max(0) as u64);
         publish.out(published);
+        publish.whole.give(frame, publish.clock.now_ns());
     }
 }
 

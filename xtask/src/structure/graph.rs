@@ -7,7 +7,7 @@ use super::modules::{Module, Name, of_package};
 use crate::tools::Result;
 
 /// The packages in the order of the data; `lib.rs` or `main.rs` is the first file of each.
-const PACKAGES: [(&str, &str); 11] = [
+const PACKAGES: [(&str, &str); 12] = [
     ("umbracast", "src"),
     ("umbracast-sim", "crates/umbracast-sim/src"),
     ("umbracast-io", "crates/umbracast-io/src"),
@@ -15,6 +15,7 @@ const PACKAGES: [(&str, &str); 11] = [
     ("umbracast-train", "crates/umbracast-train/src"),
     ("umbracast-network", "crates/umbracast-network/src"),
     ("umbracast-calibrate", "crates/umbracast-calibrate/src"),
+    ("umbracast-plan", "crates/umbracast-plan/src"),
     ("umbracast-live", "crates/umbracast-live/src"),
     ("umbracast-node", "crates/umbracast-node/src"),
     ("umbracast-fuzz", "crates/umbracast-fuzz/src"),

@@ -78,10 +78,17 @@ pub struct View {
     /// The method: hdl, paper or default.
     #[arg(long, default_value = "default")]
     pub mode: Mode,
-    /// Play this many times faster than recorded.
+    /// Show what this method says beside it: hdl, paper or default.
+    #[arg(long, value_name = "MODE")]
+    pub beside: Option<Mode>,
+    /// Folder with the truth of the recordings, as `simulate` writes it. Default: the recordings' own folder, where it
+    /// holds one.
+    #[arg(long, value_name = "DIR")]
+    pub truth: Option<PathBuf>,
+    /// The page begins to play this many times faster than recorded.
     #[arg(long, default_value_t = 1.0, value_name = "X", value_parser = positive)]
     pub rate: f64,
-    /// Begin again at the end, until a signal comes.
+    /// The page begins again at the end.
     #[arg(long)]
     pub again: bool,
     #[command(flatten)]

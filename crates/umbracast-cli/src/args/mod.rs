@@ -12,6 +12,7 @@ mod live;
 mod calibrate;
 mod cast;
 mod network;
+mod plan;
 #[cfg(feature = "node")]
 mod node;
 #[cfg(feature = "node")]
@@ -27,6 +28,7 @@ pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPacket
 pub use network::Network;
 #[cfg(feature = "node")]
 pub use node::Node;
+pub use plan::Plan;
 
 /// Detects people with LiDARs, forecasts where they walk, and says which radio links they will block.
 #[derive(Debug, Parser)]
@@ -97,6 +99,8 @@ pub enum Command {
     Ablate(Ablate),
     /// Show how many returns a person gives at each place, and which places are blind.
     Coverage(Coverage),
+    /// Plan a hall on a page before anything hangs there: what is seen, which links are blocked, the best places.
+    Plan(Plan),
     /// Play a radio network in closed loop: what forecasts of blockage gain it, beside other policies and an oracle.
     Network(Network),
     /// Run the paper's whole experiment: 500 scenes, every mode, AABB and OBB. A stopped run resumes.

@@ -16,6 +16,7 @@ use umbracast_live::receive::Door;
 use umbracast_live::record::RecordSettings;
 use umbracast_live::run::{Counters, needs_restart};
 use umbracast_live::send::{self, Sent};
+use umbracast_live::whole::Whole;
 use umbracast_live::{HostClock, Live, Settings, Summary};
 use umbracast_sim::crowd::{Ground, Stroll};
 use umbracast_sim::sensor::Sensors;
@@ -24,7 +25,7 @@ use crate::args::{self, Common, LogForm, RecordArgs};
 use crate::ending::Ending;
 use crate::input;
 use crate::outward::Outward;
-use crate::page::Page;
+use crate::page::{Page, Shown};
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
 use crate::{say, signal};
@@ -40,6 +41,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     let asked = signal::asked_to_end()?;
     let read_again = args.site.site.as_ref().map(|_| signal::asked_to_read_again()).transpose()?;
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
+    let whole = Arc::new(Whole::default());
     let settings = Settings {
         weights: Some(setup::weights(args.weights.as_deref())?),
         empty: empty_frames(args, &config)?,
@@ -48,9 +50,11 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
         config: config.clone(),
         clock,
         counters: counters.clone(),
+        whole: whole.clone(),
     };
     let title = if args.demo { format!("{}, simulated", config.site.name) } else { config.site.name.clone() };
-    let page = Page::open(&args.page, &config.site, &counters, clock, &title)?;
+    let shown = Shown { whole, ..Shown::live(&config.site, &counters, clock, &title) };
+    let page = Page::open(&args.page, shown)?;
     let (form, quiet) = log_of(args, common);
     let told = say::events(form, quiet, clock);
     let outward = Outward::of_site_file(args.site.site.as_deref(), &config.site, told)?;

@@ -16,6 +16,7 @@ pub mod network;
 #[cfg(feature = "node")]
 pub mod node;
 pub mod check;
+pub mod plan;
 pub mod replay;
 pub mod reproduce;
 pub mod run;

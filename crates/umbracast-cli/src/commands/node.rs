@@ -30,7 +30,7 @@ use crate::args::{self, Common};
 use crate::ending::Ending;
 use crate::input::{self, Input};
 use crate::outward::Outward;
-use crate::page::Page;
+use crate::page::{Page, Shown};
 use crate::run_json::{RunJson, Stopwatch};
 use crate::{say, setup, signal};
 
@@ -77,7 +77,7 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let (weights, shared) = weights(args, &config, &stages, &hall, shared)?;
     let counters = Arc::new(Counters::default());
     let page = match stages.contains(&Role::Serve) {
-        true => Page::open(&args.page, &config.site, &counters, clock, &config.site.name)?,
+        true => Page::open(&args.page, Shown::live(&config.site, &counters, clock, &config.site.name))?,
         false => Page::default(),
     };
     let session = hall.session().clone();

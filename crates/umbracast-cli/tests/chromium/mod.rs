@@ -22,7 +22,10 @@ impl Page {
     pub fn open(address: &str, profile: &Path) -> Option<Self> {
         let name = std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".to_owned());
         let started = Command::new(&name)
-            .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-sync"])
+            .args(["--headless=new", "--no-sandbox", "--no-first-run", "--disable-sync"])
+            // WebGL by software: no graphics card is needed.
+            .args(["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
+            .arg("--ignore-gpu-blocklist")
             .args(["--disable-background-networking", "--disable-component-update", "--disable-quic"])
             .args(["--remote-debugging-port=0", "about:blank"])
             .arg(format!("--user-data-dir={}", profile.display()))

@@ -74,6 +74,7 @@ pub const ORANGE: &str = "#d55e00";
 pub const GREEN: &str = "#009e73";
 pub const PURPLE: &str = "#aa4499";
 pub const GOLD: &str = "#b8860b";
+pub const YELLOW: &str = "#f0e442";
 pub const SKY: &str = "#56b4e9";
 pub const GREY: &str = "#888888";
 pub const LIGHT: &str = "#cccccc";

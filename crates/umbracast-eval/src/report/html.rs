@@ -7,7 +7,7 @@ use super::figure::Figure;
 use super::markup::escaped;
 use super::plot::Mark;
 use super::published;
-use super::tables::Table;
+use super::tables::{BOUND_ONCE, Table};
 use crate::run::pooled::{Group, Scores};
 use crate::run::scene_score::Predictor;
 use umbracast::Mode;
@@ -156,7 +156,7 @@ fn opening(group: &Group, published: bool) -> String {
     if let Some(links) = group.link(Some(mode.mode), Predictor::Run, first) {
         plain(links.windows[2].onset_f1.value, 3, "", "onset F1: links that are free when predicted");
     }
-    plain(mode.tracked_share.value.map(|share| share * 100.0), 1, " %", "of people have a track");
+    plain(mode.tracked_share.value, 3, "", "share of people with a track");
     text + "</div>\n" + &modes(group)
 }
 
@@ -229,8 +229,11 @@ fn swatch(color: &str, mark: Mark) -> String {
         Mark::Dashed(width) => line(width, "6 4"),
         Mark::Discs(radius) => format!("<circle cx=\"15\" cy=\"7\" r=\"{radius}\" fill=\"{color}\"/>"),
         Mark::Diamonds(radius) => {
-            let r = radius.min(7.0);
-            format!("<path d=\"M15 {}l{r} {r}l-{r} {r}l-{r} -{r}z\" fill=\"{color}\"/>", 7.0 - r)
+            let r = radius.min(6.5);
+            format!(
+                "<path d=\"M15 {}l{r} {r}l-{r} {r}l-{r} -{r}z\" fill=\"{color}\" stroke=\"#222\"/>",
+                7.0 - r
+            )
         }
         Mark::Squares(radius) => format!(
             "<rect x=\"{}\" y=\"{}\" width=\"{side}\" height=\"{side}\" fill=\"{color}\"/>",
@@ -245,30 +248,41 @@ fn swatch(color: &str, mark: Mark) -> String {
     format!("<svg class=\"swatch\" viewBox=\"0 0 30 14\" aria-hidden=\"true\">{shape}</svg>")
 }
 
-/// Folded where it is long, but for the one that stands `first`.
+/// Folded where it is long, but for the one that stands `first`. Rows with devices bound once are folded below the others.
 fn tabulated(table: &Table, first: bool) -> String {
     let fold = if first || table.rows.len() <= ROWS_MAX { " open" } else { "" };
-    let mut text = format!(
-        "<details{fold}><summary><h2>{}</h2></summary>\n<div class=\"wide\"><table>\n<tr>",
-        escaped(&table.title)
-    );
+    let is_bound_once =
+        |row: &&Vec<String>| row.iter().take(table.words).any(|cell| cell.ends_with(BOUND_ONCE));
+    let (bound_once, others): (Vec<_>, Vec<_>) = table.rows.iter().partition(is_bound_once);
+    let title = escaped(&table.title);
+    let mut text = format!("<details{fold}><summary><h2>{title}</h2></summary>\n{}", rows(table, &others));
+    if !bound_once.is_empty() {
+        let rows = rows(table, &bound_once);
+        let _ =
+            writeln!(text, "<details><summary>The same with devices bound once</summary>\n{rows}</details>");
+    }
+    if !table.note.is_empty() {
+        let _ = writeln!(text, "<p class=\"note\">{}</p>", escaped(&table.note));
+    }
+    text + "</details>\n"
+}
+
+/// Some rows of a table below its header.
+fn rows(table: &Table, rows: &[&Vec<String>]) -> String {
+    let mut text = "<div class=\"wide\"><table>\n<tr>".to_owned();
     let class = |column: usize| if column < table.words { " class=\"w\"" } else { "" };
     for (column, name) in table.header.iter().enumerate() {
         let _ = write!(text, "<th{}>{}</th>", class(column), escaped(name));
     }
     text += "</tr>\n";
-    for (i, row) in table.rows.iter().enumerate() {
+    for (i, row) in rows.iter().enumerate() {
         // A line where the first word changes, in tables that have several words.
-        let new = table.words > 1 && i > 0 && table.rows[i - 1][..table.words - 1] != row[..table.words - 1];
+        let new = table.words > 1 && i > 0 && rows[i - 1][..table.words - 1] != row[..table.words - 1];
         text += if new { "<tr class=\"new\">" } else { "<tr>" };
         for (column, cell) in row.iter().enumerate() {
             let _ = write!(text, "<td{}>{}</td>", class(column), escaped(cell));
         }
         text += "</tr>\n";
     }
-    text += "</table></div>\n";
-    if !table.note.is_empty() {
-        let _ = writeln!(text, "<p class=\"note\">{}</p>", escaped(&table.note));
-    }
-    text + "</details>\n"
+    text + "</table></div>\n"
 }

@@ -7,7 +7,7 @@ use umbracast::{Error, Site};
 use umbracast_io::rows::{LinkRow, TrackRow};
 
 use super::context::Kept;
-use super::figure::{BLACK, BLUE, Figure, GOLD, GREEN, GREY, LIGHT, PURPLE, RED, Sizes, axes, series};
+use super::figure::{BLACK, BLUE, Figure, GOLD, GREY, LIGHT, PURPLE, RED, Sizes, YELLOW, axes, series};
 use super::floor::{self, Window};
 use super::plot::{Mark, Panel};
 use crate::score::instances::instances;
@@ -65,7 +65,9 @@ pub fn plan(kept: &Kept) -> Result<Option<Figure>, Error> {
     panel.series.push(series("person (truth)", LIGHT, Mark::Discs(5.5), people));
     panel.series.push(series("track", BLUE, Mark::Discs(2.6), seen));
     panel.series.push(series("LiDAR", BLACK, Mark::Squares(5.0), floor::sensors(site)));
-    panel.series.push(series("access point", GREEN, Mark::Diamonds(7.0), hung.clone()));
+    // As in the animation: yellow with a dark edge.
+    panel.series.push(series("", BLACK, Mark::Diamonds(9.0), hung.clone()));
+    panel.series.push(series("access point", YELLOW, Mark::Diamonds(7.0), hung.clone()));
     let height_m = panel.y.1 - panel.y.0;
     for (access_point, (x, y)) in site.access_points.iter().zip(hung) {
         panel.notes.push((x, y - 0.05 * height_m, access_point.name.clone()));

@@ -8,6 +8,9 @@ use super::published;
 use crate::run::pooled::{Estimate, Group, ModeScores, Scores, WindowScores};
 use crate::run::scene_score::Predictor;
 
+/// What stands behind the mode of rows whose devices are bound once.
+pub const BOUND_ONCE: &str = ", bound once";
+
 /// A table.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
@@ -82,7 +85,7 @@ pub fn headline(group: &Group, published: bool) -> Table {
                     table.rows.push(with_scores(&start, &links.windows[w - 1]));
                 }
                 if let Some(links) = group.link(Some(mode.mode), Predictor::BoundOnce, access_point) {
-                    let name = format!("{}, bound once", mode.mode.name());
+                    let name = format!("{}{BOUND_ONCE}", mode.mode.name());
                     let start = [access_point.to_owned(), window(w), name];
                     table.rows.push(with_scores(&start, &links.windows[w - 1]));
                 }

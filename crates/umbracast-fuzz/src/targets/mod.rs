@@ -8,6 +8,7 @@ mod settings;
 mod packets;
 mod messages;
 mod requests;
+mod plans;
 mod step;
 
 /// Where bytes come in.
@@ -23,7 +24,7 @@ pub struct Target {
 }
 
 /// Every target.
-pub const TARGETS: [Target; 21] = [
+pub const TARGETS: [Target; 22] = [
     files::MCAP,
     tables::PARQUET,
     files::CSV,
@@ -44,6 +45,7 @@ pub const TARGETS: [Target; 21] = [
     messages::CLOUDS,
     messages::OBJECTS,
     requests::HTTP,
+    plans::PLANS,
     step::STEP,
 ];
 

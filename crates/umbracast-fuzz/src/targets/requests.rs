@@ -25,12 +25,7 @@ const ANSWER_BYTES: usize = 1 << 16;
 
 /// It ends with the program.
 static SERVER: LazyLock<Server> = LazyLock::new(|| {
-    let watched = Watched {
-        site: Config::default().site,
-        counters: Arc::default(),
-        clock: HostClock::start(),
-        title: "a hall".to_owned(),
-    };
+    let watched = Watched::new(Config::default().site, Arc::default(), HostClock::start(), "a hall");
     let address = SocketAddr::from(([127, 0, 0, 1], 0));
     let door = Door { token: Some(TOKEN.to_owned()), ..Door::at(address) };
     let server = start(door, watched).expect("a free port");

@@ -16,12 +16,8 @@ const UPGRADE: &str = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocke
                        Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
 
 fn server(limits: Limits) -> Server {
-    let watched = Watched {
-        site: Config::default().site,
-        counters: Arc::new(Counters::default()),
-        clock: HostClock::start(),
-        title: "a test".to_owned(),
-    };
+    let watched =
+        Watched::new(Config::default().site, Arc::new(Counters::default()), HostClock::start(), "a test");
     start_with(limits, Door::at(SocketAddr::from(([127, 0, 0, 1], 0))), watched).unwrap()
 }
 

@@ -5,6 +5,9 @@
 //! | `/` | the page, whole in one answer |
 //! | `/api/site` | hall, sensors, access points |
 //! | `/api/frame` | the newest frame |
+//! | `/api/scan` | the whole scan of a frame, thinned, while somebody asks |
+//! | `/api/recording` | a recording that is looked at; below it its frames and scans |
+//! | `/api/plan/NAME` | what the page of `plan` asks |
 //! | `/api/live` | WebSocket: every frame, or the newest that a slow client can take |
 //! | `/api/events` | server-sent events: warnings, blockages, clear links, decisions |
 //! | `/api/openapi.json` | this interface, with the JSON Schema of every row |
@@ -18,8 +21,11 @@ mod watched;
 mod tls;
 mod connections;
 mod doors;
+mod looked_at;
 mod metrics;
 mod openapi;
+mod pages;
+mod planned;
 
 use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
@@ -32,7 +38,7 @@ use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
 use axum::response::{AppendHeaders, Html, IntoResponse, Response};
-use axum::routing::get;
+use axum::routing::{get, post};
 use axum::{Extension, Json, Router};
 use serde_json::{Value, json};
 use tokio::sync::{broadcast, oneshot, watch};
@@ -44,11 +50,10 @@ use umbracast::{Error, Site};
 use self::connections::{Connections, Guest, Limits, Stream};
 use crate::published::Published;
 use doors::{Doors, Names};
+pub use planned::Planner;
 use tls::Tls;
 pub use watched::Watched;
 
-/// The page: HTML, style and script in one, nothing loaded from elsewhere.
-const PAGE: &str = include_str!("page.html");
 /// The cookie that holds the page's token.
 const COOKIE: &str = "umbracast_token";
 /// Events that wait for a slow client; beyond it is told how many it missed.
@@ -100,6 +105,7 @@ struct Shared {
     names: Names,
     doors: Mutex<Doors>,
     connections: Arc<Connections>,
+    encoded: looked_at::Encoded,
 }
 
 /// Where it is served, and to whom.
@@ -164,6 +170,7 @@ fn start_with(limits: Limits, door: Door, watched: Watched) -> Result<Server, Er
         names,
         doors,
         connections,
+        encoded: looked_at::Encoded::default(),
     };
     let thread = std::thread::spawn(move || {
         runtime.block_on(async move {
@@ -205,6 +212,11 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/api/site", get(site))
         .route("/api/frame", get(frame))
         .route("/api/live", get(live))
+        .route("/api/scan", get(looked_at::scan))
+        .route("/api/recording", get(looked_at::about))
+        .route("/api/recording/frames", get(looked_at::frames))
+        .route("/api/recording/scan", get(looked_at::recorded_scan))
+        .route("/api/plan/{name}", post(planned::answer))
         .route("/api/events", get(events))
         .route("/api/openapi.json", get(async || Json(openapi::document())))
         .route("/health", get(health))
@@ -278,17 +290,21 @@ fn same(given: &str, token: &str) -> bool {
 
 /// The page keeps the token of its address in a cookie that no script reads and no other site's page sends, and takes it out of
 /// the address.
-async fn page(request: Request) -> impl IntoResponse {
+async fn page(State(shared): State<Arc<Shared>>, request: Request) -> impl IntoResponse {
+    let page = if shared.watched.planner.is_some() { pages::PLAN } else { pages::WATCH };
     let cookie = given(&request).map(|token| format!("{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"));
     let policy = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; \
                   img-src data:; frame-ancestors 'none'";
     let heads = [(header::CONTENT_SECURITY_POLICY, policy), (header::CACHE_CONTROL, "no-store")];
-    (heads, cookie.map(|cookie| [(header::SET_COOKIE, cookie)]).map(AppendHeaders), Html(PAGE))
+    (heads, cookie.map(|cookie| [(header::SET_COOKIE, cookie)]).map(AppendHeaders), Html(page))
 }
 
 async fn site(State(shared): State<Arc<Shared>>) -> Json<Value> {
     let site = shared.site.read().unwrap_or_else(PoisonError::into_inner).clone();
-    Json(json!({ "title": shared.watched.title, "site": site }))
+    Json(json!({
+        "title": shared.watched.title, "fields_deg": looked_at::fields_deg(&site), "site": site,
+        "recorded": shared.watched.recording.is_some(),
+    }))
 }
 
 #[derive(serde::Deserialize)]
@@ -368,7 +384,9 @@ fn full() -> Response {
 
 async fn health(State(shared): State<Arc<Shared>>) -> impl IntoResponse {
     let newest = shared.newest.borrow().clone();
-    let stale = shared.age(&newest).is_none_or(|age| age > STALE);
+    // A recording or a plan has no frame that could be late.
+    let is_still = shared.watched.recording.is_some() || shared.watched.planner.is_some();
+    let stale = !is_still && shared.age(&newest).is_none_or(|age| age > STALE);
     let status = if stale { StatusCode::SERVICE_UNAVAILABLE } else { StatusCode::OK };
     let value = json!({
         "well": !stale,

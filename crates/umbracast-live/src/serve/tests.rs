@@ -11,12 +11,7 @@ use crate::warnings::Warnings;
 
 fn server(token: Option<&str>) -> (Server, HostClock) {
     let clock = HostClock::start();
-    let watched = Watched {
-        site: Config::default().site,
-        counters: Arc::new(Counters::default()),
-        clock,
-        title: "a test".to_owned(),
-    };
+    let watched = Watched::new(Config::default().site, Arc::new(Counters::default()), clock, "a test");
     let door = Door::at(SocketAddr::from(([127, 0, 0, 1], 0)));
     let door = Door { hosts: vec!["hall.example".to_owned()], token: token.map(str::to_owned), ..door };
     (start(door, watched).unwrap(), clock)
@@ -88,6 +83,56 @@ fn curl_gets_what_the_page_gets() {
         status == 200 && page.contains("<canvas") && !page.contains("https://"),
         "nothing is loaded from elsewhere"
     );
+    let heads = page.len();
+    assert!((40_000..1 << 20).contains(&heads), "the whole page has {heads} bytes");
+    server.stop();
+}
+
+#[test]
+fn the_whole_scan_comes_only_while_somebody_asks_and_a_recording_only_where_there_is_one() {
+    let (server, _) = server(None);
+    assert_eq!(get(&server, "/api/scan", "").0, 204, "no frame was left yet");
+    for path in ["/api/recording", "/api/recording/frames?from=0&count=5", "/api/recording/scan?frame=3"] {
+        assert_eq!(get(&server, path, "").0, 404, "{path}");
+    }
+    assert_eq!(get(&server, "/api/recording/frames?from=-1&count=5", "").0, 400);
+    server.stop();
+    let mut watched = Watched::new(Config::default().site, Arc::default(), HostClock::start(), "a recording");
+    let recording =
+        Arc::new(crate::recording::Recording::new(vec!["default".to_owned()], 2.0, false, false).unwrap());
+    recording.add(&[Published { frame: 9, ..Published::default() }], None, || vec![1, 2, 3]);
+    watched.recording = Some(recording);
+    let server = start(Door::at(SocketAddr::from(([127, 0, 0, 1], 0))), watched).unwrap();
+    let frames: Value =
+        serde_json::from_str(&get(&server, "/api/recording/frames?from=0&count=5", "").1).unwrap();
+    assert_eq!((&frames[0]["frames"][0]["frame"], frames.as_array().unwrap().len()), (&json!(9), 1));
+    assert_eq!(get(&server, "/health", "").0, 200, "a recording is never late");
+    server.stop();
+}
+
+#[test]
+fn a_planner_answers_and_says_what_is_wrong() {
+    let mut watched = Watched::new(Config::default().site, Arc::default(), HostClock::start(), "a plan");
+    watched.planner = Some(Planner::new(|name, body| match name {
+        "length" => Ok(json!({ "length": body.len() }).to_string()),
+        _ => Err(Error::new(format!("expected length, found {name}"))),
+    }));
+    let server = start(Door::at(SocketAddr::from(([127, 0, 0, 1], 0))), watched).unwrap();
+    let post = |name: &str, length: usize, heads: &str| {
+        let mut stream = TcpStream::connect(server.address()).unwrap();
+        let host = server.address();
+        write!(stream, "POST /api/plan/{name} HTTP/1.1\r\nHost: {host}\r\nContent-Length: {length}\r\nConnection: close\r\n{heads}\r\n").unwrap();
+        let _ = stream.write_all(&vec![b'x'; if length < 1000 { length } else { 0 }]);
+        let mut answer = String::new();
+        let _ = stream.read_to_string(&mut answer);
+        answer
+    };
+    assert!(post("length", 7, "").ends_with("{\"length\":7}"));
+    let wrong = post("width", 7, "");
+    assert!(wrong.contains(" 400 ") && wrong.ends_with("expected length, found width\n"), "{wrong}");
+    assert!(post("length", 5 << 20, "").contains(" 413 "), "a question has a longest length");
+    assert!(post("length", 7, "Origin: http://elsewhere.example\r\n").contains(" 403 "));
+    assert!(get(&server, "/", "").1.contains("id=\"plan\""));
     server.stop();
 }
 
@@ -184,12 +229,12 @@ fn a_name_that_was_made_to_lead_here_is_refused_with_a_token_too() {
 
 #[test]
 fn a_host_that_is_no_name_is_refused_at_the_start() {
-    let watched = Watched {
-        site: Config::default().site,
-        counters: Arc::new(Counters::default()),
-        clock: HostClock::start(),
-        title: String::new(),
-    };
+    let watched = Watched::new(
+        Config::default().site,
+        Arc::new(Counters::default()),
+        HostClock::start(),
+        String::new(),
+    );
     let door = Door::at(SocketAddr::from(([127, 0, 0, 1], 0)));
     let door = Door { hosts: vec!["https://hall.example".to_owned()], ..door };
     let message = start(door, watched).err().unwrap().to_string();
@@ -198,12 +243,12 @@ fn a_host_that_is_no_name_is_refused_at_the_start() {
 
 #[test]
 fn an_address_that_others_reach_needs_a_token() {
-    let watched = Watched {
-        site: Config::default().site,
-        counters: Arc::new(Counters::default()),
-        clock: HostClock::start(),
-        title: String::new(),
-    };
+    let watched = Watched::new(
+        Config::default().site,
+        Arc::new(Counters::default()),
+        HostClock::start(),
+        String::new(),
+    );
     let message = start(Door::at(SocketAddr::from(([0, 0, 0, 0], 0))), watched).err().unwrap().to_string();
     assert!(message.contains("UMBRACAST_TOKEN"), "{message}");
 }

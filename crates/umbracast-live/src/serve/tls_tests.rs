@@ -24,7 +24,7 @@ mod with {
 
     fn watched() -> Watched {
         let site = Config::default().site;
-        Watched { site, counters: Arc::default(), clock: HostClock::start(), title: "a test".to_owned() }
+        Watched::new(site, Arc::default(), HostClock::start(), "a test")
     }
 
     #[test]
