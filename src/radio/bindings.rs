@@ -42,6 +42,9 @@ pub struct Binding {
 const LEAST_P: f64 = 0.01;
 /// Devices that are followed at most; reports of others are skipped.
 const DEVICES_MAX: usize = 4096;
+/// Reports that wait for a frame at most: half a second of every device and eight access points, every 20 ms, would be more, but no
+/// network tells all of it. What comes beyond is skipped.
+const WAITING_MAX: usize = 1 << 18;
 /// A device that was not heard for so long is forgotten.
 const FORGOTTEN_NS: i64 = 60_000_000_000;
 /// Reports may come so late, and be so far ahead of the frames. Frames of that time are kept.
@@ -133,8 +136,7 @@ impl Binder {
     pub fn hear(&mut self, reports: &[Report]) {
         for report in reports {
             let known = self.radios.get(report.access_point).is_some_and(Option::is_some);
-            let room = self.devices.contains_key(&report.device) || self.devices.len() < DEVICES_MAX;
-            if known && room && report.power_dbm.is_finite() {
+            if known && report.power_dbm.is_finite() && self.reports.len() < WAITING_MAX {
                 self.reports.push(*report);
             } else {
                 self.skipped += 1;
@@ -160,6 +162,10 @@ impl Binder {
         };
         let heard = self.due(time_ns);
         for report in &heard {
+            if self.devices.len() >= DEVICES_MAX && !self.devices.contains_key(&report.device) {
+                self.skipped += 1;
+                continue;
+            }
             let unheard = || Device::new(report.time_ns, self.radios.len());
             let device = self.devices.entry(report.device).or_insert_with(unheard);
             device.heard_ns = device.heard_ns.max(report.time_ns);
@@ -171,8 +177,9 @@ impl Binder {
         for (name, device) in &mut self.devices {
             device.follow(&now.tracks, self.radios.len());
             device.exchange(&moves, seconds);
-            let (own, rest) = of_device.split_at(of_device.iter().take_while(|r| r.device == *name).count());
-            of_device = rest;
+            // Both are in the order of devices; reports of devices too many stand between.
+            of_device = &of_device[of_device.partition_point(|report| report.device < *name)..];
+            let own = &of_device[..of_device.partition_point(|report| report.device == *name)];
             for of_access_point in own.chunk_by(|a, b| a.access_point == b.access_point) {
                 device.weigh(of_access_point, &self.frames, self.radios.len());
             }

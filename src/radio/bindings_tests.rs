@@ -147,3 +147,16 @@ fn broken_reports_are_counted_and_cost_nobody_anything() {
     assert_eq!(binder.skipped(), 4);
     assert!(bindings.iter().all(|binding| binding.device == 1 && binding.p.is_finite()), "{bindings:?}");
 }
+
+#[test]
+fn one_batch_of_devices_too_many_is_skipped_beyond_those_that_are_followed() {
+    let (mut binder, mut bindings) = (Binder::new(&site()), Vec::new());
+    let report = |device| Report { time_ns: 0, access_point: 0, device, power_dbm: -60.0 };
+    let many: Vec<Report> = (0..2 * DEVICES_MAX as u64).map(report).collect();
+    binder.hear(&many);
+    binder.bind(0, &[somebody(1, DVec2::ZERO, DVec2::ZERO)], &[Loss::clear(0, 1)], &mut bindings);
+    assert_eq!((binder.devices.len(), binder.skipped()), (DEVICES_MAX, DEVICES_MAX as u64));
+    let flood = vec![report(7); WAITING_MAX + 5];
+    binder.hear(&flood);
+    assert_eq!(binder.skipped(), DEVICES_MAX as u64 + 5);
+}

@@ -24,6 +24,8 @@ const PLACES_M: [(f32, f32); 5] = [
     (0.021_54, 0.239_31),
     (0.036_25, 0.118_46),
 ];
+/// So far beyond an edge, in Fresnel's parameter, a path is as free as any: its loss swings by .4 dB about nothing.
+const CLEAR_NU: f32 = 3.0;
 /// Nothing loses more: diffraction round a body, and what comes by other ways, leave at least this.
 const LEAST_POWER: f32 = 1e-5;
 /// Nobody holds an antenna nearer to an edge.
@@ -43,7 +45,8 @@ pub(super) struct Across {
     /// How much of the body's depth and of its width lie across the path: sine and cosine between its heading and the path.
     pub(super) turned: [f32; 2],
     pub(super) height_m: f32,
-    pub(super) width_scale: f32,
+    /// How much wider than a usual body: [`Wave::scale`].
+    pub(super) scale: f32,
 }
 
 /// A radio's numbers.
@@ -73,13 +76,30 @@ impl Wave {
         }
     }
 
+    /// How much wider a body is than a usual one.
+    #[inline(always)]
+    pub(super) fn scale(height_m: f32, width_scale: f32) -> f32 {
+        height_m / USUAL_M * width_scale
+    }
+
+    /// Whether a body stands so far beside a path that what it costs is not worth telling, whichever way it faces.
+    #[inline(always)]
+    pub(super) fn is_clear(&self, scale: f32, aside_m: f32, from_tx_m: f32, to_rx_m: f32) -> bool {
+        // Beyond the trunk's edge by CLEAR_NU of Fresnel's parameter, sqrt(2 / lambda (1 / d1 + 1 / d2)), squared.
+        let beyond_m = aside_m.abs() - larger(TRUNK_M[1], 0.5 * ADULT_M[0]) * scale;
+        let lengths_m = from_tx_m + to_rx_m;
+        beyond_m > 0.0
+            && 2.0 * self.per_wavelength * lengths_m * beyond_m * beyond_m
+                > CLEAR_NU * CLEAR_NU * from_tx_m * to_rx_m
+    }
+
     /// The share of the power that passes.
     #[inline(always)]
     pub(super) fn passing(&self, table: &Table, across: &Across) -> f32 {
         if across.from_tx_m < NEAREST_M || across.to_rx_m < NEAREST_M {
             return 1.0;
         }
-        let scale = across.height_m / USUAL_M * across.width_scale;
+        let scale = across.scale;
         let [depth, width] = across.turned;
         let half_m = scale
             * (TRUNK_M[0] * TRUNK_M[0] * depth * depth + TRUNK_M[1] * TRUNK_M[1] * width * width).sqrt();
@@ -107,15 +127,17 @@ impl Wave {
     #[inline(always)]
     fn kirchhoff(&self, table: &Table, across: &Across, parts: &[[f32; 3]; 2]) -> f32 {
         let per_m = self.nu_per_m(across, slant(across));
-        let up = parts.map(|[_, bottom_m, top_m]| {
-            table.between(per_m * (bottom_m - across.path_m), per_m * (top_m - across.path_m))
-        });
+        let edge = |height_m: f32| table.integrals(per_m * (height_m - across.path_m));
+        // The trunk ends where the head begins.
+        let [foot, shoulders, top] = [parts[0][1], parts[1][1], parts[1][2]].map(edge);
+        let up = [between(foot, shoulders), between(shoulders, top)];
         let mut power = 0.0;
         for (off_m, weight) in PLACES_M {
             let at_m = across.aside_m + off_m;
             let mut through = [0.0; 2];
             for ([half_m, ..], up) in parts.iter().zip(&up) {
-                let side = table.between(per_m * (at_m - half_m), per_m * (at_m + half_m));
+                let [right, left] = [at_m - half_m, at_m + half_m].map(|m| table.integrals(per_m * m));
+                let side = between(right, left);
                 through[0] += side[0] * up[0] - side[1] * up[1];
                 through[1] += side[0] * up[1] + side[1] * up[0];
             }
@@ -164,6 +186,12 @@ impl Wave {
         // Beside the body the sum of powers is that of a free path and of what the far edge adds.
         smaller(round(half_m - across.aside_m) + round(half_m + across.aside_m) + over, 1.0)
     }
+}
+
+/// K(a, b) = C(b) - C(a) - j (S(b) - S(a)) of the integrals at a and b: what comes through between two edges, but for a factor.
+#[inline(always)]
+fn between([c0, s0]: [f32; 2], [c1, s1]: [f32; 2]) -> [f32; 2] {
+    [c1 - c0, s0 - s1]
 }
 
 #[inline(always)]

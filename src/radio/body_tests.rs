@@ -47,7 +47,7 @@ fn compare(table: &Table, case: &Case) -> f64 {
         slope: passage.slope as f32,
         turned: case.turned,
         height_m: USUAL_M,
-        width_scale: 1.0,
+        scale: 1.0,
     };
     let [depth, width] = case.turned.map(f64::from);
     let half_m = (0.13 * depth).hypot(0.28 * width);

@@ -35,13 +35,6 @@ impl Table {
         };
         of_size.map(|part| part.copysign(x))
     }
-
-    /// K(a, b) = C(b) - C(a) - j (S(b) - S(a)): what comes through between two edges, but for a factor.
-    #[inline(always)]
-    pub(super) fn between(&self, from: f32, to: f32) -> [f32; 2] {
-        let ([c0, s0], [c1, s1]) = (self.integrals(from), self.integrals(to));
-        [c1 - c0, s0 - s1]
-    }
 }
 
 /// The same in double precision.

@@ -5,14 +5,17 @@ use std::time::Duration;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
-use umbracast::{Config, Error};
+use umbracast::geometry::{DVec2, DVec3};
+use umbracast::radio::{Passage, models::kirchhoff_mean};
+use umbracast::{Config, Error, Site};
+use umbracast_sim::body::{PersonState, Walker};
 use umbracast_sim::random::stream;
 
 use crate::case::Case;
 use crate::experiment::{BEGIN_TICKS, Spec, Truths};
 use crate::foreseen::Foreteller;
 use crate::hall::Seen;
-use crate::truth::Traces;
+use crate::truth::{TICK_NS, Traces};
 
 /// A fade is deeper.
 const FADE_DB: f64 = 10.0;
@@ -38,6 +41,9 @@ pub struct Compared {
     pub within: [u64; 2],
     /// By step ahead: how many truths there are.
     pub count: [u64; 2],
+    /// The first of these again: sum of squared differences of what the trunk and head lose that stand at everybody's true
+    /// place, dB^2. No forecast can do better with such bodies.
+    pub placed_db2: f64,
     /// How long the losses of each frame took.
     pub took: Vec<Duration>,
 }
@@ -51,6 +57,11 @@ impl Compared {
     /// The share of truths within the 10 and 90 % told.
     pub fn coverage(&self, ahead: usize) -> f64 {
         self.within[ahead] as f64 / self.count[ahead].max(1) as f64
+    }
+
+    /// Root of the mean squared difference with a trunk and a head at everybody's true place, dB.
+    pub fn rmse_placed_db(&self) -> f64 {
+        (self.placed_db2 / self.count[0].max(1) as f64).sqrt()
     }
 
     /// How long the losses of a frame took at this share of frames, milliseconds.
@@ -68,6 +79,7 @@ impl Compared {
             self.within[ahead] += other.within[ahead];
             self.count[ahead] += other.count[ahead];
         }
+        self.placed_db2 += other.placed_db2;
         self.took.extend(other.took);
     }
 }
@@ -116,12 +128,13 @@ fn of_scene(
     for frame in &seen.ours {
         let said = foreteller.foresee(frame, traces);
         compared.took.push(foreteller.fading);
-        let tick = (frame.time_ns / crate::truth::TICK_NS) as usize;
+        let tick = (frame.time_ns / TICK_NS) as usize;
         for (ahead, steps) in STEPS_AHEAD.into_iter().enumerate() {
             let then = tick + steps * STEP_TICKS;
             if tick < BEGIN_TICKS || then >= traces.ticks {
                 continue;
             }
+            let bodies = Bodies::at(&seen.walkers, then as i64 * TICK_NS);
             for person in 0..traces.people {
                 let Some(index) = said.index_of[person] else { continue };
                 for access_point in 0..traces.access_points {
@@ -134,11 +147,55 @@ fn of_scene(
                     compared.squares_db2[ahead] += (told_db - came_db).powi(2);
                     compared.within[ahead] += u64::from((low_db..=high_db).contains(&came_db));
                     compared.count[ahead] += 1;
+                    if ahead == 0 {
+                        let placed_db = bodies.loss_db(&config.site, access_point, person);
+                        compared.placed_db2 += (placed_db - came_db).powi(2);
+                    }
                 }
             }
         }
     }
     Ok(compared)
+}
+
+/// Everybody where they are, as a trunk and a head.
+struct Bodies(Vec<Option<PersonState>>);
+
+/// Half depth and half width of a trunk, half width of a head, for a body of so many metres; and where the shoulders end, as a
+/// share of the height: those of the runtime's.
+const TRUNK_M: [f64; 2] = [0.13, 0.28];
+const HEAD_M: f64 = 0.10;
+const USUAL_M: f64 = 1.72;
+const SHOULDERS: f64 = 0.82;
+/// Powers are averaged over places of the body so far to either side.
+const WITHIN_M: f64 = 0.04;
+
+impl Bodies {
+    fn at(walkers: &[Walker], time_ns: i64) -> Self {
+        Self(walkers.iter().map(|walker| walker.state_at(time_ns)).collect())
+    }
+
+    /// What others cost a link, by Kirchhoff's integral as the runtime's.
+    fn loss_db(&self, site: &Site, access_point: usize, person: usize) -> f64 {
+        let ap = &site.access_points[access_point];
+        let (Some(owner), Some(radio)) = (&self.0[person], ap.radio) else { return 0.0 };
+        let of_axis_m = site.ue.on_body(owner.position_m, owner.heading_rad, owner.height_m);
+        let (ap_m, ue_m) = (ap.position(), of_axis_m + DVec3::Z * owner.floor_m);
+        let along = (ap_m - ue_m).truncate().normalize_or_zero();
+        let others = self.0.iter().enumerate().filter(|(other, _)| *other != person);
+        let of_body_db = |body: &PersonState| {
+            let Some(passage) = Passage::new(ap_m, ue_m, body.position_m, body.floor_m) else { return 0.0 };
+            let (scale, facing) = (body.height_m / USUAL_M, DVec2::from_angle(body.heading_rad));
+            let half_m = scale * (TRUNK_M[0] * along.perp_dot(facing)).hypot(TRUNK_M[1] * along.dot(facing));
+            let shoulders_m = SHOULDERS * body.height_m;
+            let parts = [
+                passage.rectangle(half_m, 0.0, shoulders_m),
+                passage.rectangle(HEAD_M * scale, shoulders_m, body.height_m),
+            ];
+            kirchhoff_mean(radio.wavelength_m(), &passage, &parts, WITHIN_M)
+        };
+        others.filter_map(|(_, body)| body.as_ref().map(of_body_db)).sum()
+    }
 }
 
 /// The truth about fades, NaN elsewhere: by instant, access point and person. With `spread` each fade is deeper or shallower than

@@ -17,5 +17,6 @@ pub mod case;
 pub mod hall;
 pub mod experiment;
 pub mod fades;
+pub mod passages;
 pub mod trace;
 pub mod report;

@@ -160,6 +160,7 @@ pub fn to_text(rows: &[Row]) -> String {
 /// Losses told beside those that came.
 pub fn fades_to_text(all: &[Compared]) -> String {
     let mut text = "about fades of 10 dB and more, 400 ms to each side: RMSE of the median told, share of truths within 10 to 90 %\n\
+                    true places: RMSE of a trunk and a head by the same integral where everybody is in truth\n\
                     spread: that of real fades about a model is in what is told and in the truth\n"
         .to_owned();
     for of in all {
@@ -170,7 +171,10 @@ pub fn fades_to_text(all: &[Compared]) -> String {
             let (rmse_db, coverage) = (of.rmse_db(ahead), of.coverage(ahead));
             text += &format!("; {} ms ahead {rmse_db:.2} dB, {coverage:.3}", 100 * steps);
         }
-        text += &format!("; {:.2} ms a frame (median), {:.2} ms (99 %)\n", of.took_ms(0.5), of.took_ms(0.99));
+        let (placed_db, median_ms, most_ms) = (of.rmse_placed_db(), of.took_ms(0.5), of.took_ms(0.99));
+        text += &format!(
+            "; true places {placed_db:.2} dB; {median_ms:.2} ms a frame (median), {most_ms:.2} ms (99 %)\n"
+        );
     }
     text
 }
@@ -185,6 +189,7 @@ pub fn fades_to_json(all: &[Compared]) -> Value {
             value[format!("rmse_{}_ms_db", 100 * steps)] = of.rmse_db(ahead).into();
             value[format!("coverage_{}_ms", 100 * steps)] = of.coverage(ahead).into();
         }
+        value["rmse_true_places_db"] = of.rmse_placed_db().into();
         value["losses_ms_median"] = of.took_ms(0.5).into();
         value["losses_ms_p99"] = of.took_ms(0.99).into();
         value

@@ -25,6 +25,10 @@ use umbracast_node::network::Network;
 
 #[path = "node_faults/fleet.rs"]
 mod fleet;
+#[path = "node_faults/forged.rs"]
+mod forged;
+#[path = "node_faults/leaders.rs"]
+mod leaders;
 
 const PLACES: [(&str, &str); 3] = [("edge", "10.77.0.2"), ("server", "10.77.0.3"), ("radio", "10.77.0.4")];
 /// The bad wire's ends.
@@ -248,7 +252,10 @@ impl Bench {
             "\n{:44} {:40} {:>7} {:>7} {:>9} {:>11} {:>10}",
             "what failed", "what must happen", "frames", "lost", "gap, ms", "recovers,s", "renumbered"
         );
-        self.vanishing(&self.record("long", "26")?)?;
+        let long = self.record("long", "26")?;
+        self.vanishing(&long)?;
+        self.forged(&recording)?;
+        self.leaders(&long)?;
         for fault in FAULTS.iter().filter(|fault| fault.short || !self.short) {
             let (seen, well) = self.fault(fault, &recording)?;
             println!("{:44} {:40} {seen}", fault.what, fault.must);

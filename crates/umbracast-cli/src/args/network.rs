@@ -66,6 +66,10 @@ pub struct Network {
     /// --out. `ns3` is for examples/ns3/umbracast-loss.h.
     #[arg(long, value_name = "SIMULATOR", value_parser = ["ns3"], requires = "out", conflicts_with_all = ["policies", "losses"])]
     pub trace: Option<String>,
+    /// Compare the shape of real fades with the model's instead: a table of passages in the form of IMMERSE
+    /// (docs/NETWORK.md).
+    #[arg(long, value_name = "TRACES.csv", conflicts_with_all = ["policies", "losses", "trace"])]
+    pub shape: Option<PathBuf>,
     /// Folder for the table, network.csv, and the same as network.json.
     #[arg(long, value_name = "DIR", conflicts_with = "losses")]
     pub out: Option<PathBuf>,

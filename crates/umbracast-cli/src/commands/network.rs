@@ -6,7 +6,7 @@ use umbracast_network::case::{Sweep, with_radios};
 use umbracast_network::experiment::{self, Spec};
 use umbracast_network::hall::{Crowd, Hall};
 use umbracast_network::policy::Policy;
-use umbracast_network::{fades, report, trace};
+use umbracast_network::{fades, passages, report, trace};
 
 use crate::args::{Common, Network};
 use crate::ending::Ending;
@@ -15,6 +15,14 @@ use crate::{say, setup};
 
 /// Plays every case of the sweep.
 pub fn run(args: &Network, common: &Common) -> Result<Ending, Error> {
+    if let Some(file) = &args.shape {
+        let shapes = passages::compare(&setup::read_text(file)?, &file.display().to_string())?;
+        say::text(&match common.json {
+            true => format!("{}\n", passages::to_json(&shapes)),
+            false => passages::to_text(&shapes),
+        });
+        return Ok(Ending::Done);
+    }
     let site = setup::config(Mode::Default, args.site.site.as_deref())?;
     let is_given = site.site.has_radio();
     let config = with_radios(&site, args.own_body);
