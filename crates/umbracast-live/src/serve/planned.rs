@@ -55,7 +55,8 @@ pub(super) async fn answer(
         Ok(Ok(body)) => body,
         Ok(Err(_)) => return long(),
         Err(_) => {
-            return (StatusCode::REQUEST_TIMEOUT, "expected the whole question within 10 s\n").into_response();
+            return (StatusCode::REQUEST_TIMEOUT, "expected the whole question within 10 s\n")
+                .into_response();
         }
     };
     let _one = planner.one.lock().await;
