@@ -4,6 +4,7 @@ import ast
 import doctest
 import inspect
 import re
+import os
 import subprocess
 import sys
 import threading
@@ -62,13 +63,16 @@ def signature(of, drop=()):
     return [part for part in named if part[0] not in drop]
 
 
-def test_types_are_strict():
+def test_types_are_strict(tmp_path):
     pytest.importorskip("mypy")
+    # An installed package is found by itself; a folder of installed packages would be looked through whole.
+    installed = PACKAGE.parent.name in ("site-packages", "dist-packages")
     told = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", "--ignore-missing-imports", "-p", "umbracast"],
         capture_output=True,
         text=True,
-        cwd=PACKAGE.parent,
+        cwd=tmp_path,
+        env={**os.environ, **({} if installed else {"MYPYPATH": str(PACKAGE.parent)})},
     )
     assert told.returncode == 0, told.stdout
 

@@ -39,9 +39,9 @@ struct Heard {
 /// What fails, from `FAILS_AFTER` on, and for how long; whether it is among the few.
 const CASES: [(&str, Fails, u64, bool); 4] = [
     ("of two whole processes the leader is stopped for 3 s", Fails::Leader, 3, false),
-    ("the same of the one that stands by", Fails::Other, 3, false),
+    ("of two whole processes the other is stopped for 3 s", Fails::Other, 3, false),
     ("of two whole processes the leader is cut off for 6 s", Fails::Wire, 6, false),
-    ("the same for 12 s", Fails::Wire, 12, true),
+    ("of two whole processes the leader is cut off for 12 s", Fails::Wire, 12, true),
 ];
 
 #[derive(Clone, Copy)]
