@@ -18,9 +18,9 @@ mod height;
 pub mod width;
 mod heading;
 mod followed;
-mod given;
 mod origin;
 mod person;
+mod given;
 mod mixture;
 mod paper;
 

@@ -2,14 +2,14 @@
 //!
 //! A new target is a `Target` beside the others of its kind and a line in [`TARGETS`].
 
+mod step;
+mod packets;
 mod files;
 mod tables;
 mod settings;
-mod packets;
 mod messages;
 mod requests;
 mod plans;
-mod step;
 
 /// Where bytes come in.
 #[derive(Debug, Clone, Copy)]

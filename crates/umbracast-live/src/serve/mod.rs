@@ -17,6 +17,7 @@
 //! The server has a thread of its own with one worker. A slow or hostile client can take time from other clients
 //! only, never from the pipeline, which only leaves the newest frame here.
 
+mod planned;
 mod watched;
 mod tls;
 mod connections;
@@ -25,7 +26,6 @@ mod looked_at;
 mod metrics;
 mod openapi;
 mod pages;
-mod planned;
 
 use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
