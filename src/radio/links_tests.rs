@@ -83,12 +83,17 @@ fn somebody_who_crosses_a_link_takes_it_out_when_he_is_there() {
 #[test]
 fn the_spread_of_real_fades_widens_what_is_told() {
     let tracks = [(4.0, 0), (2.0, 1)].map(|(x, id)| somebody(id, DVec2::new(x, 0.0), DVec2::ZERO));
-    let width_db = |fade_spread| {
-        let (.., losses) = faded(&config(fade_spread), &tracks);
+    let width_of = |losses: &[Loss]| {
         let [low, _, high] = losses.iter().find(|l| l.access_point == 0 && l.track == 1).unwrap().now_db;
         high - low
     };
-    assert!(width_db(true) > width_db(false) + 2.0, "{} {}", width_db(true), width_db(false));
+    let width_db = |fade_spread| width_of(&faded(&config(fade_spread), &tracks).2);
+    let (caster, mut fader, mut losses) = faded(&config(false), &tracks);
+    fader.spreads.values_mut().for_each(|spread| spread.fill(0.0));
+    fader.fade(&caster, &mut losses);
+    let (none_db, shape_db, both_db) = (width_of(&losses), width_db(false), width_db(true));
+    assert!(both_db > none_db + 5.0, "{both_db} {none_db}");
+    assert!(both_db > shape_db + 2.0 && shape_db > none_db, "{both_db} {shape_db} {none_db}");
     assert_eq!([false, true].map(|fades| spread_db(0.0, fades)), [0.0; 2]);
     assert_eq!((spread_db(4.0, false), spread_db(40.0, false)), (2.4, 4.0));
     assert!((spread_db(4.0, true) - 2.4_f64.hypot(3.3)).abs() < 1e-12);

@@ -4,41 +4,25 @@
 #[path = "chromium/mod.rs"]
 mod chromium;
 
-use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, Stdio};
 
-use chromium::Page;
-
-/// A run that ends with this. It would end by itself where nobody held the other side of what it says.
-struct Demo(Child, #[expect(dead_code, reason = "held, not read")] BufReader<ChildStdout>);
-
-impl Drop for Demo {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// A demonstration on a free port, and its address.
-fn demonstration() -> (Demo, String) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_umbracast"))
-        .args(["live", "--demo", "--people", "8", "--serve", "127.0.0.1:0", "--seed", "100300", "--quiet"])
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("starts");
-    let mut line = String::new();
-    let mut said = BufReader::new(child.stdout.take().expect("piped"));
-    said.read_line(&mut line).expect("a line");
-    let address = line.trim().strip_prefix("page: ").expect("the page's address").to_owned();
-    (Demo(child, said), address)
-}
+use chromium::{Page, Served};
 
 #[test]
 fn people_move_links_turn_and_the_last_minute_can_be_gone_back_through() {
     let profile = Path::new(env!("CARGO_TARGET_TMPDIR")).join("chromium");
     let _ = std::fs::remove_dir_all(&profile);
-    let (_demo, address) = demonstration();
+    let (_demo, address) = Served::start([
+        "live",
+        "--demo",
+        "--people",
+        "8",
+        "--serve",
+        "127.0.0.1:0",
+        "--seed",
+        "100300",
+        "--quiet",
+    ]);
     let Some(mut page) = Page::open(&address, &profile) else { return };
     page.size(1400, 900);
     page.until("document.body.dataset.people >= 6");

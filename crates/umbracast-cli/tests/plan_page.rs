@@ -4,37 +4,10 @@
 #[path = "chromium/mod.rs"]
 mod chromium;
 
-use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::path::PathBuf;
 
-use chromium::Page;
+use chromium::{Page, Served};
 use serde_json::json;
-
-/// A run that ends with this.
-struct Planning(Child, #[expect(dead_code, reason = "held, not read")] BufReader<ChildStdout>);
-
-impl Drop for Planning {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// A plan of that file on a free port, and the page's address.
-fn planning(file: &Path) -> (Planning, String) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_umbracast"))
-        .args(["plan", "--serve", "127.0.0.1:0", "--site"])
-        .arg(file)
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("starts");
-    let mut line = String::new();
-    let mut said = BufReader::new(child.stdout.take().expect("piped"));
-    said.read_line(&mut line).expect("a line");
-    let address = line.trim().strip_prefix("page: ").expect("the page's address").to_owned();
-    (Planning(child, said), address)
-}
 
 /// The pixel of a place on the floor.
 fn pixel(page: &mut Page, x: f64, y: f64) -> [f64; 2] {
@@ -62,7 +35,8 @@ fn a_sensor_is_dragged_the_maps_follow_and_the_file_keeps_its_comments() {
     let text = "# Above the doors.\n[site]\nname = \"planned\"\n\n[[site.sensors]] # the first\nname = \"east\"\n\
                 position_m = [12.5, 0.0, 6.0]\nrotation_deg = { yaw = 180.0, pitch = 35.0, roll = 0.0 } # measured\n";
     std::fs::write(&file, text).expect("writes");
-    let (_planning, address) = planning(&file);
+    let named = file.display().to_string();
+    let (_planning, address) = Served::start(["plan", "--serve", "127.0.0.1:0", "--site", &named]);
     let Some(mut page) = Page::open(&address, &profile) else { return };
     page.size(1400, 900);
     page.until("+document.body.dataset.mapped >= 1 && !dirty");

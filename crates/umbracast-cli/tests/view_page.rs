@@ -3,22 +3,12 @@
 #[path = "chromium/mod.rs"]
 mod chromium;
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::Command;
 
-use chromium::Page;
-
-/// A run that ends with this.
-struct Viewing(Child, #[expect(dead_code, reason = "held, not read")] BufReader<ChildStdout>);
-
-impl Drop for Viewing {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
+use chromium::{Page, Served};
 
 /// Two people cross the hall for four seconds.
 fn recorded(folder: &Path) {
@@ -58,17 +48,18 @@ fn any_frame_is_shown_at_any_speed_with_the_truth_and_a_second_mode_beside() {
     let _ = std::fs::remove_dir_all(&profile);
     let _ = std::fs::remove_dir_all(&recording);
     recorded(&recording);
-    let mut child = Command::new(env!("CARGO_BIN_EXE_umbracast"))
-        .args(["view", "--serve", "127.0.0.1:0", "--beside", "paper", "--rate", "2", "--quiet"])
-        .arg(recording.join("scene-0000.mcap"))
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("starts");
-    let mut line = String::new();
-    let mut said = BufReader::new(child.stdout.take().expect("piped"));
-    said.read_line(&mut line).expect("a line");
-    let address = line.trim().strip_prefix("page: ").expect("the page's address").to_owned();
-    let _viewing = Viewing(child, said);
+    let scene = recording.join("scene-0000.mcap").display().to_string();
+    let (_viewing, address) = Served::start([
+        "view",
+        "--serve",
+        "127.0.0.1:0",
+        "--beside",
+        "paper",
+        "--rate",
+        "2",
+        "--quiet",
+        &scene,
+    ]);
     let Some(mut page) = Page::open(&address, &profile) else { return };
     page.size(1400, 900);
     page.until("recording && recording.about.done && recording.about.frames > 30");

@@ -307,17 +307,7 @@ impl Bench {
         let watch = Arc::<Mutex<Vec<Seen>>>::default();
         let _looking = look(&watch, &[format!("tcp/{radio}:7447"), format!("tcp/{server}:7447")])?;
         sleep(Duration::from_secs(1));
-        let replay = format!(
-            "exec ip netns exec edge {} replay {recording} --to 127.0.0.1:2368 --quiet",
-            self.command.display()
-        );
-        let mut replay = Running(
-            Command::new("bash")
-                .args(["-c", &replay])
-                .stdout(Stdio::null())
-                .spawn()
-                .map_err(|e| Error::new(e.to_string()))?,
-        );
+        let mut replay = self.replay(recording)?;
         sleep(FAILS_AFTER);
         let failed = clock();
         let restored = match fault.kind {
@@ -349,6 +339,16 @@ impl Bench {
         sleep(Duration::from_secs(1));
         let seen = std::mem::take(&mut *watch.lock().unwrap_or_else(PoisonError::into_inner));
         Ok(account(seen, failed, restored, fault.doubled))
+    }
+
+    /// Sends a recording's packets to the front ends, from their place.
+    fn replay(&self, recording: &str) -> Result<Running, Error> {
+        let command = format!(
+            "exec ip netns exec edge {} replay {recording} --to 127.0.0.1:2368 --quiet",
+            self.command.display()
+        );
+        let child = Command::new("bash").args(["-c", &command]).stdout(Stdio::null()).spawn();
+        child.map(Running).map_err(|e| Error::new(e.to_string()))
     }
 
     /// In place of the wire between edge and server.

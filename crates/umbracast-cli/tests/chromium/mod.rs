@@ -1,14 +1,40 @@
-//! A headless Chromium, driven over its DevTools protocol.
+//! A headless Chromium, driven over its DevTools protocol, and what it looks at.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 use serde_json::{Value, json};
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
+
+/// A command that serves a page. It ends with this, and would end by itself where nobody held the other side of what it says.
+pub struct Served(Child, #[expect(dead_code, reason = "held, not read")] BufReader<ChildStdout>);
+
+impl Served {
+    /// Starts `umbracast` and waits until it says where the page is; its address.
+    pub fn start<I: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = I>) -> (Self, String) {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_umbracast"))
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("starts");
+        let mut line = String::new();
+        let mut said = BufReader::new(child.stdout.take().expect("piped"));
+        said.read_line(&mut line).expect("a line");
+        let address = line.trim().strip_prefix("page: ").expect("the page's address").to_owned();
+        (Self(child, said), address)
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
 
 /// The browser and one page in it. Both end with this.
 pub struct Page {

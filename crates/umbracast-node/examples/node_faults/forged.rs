@@ -1,7 +1,6 @@
 //! Messages with numbers that cannot be, from whoever may write: nobody else may lose anything for them, `fleet` names the sender, and
 //! nodes end when they are asked to.
 
-use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::sleep;
 use std::time::Duration;
@@ -16,7 +15,7 @@ use umbracast_node::hall::{Hall, Outlet, Urgency};
 use umbracast_node::keys::Keys;
 use umbracast_node::network::Network;
 
-use super::{Bench, FAILS_AFTER, PLACES, Running, Seen, account, clock, look, shell};
+use super::{Bench, FAILS_AFTER, PLACES, Seen, account, clock, look, shell};
 
 const FOR: Duration = Duration::from_secs(3);
 const SECOND_NS: i64 = 1_000_000_000;
@@ -80,12 +79,7 @@ impl Bench {
         let watch = Arc::<Mutex<Vec<Seen>>>::default();
         let _looking = look(&watch, &[format!("tcp/{radio}:7447")])?;
         sleep(Duration::from_secs(1));
-        let replay = format!(
-            "exec ip netns exec edge {} replay {recording} --to 127.0.0.1:2368 --quiet",
-            self.command.display()
-        );
-        let replay = Command::new("bash").args(["-c", &replay]).stdout(Stdio::null()).spawn();
-        let mut replay = Running(replay.map_err(|e| Error::new(e.to_string()))?);
+        let mut replay = self.replay(recording)?;
         sleep(FAILS_AFTER);
         let begun = clock();
         let forger = Forger::new(&[format!("tcp/{server}:7447")])?;

@@ -2,7 +2,6 @@
 //! they do not hear each other.
 
 use std::collections::BTreeSet;
-use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::sleep;
 use std::time::Duration;
@@ -16,7 +15,7 @@ use umbracast_node::keys::Keys;
 use umbracast_node::network::Network;
 use umbracast_node::terms::Terms;
 
-use super::{Bench, FAILS_AFTER, PLACES, Running, shell};
+use super::{Bench, FAILS_AFTER, PLACES, shell};
 
 /// Links that come so much later after their frame than the promptest of all are stale: frames have the recording's time.
 const STALE_NS: i64 = 1_000_000_000;
@@ -80,12 +79,7 @@ impl Bench {
         let heard = Arc::<Mutex<Heard>>::default();
         let _controller = controller(&heard, &[format!("tcp/{edge}:7447")])?;
         sleep(Duration::from_secs(2));
-        let replay = format!(
-            "exec ip netns exec edge {} replay {recording} --to 127.0.0.1:2368 --quiet",
-            self.command.display()
-        );
-        let replay = Command::new("bash").args(["-c", &replay]).stdout(Stdio::null()).spawn();
-        let mut replay = Running(replay.map_err(|e| Error::new(e.to_string()))?);
+        let mut replay = self.replay(recording)?;
         sleep(FAILS_AFTER);
         let (begins, ends) = match fails {
             Fails::Leader => (format!("kill -STOP {}", first.0.id()), format!("kill -CONT {}", first.0.id())),

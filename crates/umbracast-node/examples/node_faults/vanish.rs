@@ -1,14 +1,13 @@
 //! Hosts that vanish without a reset, as when a cable is pulled: nobody else may lose a frame for it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::sleep;
 use std::time::Duration;
 
 use umbracast::Error;
 
-use super::{Bench, FAILS_AFTER, PLACES, Running, Seen, account, clock, look, shell};
+use super::{Bench, FAILS_AFTER, PLACES, Seen, account, clock, look, shell};
 
 /// Longer than Zenoh waits for a connection (2 s) and for its close (10 s).
 const AWAY: Duration = Duration::from_secs(14);
@@ -95,12 +94,7 @@ impl Bench {
         let watch = Arc::<Mutex<Vec<Seen>>>::default();
         let _looking = look(&watch, &[format!("tcp/{radio}:7447")])?;
         sleep(Duration::from_secs(2));
-        let replay = format!(
-            "exec ip netns exec edge {} replay {recording} --to 127.0.0.1:2368 --quiet",
-            self.command.display()
-        );
-        let replay = Command::new("bash").args(["-c", &replay]).stdout(Stdio::null()).spawn();
-        let mut replay = Running(replay.map_err(|e| Error::new(e.to_string()))?);
+        let mut replay = self.replay(recording)?;
         sleep(FAILS_AFTER);
         let failed = clock();
         shell(&format!("ip link set {wire} down"))?;
