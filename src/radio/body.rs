@@ -3,15 +3,15 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
+use super::passage;
 use super::table::Table;
 use crate::site::{LossModel, Radio};
 
-/// Half depth and half width of a trunk of usual width with its arms, half width of a head, for a body of [`USUAL_M`].
-const TRUNK_M: [f32; 2] = [0.13, 0.28];
-const HEAD_M: f32 = 0.10;
-const USUAL_M: f32 = 1.72;
-/// Where the shoulders end, as a share of the height.
-const SHOULDERS: f32 = 0.82;
+/// The body of [`super::Passage::trunk_and_head`].
+const TRUNK_M: [f32; 2] = [passage::TRUNK_M[0] as f32, passage::TRUNK_M[1] as f32];
+const HEAD_M: f32 = passage::HEAD_M as f32;
+const USUAL_M: f32 = passage::USUAL_M as f32;
+const SHOULDERS: f32 = passage::SHOULDERS as f32;
 /// 3GPP TR 38.901: the human that blocks, and the adult of the sensing channel; width and height.
 const HUMAN_M: [f32; 2] = [0.3, 1.7];
 const ADULT_M: [f32; 2] = [0.5, 1.75];

@@ -2,6 +2,13 @@
 
 use crate::geometry::{DVec2, DVec3};
 
+/// Half depth and half width of a trunk of usual width with its arms, half width of a head, for a body of [`USUAL_M`].
+pub(super) const TRUNK_M: [f64; 2] = [0.13, 0.28];
+pub(super) const HEAD_M: f64 = 0.10;
+pub(super) const USUAL_M: f64 = 1.72;
+/// Where the shoulders end, as a share of the height.
+pub(super) const SHOULDERS: f64 = 0.82;
+
 /// A path past the vertical axis of a body, seen from above and from the side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Passage {
@@ -60,6 +67,14 @@ impl Passage {
             across_m: [self.aside_m - half_width_m, self.aside_m + half_width_m],
             up_m: [bottom_m - self.height_m, top_m - self.height_m],
         }
+    }
+
+    /// A trunk and a head, as wide as they show across the path. `turned` is how much of the body's depth and of its width lie
+    /// across: sine and cosine between its heading and the path. `width_scale` is that of its tracks.
+    pub fn trunk_and_head(&self, height_m: f64, width_scale: f64, turned: [f64; 2]) -> [Rectangle; 2] {
+        let (scale, shoulders_m) = (height_m / USUAL_M * width_scale, SHOULDERS * height_m);
+        let half_m = scale * (TRUNK_M[0] * turned[0]).hypot(TRUNK_M[1] * turned[1]);
+        [self.rectangle(half_m, 0.0, shoulders_m), self.rectangle(HEAD_M * scale, shoulders_m, height_m)]
     }
 }
 

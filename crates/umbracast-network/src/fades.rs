@@ -161,12 +161,6 @@ fn of_scene(
 /// Everybody where they are, as a trunk and a head.
 struct Bodies(Vec<Option<PersonState>>);
 
-/// Half depth and half width of a trunk, half width of a head, for a body of so many metres; and where the shoulders end, as a
-/// share of the height: those of the runtime's.
-const TRUNK_M: [f64; 2] = [0.13, 0.28];
-const HEAD_M: f64 = 0.10;
-const USUAL_M: f64 = 1.72;
-const SHOULDERS: f64 = 0.82;
 /// Powers are averaged over places of the body so far to either side.
 const WITHIN_M: f64 = 0.04;
 
@@ -185,13 +179,9 @@ impl Bodies {
         let others = self.0.iter().enumerate().filter(|(other, _)| *other != person);
         let of_body_db = |body: &PersonState| {
             let Some(passage) = Passage::new(ap_m, ue_m, body.position_m, body.floor_m) else { return 0.0 };
-            let (scale, facing) = (body.height_m / USUAL_M, DVec2::from_angle(body.heading_rad));
-            let half_m = scale * (TRUNK_M[0] * along.perp_dot(facing)).hypot(TRUNK_M[1] * along.dot(facing));
-            let shoulders_m = SHOULDERS * body.height_m;
-            let parts = [
-                passage.rectangle(half_m, 0.0, shoulders_m),
-                passage.rectangle(HEAD_M * scale, shoulders_m, body.height_m),
-            ];
+            let facing = DVec2::from_angle(body.heading_rad);
+            let turned = [along.perp_dot(facing), along.dot(facing)];
+            let parts = passage.trunk_and_head(body.height_m, 1.0, turned);
             kirchhoff_mean(radio.wavelength_m(), &passage, &parts, WITHIN_M)
         };
         others.filter_map(|(_, body)| body.as_ref().map(of_body_db)).sum()
