@@ -35,6 +35,8 @@ const PLACES: [(&str, &str); 3] = [("edge", "10.77.0.2"), ("server", "10.77.0.3"
 const BAD: [(&str, &str); 2] = [("edge", "10.78.0.2"), ("server", "10.78.0.3")];
 const FAILS_AFTER: Duration = Duration::from_secs(6);
 const FAILS_FOR: Duration = Duration::from_secs(5);
+/// What a failure of no duration costs the others is looked at for as long.
+const LOOKED_AT: Duration = Duration::from_secs(3);
 /// A frame every 100 ms: after a longer gap than this something was missing.
 const GAP: Duration = Duration::from_millis(150);
 
@@ -249,8 +251,15 @@ impl Bench {
     fn faults(&self, seconds: &str) -> Result<(), Error> {
         let recording = self.record("short", seconds)?;
         println!(
-            "\n{:44} {:40} {:>7} {:>7} {:>9} {:>11} {:>10}",
-            "what failed", "what must happen", "frames", "lost", "gap, ms", "recovers,s", "renumbered"
+            "\n{:44} {:40} {:>7} {:>7} {:>9} {:>9} {:>11} {:>10}",
+            "what failed",
+            "what must happen",
+            "frames",
+            "lost",
+            "gap, ms",
+            "later, ms",
+            "recovers,s",
+            "renumbered"
         );
         let long = self.record("long", "26")?;
         self.vanishing(&long)?;
@@ -264,7 +273,8 @@ impl Bench {
             }
         }
         println!(
-            "lost: frames without results from the first to the last. Gap: longest time between results. Recovers: from the \
+            "lost: frames without results from the first to the last. Gap: longest time between results. Later: how \
+             much longer after its own time a frame comes while something fails, median against that of before. Recovers: from the \
              end of the failure until frames come again in time with all sensors and as many people as before. Renumbered: \
              people who have another number than before the failure. Loss and jitter: a relay of IP packets between two \
              tun devices, as this kernel has no netem; jitter lets packets overtake each other."
@@ -466,9 +476,21 @@ fn account(seen: Vec<Seen>, failed: Instant, restored: Instant, none_lost: bool)
         recovered.map_or("never".to_owned(), |pair| format!("{:.2}", (pair[1].at - restored).as_secs_f64()));
     let renumbered = seen.last().map_or(0, |frame| frame.people.difference(&known).count());
     let lost = all - times.len() as i64;
+    let until = restored.max(failed + LOOKED_AT);
+    let (ahead, during): (Vec<&Seen>, Vec<&Seen>) =
+        seen.iter().filter(|frame| frame.at < until).partition(|frame| frame.at < failed);
+    let later_ms = median_delay_ms(&during, seen[0].at) - median_delay_ms(&ahead, seen[0].at);
     let (frames, gap_ms) = (times.len(), gap.as_secs_f64() * 1e3);
-    let row = format!("{frames:7} {lost:7} {gap_ms:9.0} {recovers:>11} {renumbered:10}");
+    let row = format!("{frames:7} {lost:7} {gap_ms:9.0} {later_ms:9.1} {recovers:>11} {renumbered:10}");
     (row, recovered.is_some() && renumbered == 0 && (!none_lost || lost == 0))
+}
+
+/// Half of the frames came later after their own time than this, up to a constant that all frames of a run share.
+fn median_delay_ms(frames: &[&Seen], origin: Instant) -> f64 {
+    let delay_ms = |frame: &&Seen| (frame.at - origin).as_secs_f64() * 1e3 - frame.time_ns as f64 * 1e-6;
+    let mut delays_ms: Vec<f64> = frames.iter().map(delay_ms).collect();
+    delays_ms.sort_by(f64::total_cmp);
+    delays_ms.get(delays_ms.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// The results of a recording by topic.

@@ -8,13 +8,13 @@ use crate::tools::{Result, root};
 const SECONDS: u64 = 30;
 const BUILD: &str = "cargo build --release --quiet --package umbracast-cli --features node";
 
-/// Ten minutes of ten people on three hosts against one process, to the byte; what the wires carry and add; what happens
+/// Two minutes of ten people on three hosts against one process, to the byte; what the wires carry and add; what happens
 /// when something fails. Needs root: the hosts are network namespaces of this one.
 pub fn nodes(book: &mut Book) -> Result<()> {
     built_with_nodes(book)?;
     let run = |command: &str| {
         format!(
-            "cargo run --release --quiet --package umbracast-node --example node_faults -- {command} 600 30"
+            "cargo run --release --quiet --package umbracast-node --example node_faults -- {command} 120 30"
         )
     };
     book.command(&run("umbracast"));
