@@ -104,6 +104,18 @@ impl Decider {
         self.serving.insert(track, access_point);
     }
 
+    /// Everybody has another number from now on.
+    ///
+    /// ```
+    /// use umbracast::{Config, decide::Decider};
+    ///
+    /// Decider::new(&Config::default().site).renumber(|track| track + 1000);
+    /// ```
+    pub fn renumber(&mut self, number: impl Fn(u64) -> u64) {
+        self.serving =
+            std::mem::take(&mut self.serving).into_iter().map(|(id, ap)| (number(id), ap)).collect();
+    }
+
     /// One decision for each confirmed track, in their order. `losses` and `outages` are of the same frame.
     pub fn decide(
         &mut self,

@@ -144,6 +144,19 @@ impl Binder {
         }
     }
 
+    /// Everybody has another number from now on.
+    ///
+    /// ```
+    /// use umbracast::{Config, radio::Binder};
+    ///
+    /// Binder::new(&Config::default().site).renumber(|track| track + 1000);
+    /// ```
+    pub fn renumber(&mut self, number: impl Fn(u64) -> u64) {
+        let of_frames = self.frames.iter_mut().flat_map(|frame| &mut frame.tracks);
+        let of_devices = self.devices.values_mut().flat_map(|device| &mut device.tracks);
+        of_frames.chain(of_devices).for_each(|track| *track = number(*track));
+    }
+
     /// How many reports were of no use since the start.
     pub fn skipped(&self) -> u64 {
         self.skipped

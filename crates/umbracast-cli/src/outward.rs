@@ -4,6 +4,8 @@
 use std::path::Path;
 
 use umbracast::{Error, Site};
+use umbracast_live::HostClock;
+use umbracast_live::heard::Ear;
 use umbracast_live::log::Event;
 use umbracast_live::run::Listener;
 
@@ -16,16 +18,24 @@ pub struct Outward {
 
 #[cfg(feature = "node")]
 impl Outward {
-    /// Opens what the site file asks for. `told` gets what happens to a connection.
+    /// Opens what the site file asks for. `hears` gets what access points heard, `told` what happens to a connection.
     pub fn of_site_file(
         file: Option<&Path>,
         site: &Site,
+        hears: (Ear, HostClock),
         told: impl Fn(Event) + Send + 'static,
     ) -> Result<Self, Error> {
         use umbracast_node::network::Network;
         let Some(file) = file else { return Ok(Self::default()) };
         let network = Network::of_site_file(&crate::setup::read_text(file)?, file)?;
-        Self::of_network(&network, || network.open(), &network.hall(site).unwrap_or_default(), site, told)
+        Self::of_network(
+            &network,
+            || network.open(),
+            &network.hall(site).unwrap_or_default(),
+            site,
+            hears,
+            told,
+        )
     }
 
     /// The same of settings that are read already.
@@ -34,10 +44,11 @@ impl Outward {
         session: impl FnOnce() -> Result<umbracast_node::Session, Error>,
         hall: &str,
         site: &Site,
+        hears: (Ear, HostClock),
         told: impl Fn(Event) + Send + 'static,
     ) -> Result<Self, Error> {
         use umbracast_node::outward::Outward;
-        let opened = Outward::open(session, hall, site, network.ros2, network.mqtt.as_ref(), told)?;
+        let opened = Outward::open(session, hall, site, network.ros2, network.mqtt.as_ref(), hears, told)?;
         Ok(Self { told: opened })
     }
 
@@ -56,7 +67,12 @@ impl Outward {
 
 #[cfg(not(feature = "node"))]
 impl Outward {
-    pub fn of_site_file(_: Option<&Path>, _: &Site, _: impl Fn(Event)) -> Result<Self, Error> {
+    pub fn of_site_file(
+        _: Option<&Path>,
+        _: &Site,
+        _: (Ear, HostClock),
+        _: impl Fn(Event),
+    ) -> Result<Self, Error> {
         Ok(Self {})
     }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use umbracast::{Error, Site};
+use umbracast_live::heard::Ear;
 use umbracast_live::recording::Recording;
 use umbracast_live::run::Counters;
 use umbracast_live::whole::Whole;
@@ -25,13 +26,15 @@ pub struct Shown<'a> {
     pub whole: Arc<Whole>,
     /// The frames of a recording, where one is looked at.
     pub recording: Option<Arc<Recording>>,
+    /// Who takes what access points heard of devices, where somebody does.
+    pub ear: Option<Ear>,
 }
 
 impl<'a> Shown<'a> {
     /// A hall that is watched as it is.
     pub fn live(site: &'a Site, counters: &Arc<Counters>, clock: HostClock, title: &str) -> Self {
         let (counters, title) = (counters.clone(), title.to_owned());
-        Self { site, counters, clock, title, whole: Arc::default(), recording: None }
+        Self { site, counters, clock, title, whole: Arc::default(), recording: None, ear: None }
     }
 }
 
@@ -56,6 +59,7 @@ impl Page {
             umbracast_live::serve::Watched::new(shown.site.clone(), shown.counters, shown.clock, shown.title);
         watched.whole = shown.whole;
         watched.recording = shown.recording;
+        watched.ear = shown.ear;
         Self::serve(args, watched)
     }
 

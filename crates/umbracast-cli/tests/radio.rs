@@ -1,10 +1,13 @@
 //! Sites with radios as a user meets them: losses and decisions of a run, and the closed loop.
 
 use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 use umbracast::decide::Action;
-use umbracast_io::rows::{DecisionRow, LossRow};
+use umbracast_io::rows::{BindingRow, DecisionRow, LossRow, ReportRow};
 use umbracast_io::tables;
 use umbracast_io::wire::WireRow;
 
@@ -12,7 +15,7 @@ use umbracast_io::wire::WireRow;
 mod command;
 mod common;
 
-use command::{done, results_in};
+use command::{done, results_in, umbracast};
 use common::folder;
 
 /// Two people who cross in front of the access point `side`, for three seconds.
@@ -69,7 +72,14 @@ fn a_site_with_radios_has_tables_of_losses_and_decisions_and_no_other_site_has()
         "{csv}"
     );
     // The same bytes as without radios, but for the configuration and what is of the radio alone.
-    let radio = ["links_db.parquet", "links_db.csv", "decisions.parquet", "decisions.csv"];
+    let radio = [
+        "links_db.parquet",
+        "links_db.csv",
+        "bindings.parquet",
+        "bindings.csv",
+        "decisions.parquet",
+        "decisions.csv",
+    ];
     let of = |folder: &Path| {
         let kept = |(name, _): &(String, Vec<u8>)| {
             !radio.contains(&name.as_str())
@@ -82,8 +92,117 @@ fn a_site_with_radios_has_tables_of_losses_and_decisions_and_no_other_site_has()
     assert!(radio.iter().all(|name| !plain.join(name).exists()));
     let topics =
         |folder: &Path| results_in(&folder.join("results-0000.mcap")).into_keys().collect::<Vec<_>>();
-    let of_radio = [LossRow::TOPIC, DecisionRow::TOPIC].map(str::to_owned);
+    let of_radio = [LossRow::TOPIC, BindingRow::TOPIC, DecisionRow::TOPIC].map(str::to_owned);
     assert!(of_radio.iter().all(|topic| topics(&out).contains(topic) && !topics(&plain).contains(topic)));
+}
+
+/// The crossing on a site with two radios: the folder, its simulation, the site file.
+fn crossing(name: &str) -> (PathBuf, PathBuf, PathBuf) {
+    let folder = folder(name);
+    let (walk, sim, site) = (folder.join("crossing.csv"), folder.join("sim"), folder.join("hall.toml"));
+    fs::write(&walk, CROSSING).expect("writes");
+    done(&["simulate", "--trajectories", text(&walk), "--seed", "7", "--out", text(&sim)]);
+    let access_points = [("side", "[14.0, 0.0, 2.0]"), ("north", "[0.0, 14.0, 3.0]")].map(|(name, at)| {
+        format!("[[site.access_points]]\nname = \"{name}\"\nposition_m = {at}\nradio = {{}}\n")
+    });
+    fs::write(&site, access_points.concat()).expect("writes");
+    (folder, sim, site)
+}
+
+#[test]
+fn reports_of_a_file_say_who_carries_a_device() {
+    let (folder, sim, site) = crossing("reports");
+    let out = folder.join("out");
+    let run = |reports: &Path, out: &Path| {
+        let words = ["run", text(&sim), "--site", text(&site), "--csv", "--out", text(out), "--reports"];
+        umbracast(&[&words[..], &[text(reports)]].concat()).output().expect("runs")
+    };
+    // Device 17 comes nearer to `north` as nobody but the second person does, who walks away from `side`.
+    let reports = folder.join("reports.csv");
+    let heard = |k: i64| {
+        let s = k as f64 * 0.1;
+        let (x_m, y_m) = (1.0 - s, 0.3);
+        let loss_db = |ap: [f64; 2]| 20.0 * ((ap[0] - x_m).hypot(ap[1] - y_m)).log10();
+        let time_ns = k * 100_000_000;
+        format!(
+            "{time_ns},17,side,{:.2}\n{time_ns},17,north,{:.2}\n",
+            -30.0 - loss_db([14.0, 0.0]),
+            -30.0 - loss_db([0.0, 14.0])
+        )
+    };
+    let rows: String = (0..30).map(heard).collect();
+    fs::write(&reports, format!("time_ns,device,access_point,power_dbm\n{rows}")).expect("writes");
+    let done = run(&reports, &out);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let names = ["side".to_owned(), "north".to_owned()];
+    let bindings = tables::read::<BindingRow>(&out, &names).expect("a table");
+    assert!(!bindings.is_empty() && bindings.iter().all(|row| row.device == 17), "{bindings:?}");
+    let csv = fs::read_to_string(out.join("bindings.csv")).expect("a table");
+    assert!(csv.starts_with("scene,frame,time_ns,device,track,p\n"), "{csv:.200}");
+    fs::write(&reports, "time_ns,device,access_point,power_dbm\n5,17,attic,-60\n").expect("writes");
+    let refused = run(&reports, &folder.join("refused"));
+    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(1), "{told}");
+    assert!(
+        told.contains("reports.csv: line 2, column access_point: expected the name of an access point"),
+        "{told}"
+    );
+}
+
+#[test]
+fn what_a_live_run_heard_is_heard_again_from_its_recording() {
+    let (folder, sim, site) = crossing("reports-live");
+    let empty = sim.join("empty.mcap");
+    let names = ["side".to_owned(), "north".to_owned()];
+    // A busy machine may skip a frame, which a replay does not: then once more, more slowly.
+    let recording = ["0.5", "0.25", "0.1"].iter().find_map(|rate| {
+        let records = folder.join(format!("records-{rate}"));
+        let words = ["live", "--port", "0", "--serve", "127.0.0.1:0", "--json", "--site", text(&site)];
+        let mut live = umbracast(&[&words[..], &["--empty", text(&empty), "--record", text(&records)]].concat())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("starts");
+        let mut said = BufReader::new(live.stdout.take().expect("piped"));
+        let mut ends_with = || {
+            let mut line = String::new();
+            said.read_line(&mut line).expect("a line");
+            line.trim().rsplit(' ').next().expect("a word").to_owned()
+        };
+        let page = ends_with();
+        let ports: Vec<String> = (0..2).map(|_| format!("127.0.0.1:{}", ends_with())).collect();
+        let (scene, to) = (sim.join("scene-0000.mcap"), ports.join(","));
+        let replay = umbracast(&["replay", text(&scene), "--to", &to, "--rate", rate, "--quiet"]).spawn();
+        let mut replay = replay.expect("starts");
+        let host = page.trim_start_matches("http://").trim_end_matches('/');
+        while replay.try_wait().expect("a state").is_none() {
+            let body = "[{\"access_point\":\"side\",\"device\":17,\"power_dbm\":-53.3},\
+                        {\"access_point\":\"north\",\"device\":17,\"power_dbm\":-52.9}]";
+            let mut stream = TcpStream::connect(host).expect("the page");
+            let length = body.len();
+            write!(stream, "POST /api/reports HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n{body}")
+                .expect("sends");
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer).expect("an answer");
+            assert!(answer.starts_with("HTTP/1.1 202"), "{answer}");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        assert!(Command::new("kill").args(["-TERM", &live.id().to_string()]).status().expect("kill").success());
+        let mut summary = String::new();
+        said.read_to_string(&mut summary).expect("a summary");
+        live.wait().expect("ends");
+        let summary: serde_json::Value = serde_json::from_str(&summary).expect("a summary");
+        let whole = summary["frames_skipped"] == 0 && summary["recorder"]["lost"] == 0;
+        whole.then(|| fs::read_dir(&records).expect("recordings").next().expect("one").expect("readable").path())
+    });
+    let recording = recording.expect("a run without a skipped frame");
+    let out = folder.join("out");
+    done(&["run", text(&recording), "--empty", text(&empty), "--mcap", "--out", text(&out)]);
+    let (live, again) = (results_in(&recording), results_in(&out.join("results-0000.mcap")));
+    for topic in [BindingRow::TOPIC, ReportRow::TOPIC] {
+        assert!(live[topic].len() > 20, "{topic}: {} messages", live[topic].len());
+        assert!(live[topic] == again[topic], "{topic}");
+    }
+    assert!(!tables::read::<BindingRow>(&out, &names).expect("a table").is_empty());
 }
 
 #[test]

@@ -22,5 +22,6 @@ pub mod setup;
 pub mod input;
 pub mod outcome_tables;
 pub mod own_tracks;
+pub mod reports;
 pub mod trajectories;
 pub mod bvh;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use umbracast::{Error, Outcome, Site};
 
-use crate::rows::{self, DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
+use crate::rows::{self, BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use crate::tables::TableWriter;
 
 /// The rows of one frame, or of several one after the other.
@@ -18,6 +18,8 @@ pub struct OutcomeRows {
     pub links: Vec<LinkRow>,
     /// What each of them loses, where its access point has a radio.
     pub losses: Vec<LossRow>,
+    /// Who may carry which device that was heard.
+    pub bindings: Vec<BindingRow>,
     /// What to do about each device, where the site says what changes cost.
     pub decisions: Vec<DecisionRow>,
 }
@@ -35,6 +37,7 @@ impl OutcomeRows {
         rows::of_outcome(scene, outcome, &mut self.tracks, &mut self.links);
         self.detections.extend(rows::detections(scene, outcome));
         self.losses.extend(rows::losses(scene, outcome));
+        self.bindings.extend(rows::bindings(scene, outcome));
         self.decisions.extend(rows::decisions(scene, outcome));
     }
 }
@@ -46,6 +49,7 @@ pub struct OutcomeTables {
     tracks: TableWriter<TrackRow>,
     links: TableWriter<LinkRow>,
     losses: Option<TableWriter<LossRow>>,
+    bindings: Option<TableWriter<BindingRow>>,
     decisions: Option<TableWriter<DecisionRow>>,
 }
 
@@ -61,6 +65,7 @@ impl OutcomeTables {
             tracks: TableWriter::create(folder, &names, csv)?,
             links: TableWriter::create(folder, &names, csv)?,
             losses: site.has_radio().then(|| TableWriter::create(folder, &names, csv)).transpose()?,
+            bindings: site.has_radio().then(|| TableWriter::create(folder, &names, csv)).transpose()?,
             decisions: site.has_decisions().then(|| TableWriter::create(folder, &names, csv)).transpose()?,
         })
     }
@@ -74,6 +79,7 @@ impl OutcomeTables {
         self.tracks.write(&rows.tracks)?;
         self.links.write(&rows.links)?;
         self.losses.as_mut().map_or(Ok(()), |table| table.write(&rows.losses))?;
+        self.bindings.as_mut().map_or(Ok(()), |table| table.write(&rows.bindings))?;
         self.decisions.as_mut().map_or(Ok(()), |table| table.write(&rows.decisions))
     }
 
@@ -86,6 +92,7 @@ impl OutcomeTables {
         self.tracks.finish()?;
         self.links.finish()?;
         self.losses.map_or(Ok(()), TableWriter::finish)?;
+        self.bindings.map_or(Ok(()), TableWriter::finish)?;
         self.decisions.map_or(Ok(()), TableWriter::finish)
     }
 }

@@ -122,7 +122,7 @@ impl OwnTracks {
 }
 
 /// Times in seconds become nanoseconds.
-fn from_seconds(table: &mut Loose) -> Result<(), Error> {
+pub(crate) fn from_seconds(table: &mut Loose) -> Result<(), Error> {
     if table.column("time_ns").is_some() {
         return Ok(());
     }

@@ -4,7 +4,7 @@ use umbracast::Site;
 use umbracast::detect::Point;
 
 use crate::messages::{self, Schema};
-use crate::rows::{DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
+use crate::rows::{BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, ReportRow, TrackRow};
 use crate::viewers;
 use crate::wire::{self, WireRow};
 
@@ -25,6 +25,10 @@ pub struct Results<'a> {
     pub links: &'a [LinkRow],
     /// What each of them loses; sent where the site has a radio.
     pub losses: &'a [LossRow],
+    /// Who may carry which device; sent where the site has a radio.
+    pub bindings: &'a [BindingRow],
+    /// What was heard before the frame; recorded, where there is any, so that a replay hears the same.
+    pub reports: &'a [ReportRow],
     /// What to do about each device; sent where the site says what changes cost.
     pub decisions: &'a [DecisionRow],
     /// Points that do not belong to the empty scene; none where nobody asked for them.
@@ -59,15 +63,18 @@ const OF_EVERY_SITE: [(&str, SchemaOf); 6] = [
 pub fn topics(site: &Site) -> Vec<(&'static str, SchemaOf)> {
     let losses = (LossRow::TOPIC, wire::schema::<LossRow> as SchemaOf);
     let decisions = (DecisionRow::TOPIC, wire::schema::<DecisionRow> as SchemaOf);
-    let of_radio = [(site.has_radio(), losses), (site.has_decisions(), decisions)];
+    let bindings = (BindingRow::TOPIC, wire::schema::<BindingRow> as SchemaOf);
+    let of_radio =
+        [(site.has_radio(), losses), (site.has_radio(), bindings), (site.has_decisions(), decisions)];
     let asked_for = of_radio.into_iter().filter_map(|(has, topic)| has.then_some(topic));
     OF_EVERY_SITE.into_iter().chain(asked_for).collect()
 }
 
 impl Results<'_> {
-    /// The frame's messages in the order of [`topics`], and the foreground behind them where somebody asked for it.
+    /// The frame's messages in the order of [`topics`], and behind them the foreground where somebody asked for it, and what was heard.
     pub fn messages(&self, site: &Site) -> Vec<Message> {
-        let &Results { frame, time_ns, detections, tracks, links, losses, decisions, foreground, .. } = self;
+        let &Results { frame, time_ns, detections, tracks, links, losses, .. } = self;
+        let &Results { bindings, reports, decisions, foreground, .. } = self;
         let access_points: Vec<String> = site.access_points.iter().map(|ap| ap.name.clone()).collect();
         let every = [
             wire::encode(time_ns, frame, detections, &access_points),
@@ -79,17 +86,23 @@ impl Results<'_> {
             viewers::people(time_ns, tracks),
         ];
         let losses = site.has_radio().then(|| wire::encode(time_ns, frame, losses, &access_points));
+        let bindings = site.has_radio().then(|| wire::encode(time_ns, frame, bindings, &access_points));
         let decisions = site.has_decisions().then(|| wire::encode(time_ns, frame, decisions, &access_points));
         let every = topics(site)
             .into_iter()
-            .zip(every.into_iter().chain(losses).chain(decisions))
+            .zip(every.into_iter().chain(losses).chain(bindings).chain(decisions))
             .map(|((topic, schema), bytes)| Message { topic, schema, bytes });
         let points = foreground.map(|points| Message {
             topic: viewers::FOREGROUND_TOPIC,
             schema: || messages::CLOUD,
             bytes: viewers::foreground(time_ns, points),
         });
-        every.chain(points).collect()
+        let reports = (!reports.is_empty()).then(|| Message {
+            topic: ReportRow::TOPIC,
+            schema: wire::schema::<ReportRow>,
+            bytes: wire::encode(time_ns, frame, reports, &access_points),
+        });
+        every.chain(points).chain(reports).collect()
     }
 }
 

@@ -8,6 +8,7 @@ use umbracast::blockage::Chance;
 use umbracast::decide::Action;
 use umbracast::detect::Detection;
 use umbracast::geometry::{Aabb, Obb};
+use umbracast::radio::Binding;
 use umbracast::track::Track;
 use umbracast::{Outcome, STEPS};
 
@@ -206,6 +207,33 @@ pub struct DecisionRow {
     pub p_out: f64,
 }
 
+/// Our answer: how likely a person carries a device that was heard, in one frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BindingRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    /// The network's name of the device.
+    pub device: u64,
+    pub track: u64,
+    pub p: f64,
+}
+
+/// What an access point heard of a device, as it was taken before one frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ReportRow {
+    pub scene: u32,
+    pub frame: u64,
+    /// The frame's.
+    pub time_ns: i64,
+    /// When it was heard.
+    pub heard_ns: i64,
+    pub access_point: u32,
+    /// The network's name of the device.
+    pub device: u64,
+    pub power_dbm: f64,
+}
+
 /// The rows of one outcome.
 pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, links: &mut Vec<LinkRow>) {
     tracks.reserve(outcome.tracks.len());
@@ -264,6 +292,14 @@ pub fn decisions(scene: u32, outcome: &Outcome) -> impl Iterator<Item = Decision
         saved_s: decision.saved_s,
         p_out: decision.p_out,
     })
+}
+
+/// The bindings of one outcome.
+pub fn bindings(scene: u32, outcome: &Outcome) -> impl Iterator<Item = BindingRow> + '_ {
+    let &Outcome { frame, time_ns, .. } = outcome;
+    let of =
+        move |b: &Binding| BindingRow { scene, frame, time_ns, device: b.device, track: b.track, p: b.p };
+    outcome.bindings.iter().map(of)
 }
 
 fn with_now<T: Copy>(now: T, steps: [T; STEPS]) -> [T; 1 + STEPS] {

@@ -10,7 +10,7 @@ use umbracast::decide::Action;
 
 use crate::cdr::{Decoder, Encoder};
 use crate::messages::{HEADER_DEFINITIONS, Schema};
-use crate::rows::{DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
+use crate::rows::{BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, ReportRow, TrackRow};
 use crate::tables::{Cell, Row};
 
 /// The columns that the message says once for all of its rows.
@@ -64,6 +64,21 @@ impl WireRow for DecisionRow {
     const MANY: &'static str = "Decisions";
     const WHAT: &'static str = "What to do about the link of every device, at the end of a frame.";
     const TOPIC: &'static str = "/umbracast/decisions";
+}
+
+impl WireRow for BindingRow {
+    const ONE: &'static str = "Binding";
+    const MANY: &'static str = "Bindings";
+    const WHAT: &'static str =
+        "Who may carry which device that was heard, at the end of a frame, likeliest first.";
+    const TOPIC: &'static str = "/umbracast/bindings";
+}
+
+impl WireRow for ReportRow {
+    const ONE: &'static str = "Report";
+    const MANY: &'static str = "Reports";
+    const WHAT: &'static str = "What access points heard of devices, taken before this frame.";
+    const TOPIC: &'static str = "/umbracast/reports";
 }
 
 /// The fields of one row, in the words of ROS 2.

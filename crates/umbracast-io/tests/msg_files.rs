@@ -7,7 +7,7 @@ use std::path::Path;
 
 use umbracast_io::messages::{self, Schema};
 use umbracast_io::nodes;
-use umbracast_io::rows::{DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
+use umbracast_io::rows::{BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, ReportRow, TrackRow};
 use umbracast_io::wire;
 
 const OURS: &str = "umbracast_msgs/";
@@ -20,6 +20,8 @@ fn definitions() -> BTreeMap<String, String> {
         wire::schema::<LinkRow>(),
         wire::schema::<LossRow>(),
         wire::schema::<DecisionRow>(),
+        wire::schema::<BindingRow>(),
+        wire::schema::<ReportRow>(),
     ];
     let rest = [messages::PEOPLE, messages::LINKS, messages::SENSOR_PACKETS];
     rows.into_iter().chain(rest).chain(nodes::schemas()).flat_map(|schema| parts(&schema)).collect()

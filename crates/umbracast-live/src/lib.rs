@@ -20,6 +20,7 @@ pub mod published;
 pub mod whole;
 pub mod recording;
 pub mod record;
+pub mod heard;
 pub mod run;
 pub mod log;
 pub mod send;

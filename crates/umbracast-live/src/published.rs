@@ -8,7 +8,9 @@ use serde_json::Value;
 use umbracast::detect::Point;
 use umbracast::{Frame, Health, Outcome, Site};
 use umbracast_io::results::Results;
-use umbracast_io::rows::{self, DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
+use umbracast_io::rows::{
+    self, BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, ReportRow, TrackRow,
+};
 use umbracast_io::wire::Json;
 
 use crate::advice::Advice;
@@ -40,6 +42,10 @@ pub struct Published {
     pub links: Vec<LinkRow>,
     /// What each of them loses; empty where no access point has a radio.
     pub losses: Vec<LossRow>,
+    /// Who may carry which device that was heard, likeliest first.
+    pub bindings: Vec<BindingRow>,
+    /// What was heard before the frame.
+    pub reports: Vec<ReportRow>,
     /// What to do about each device; empty where the site does not say what changes cost.
     pub decisions: Vec<DecisionRow>,
     /// What changed of the links.
@@ -74,6 +80,7 @@ impl Published {
             tracks,
             links,
             losses: rows::losses(0, outcome).collect(),
+            bindings: rows::bindings(0, outcome).collect(),
             decisions: rows::decisions(0, outcome).collect(),
             points_cm: points_cm(&outcome.foreground),
             health: outcome.health,
@@ -93,6 +100,8 @@ impl Published {
             tracks: &self.tracks,
             links: &self.links,
             losses: &self.losses,
+            bindings: &self.bindings,
+            reports: &self.reports,
             decisions: &self.decisions,
             foreground: self.foreground.as_deref(),
         }
@@ -115,6 +124,7 @@ impl Published {
             tracks: Json(&self.tracks, &self.access_points),
             blockages: Json(&self.links, &self.access_points),
             losses: (!self.losses.is_empty()).then(|| Json(&self.losses, &self.access_points)),
+            bindings: (!self.bindings.is_empty()).then(|| Json(&self.bindings, &self.access_points)),
             decisions: (!self.decisions.is_empty()).then(|| Json(&self.decisions, &self.access_points)),
             events: self.events.iter().map(Event::json).chain(self.advice.iter().map(Advice::json)).collect(),
             points_cm: with_points.then(|| self.points_cm.as_flattened()),
@@ -139,6 +149,8 @@ struct FrameJson<'a> {
     blockages: Json<'a, LinkRow>,
     #[serde(skip_serializing_if = "Option::is_none")]
     losses: Option<Json<'a, LossRow>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bindings: Option<Json<'a, BindingRow>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     decisions: Option<Json<'a, DecisionRow>>,
     events: Vec<Value>,

@@ -8,9 +8,11 @@ use std::time::Duration;
 use umbracast::forecast::Weights;
 use umbracast::lidar::Assembler;
 use umbracast::{Config, Error, Frame, Health, Pipeline};
+use umbracast_io::reports;
 
 use crate::advice::Advised;
 use crate::clock::HostClock;
+use crate::heard::Inbox;
 use crate::latency::Latencies;
 use crate::published::{self, Published};
 use crate::queue::{Queue, WhenFull};
@@ -69,6 +71,10 @@ pub struct Counters {
     pub packets: AtomicU64,
     /// The same of each.
     pub of_sensors: Mutex<Vec<u64>>,
+    /// What access points heard, on its way to the pipeline.
+    pub heard: Inbox,
+    /// Reports of which nothing could be made, as of the last frame.
+    pub reports_skipped: AtomicU64,
     /// Packets that the system gave up before they were received, as of the last [`Live::summary`].
     pub dropped_by_system: AtomicU64,
     /// Frames that were published.
@@ -322,9 +328,12 @@ fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
     while let Some(Closed { frame, arrived_ns, health }) = frames.pop() {
         publish.take_over(&mut pipeline);
         let begun_ns = publish.clock.now_ns();
+        let heard = publish.counters.heard.take(frame.time_ns, arrived_ns);
+        pipeline.hear(&heard);
         let outcome = pipeline.step(&frame);
         let stepped_ns = publish.clock.now_ns();
         let mut published = Published::of(outcome, &frame, publish.sensors, &publish.access_points);
+        published.reports = reports::rows(frame.index, frame.time_ns, &heard);
         published.foreground = publish.points.then(|| outcome.foreground.clone());
         published.health.add(&health);
         published.frames_skipped = frames.lost();
@@ -335,6 +344,7 @@ fn step(mut pipeline: Pipeline, frames: &Queue<Closed>, mut publish: Publish) {
         published.step = Duration::from_nanos((stepped_ns - begun_ns).max(0) as u64);
         published.published_ns = publish.clock.now_ns();
         published.latency = Duration::from_nanos((published.published_ns - arrived_ns).max(0) as u64);
+        publish.counters.reports_skipped.store(pipeline.binder().skipped(), Ordering::Relaxed);
         publish.out(published);
         publish.whole.give(frame, publish.clock.now_ns());
     }

@@ -221,14 +221,17 @@ fn of_role(role: Role) -> (Ends, Ends, Ends, Ends) {
             (&["tracks"], &["followed", "state"], &["state"], &["state", "config/site", "config/weights"])
         }
         Role::Cast => (
-            &["links", "losses", "decisions", "warnings/*"],
-            &["tracks", "state"],
+            &["links", "losses", "bindings", "decisions", "warnings/*"],
+            &["tracks", "state", "reports/*"],
             &["state"],
             &["state", "config/site"],
         ),
-        Role::Record | Role::Serve => (&[], &["**"], &["state"], &[]),
+        Role::Record => (&[], &["**"], &["state"], &[]),
+        Role::Serve => (&["reports/*"], &["**"], &["state"], &[]),
         Role::Display => (&[], &["**"], &[], &[]),
-        Role::Controller => (&[], &["links", "losses", "decisions", "warnings/*"], &[], &[]),
+        Role::Controller => {
+            (&["reports/*"], &["links", "losses", "bindings", "decisions", "warnings/*"], &[], &[])
+        }
         Role::Router => (&[], &[], &[], &[]), // Of no hall: see above.
     }
 }

@@ -10,7 +10,9 @@ use umbracast::{Config, Error, Health};
 use umbracast_io::fields;
 use umbracast_io::nodes::{Followed, Foreground, Priors, TrackerState};
 use umbracast_io::objects::{self, ObjectList};
+use umbracast_io::reports;
 use umbracast_live::HostClock;
+use umbracast_live::heard::Inbox;
 use umbracast_live::latency::Latencies;
 use umbracast_live::queue::{Popped, Queue, WhenFull};
 use zenoh::Wait;
@@ -128,6 +130,7 @@ impl Back {
             others: Vec::new(),
             used_ns: clock.now_ns(),
             foreground_ns: None,
+            reports: Arc::default(),
             misunderstood: 0,
             clock,
             counted: counted.clone(),
@@ -139,6 +142,17 @@ impl Back {
             })
         };
         let (mut subscribers, mut queryable) = (Vec::new(), None);
+        if row.cast && config.site.has_radio() {
+            // Beside the queue: however many reports come, no frame is given up for them.
+            let (inbox, site) = (stages.reports.clone(), config.site.clone());
+            subscribers.push(hall.hear(
+                &hall.keys().of("reports/*"),
+                move |_, bytes| match reports::from_json(&bytes.to_bytes(), &site, clock.now_ns()) {
+                    Ok(heard) => inbox.push(&heard),
+                    Err(_) => inbox.refuse(),
+                },
+            )?);
+        }
         if row.track {
             let (seen, own) = (queue.clone(), hall.id());
             subscribers.push(hall.watch_nodes(Role::Track, move |id, here| {
@@ -242,6 +256,8 @@ struct Stages {
     /// When a message was of use last, and one of a front end.
     used_ns: i64,
     foreground_ns: Option<i64>,
+    /// What access points heard.
+    reports: Arc<Inbox>,
     misunderstood: u64,
     clock: HostClock,
     counted: Arc<Counted>,
@@ -318,8 +334,10 @@ impl Stages {
         let (counts, counted) = (&self.join.counts, &self.counted);
         counted.incomplete.store(counts.incomplete, Ordering::Relaxed);
         counted.late.store(counts.late, Ordering::Relaxed);
+        let of_reports = self.reports.lost() + self.seat.work.chain.reports_skipped();
+        let broken = self.misunderstood + self.refused.count + of_reports;
         counted.leads.store(self.seat.lead.term().is_some(), Ordering::Relaxed);
-        counted.broken.store(self.misunderstood + self.refused.count, Ordering::Relaxed);
+        counted.broken.store(broken, Ordering::Relaxed);
         *lock(&counted.troubles) = self.refused.words(clock.now_ns());
     }
 
@@ -387,6 +405,8 @@ impl Stages {
     /// A frame of front ends, or of another perception.
     fn joined(&mut self, joined: Joined) {
         let clock = self.clock;
+        let heard = self.reports.take(joined.views.time_ns, joined.closed_ns);
+        self.seat.work.chain.hear(&heard);
         if let Some(made) = self.seat.frame(joined, || clock.now_ns()) {
             self.publish(made);
         }
@@ -406,6 +426,7 @@ impl Stages {
         if clock.now_ns() - self.used_ns > SILENCE_NS {
             chain.forget_time();
         }
+        chain.hear(&self.reports.take(followed.time_ns, followed.closed_ns));
         if let Some(made) = chain.followed(followed, || clock.now_ns()) {
             self.used_ns = clock.now_ns();
             self.counted.count(&made, self.used_ns);

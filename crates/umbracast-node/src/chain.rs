@@ -6,12 +6,12 @@ use umbracast::blockage::Caster;
 use umbracast::decide::Decider;
 use umbracast::detect::{self, Clocks, Clusterer, Measurer, Prior};
 use umbracast::forecast::{Forecaster, Weights};
-use umbracast::radio::Fader;
+use umbracast::radio::{Binder, Fader, Report};
 use umbracast::track::Tracker;
 use umbracast::{Config, Error, Outcome, STEP_NS};
 use umbracast_io::nodes::{Followed, Priors, TrackerState, Warning};
 use umbracast_io::rows;
-use umbracast_io::rows::{DecisionRow, DetectionRow, LinkRow, LossRow};
+use umbracast_io::rows::{BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow};
 use umbracast_live::warnings::{Event, Warnings};
 
 use crate::join::Joined;
@@ -57,6 +57,7 @@ pub struct Chain {
     forecaster: Option<Forecaster>,
     caster: Option<Caster>,
     fader: Fader,
+    binder: Binder,
     decider: Decider,
     access_points: Vec<String>,
     warnings: Warnings,
@@ -86,6 +87,8 @@ pub struct Made {
     pub links: Option<Vec<LinkRow>>,
     /// What each of them loses.
     pub losses: Vec<LossRow>,
+    /// Who may carry which device that was heard.
+    pub bindings: Vec<BindingRow>,
     /// What to do about each device.
     pub decisions: Vec<DecisionRow>,
     /// What changed of the links.
@@ -108,8 +111,12 @@ impl Made {
             tracks.chain(followed.forecasts.iter_mut().map(|forecast| &mut forecast.track))
         });
         let links = self.links.iter_mut().flatten().map(|link| &mut link.track);
+        let losses = self.losses.iter_mut().map(|loss| &mut loss.track);
+        let bindings = self.bindings.iter_mut().map(|binding| &mut binding.track);
+        let decisions = self.decisions.iter_mut().map(|decision| &mut decision.track);
         let warnings = self.warnings.iter_mut().map(|warning| &mut warning.track);
-        let all = followed.chain(links).chain(warnings).chain(&mut self.numbers);
+        let of_radio = losses.chain(bindings).chain(decisions);
+        let all = followed.chain(links).chain(of_radio).chain(warnings).chain(&mut self.numbers);
         all.for_each(|old| *old = number(*old));
     }
 
@@ -133,6 +140,7 @@ impl Chain {
             forecaster: row.forecast.then(|| Forecaster::new(&config.forecast, weights)).transpose()?,
             caster: row.cast.then(|| Caster::new(&config.blockage, &config.site)),
             fader: Fader::new(&config.site),
+            binder: Binder::new(&config.site),
             decider: Decider::new(&config.site),
             access_points: config.site.access_points.iter().map(|ap| ap.name.clone()).collect(),
             warnings: Warnings::default(),
@@ -258,7 +266,19 @@ impl Chain {
         if let Some(tracker) = &mut self.tracker {
             tracker.renumber(&number, next);
         }
+        self.binder.renumber(&number);
+        self.decider.renumber(&number);
         self.warnings.renumber(number);
+    }
+
+    /// What access points heard of devices, for the next frame.
+    pub fn hear(&mut self, reports: &[Report]) {
+        self.binder.hear(reports);
+    }
+
+    /// Reports of which nothing could be made since the start.
+    pub fn reports_skipped(&self) -> u64 {
+        self.binder.skipped()
     }
 
     /// The next frame says again which warnings hold.
@@ -296,6 +316,7 @@ impl Chain {
         if let Some(caster) = &mut self.caster {
             caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
             self.fader.fade(caster, &mut o.losses);
+            self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
             self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
             self.fewer_samples += u64::from(caster.took_fewer_samples());
             o.health.frames_with_fewer_samples =
@@ -307,6 +328,7 @@ impl Chain {
             made.warnings = events.iter().map(warning).collect();
             made.links = Some(links);
             made.losses = rows::losses(0, o).collect();
+            made.bindings = rows::bindings(0, o).collect();
             made.decisions = rows::decisions(0, o).collect();
         }
         made.took_ns = took_ns + now_ns() - begun_ns;
@@ -351,4 +373,22 @@ fn warning(event: &Event, time_ns: i64, frame: u64, closed_ns: i64) -> Warning {
 /// The number of the frame that ends at `time_ns`.
 fn frames_between(first_ns: i64, time_ns: i64) -> u64 {
     ((time_ns - first_ns + STEP_NS / 2) / STEP_NS) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tracker that took over gave everybody another number, but losses and decisions of its frames kept the old ones.
+    #[test]
+    fn losses_bindings_and_decisions_of_a_new_term_have_its_numbers() {
+        let mut made = Made {
+            losses: vec![LossRow { track: 3, ..LossRow::default() }],
+            bindings: vec![BindingRow { track: 3, ..BindingRow::default() }],
+            decisions: vec![DecisionRow { track: 3, ..DecisionRow::default() }],
+            ..Made::default()
+        };
+        made.renumber(|number| number + 100);
+        assert_eq!((made.losses[0].track, made.bindings[0].track, made.decisions[0].track), (103, 103, 103));
+    }
 }

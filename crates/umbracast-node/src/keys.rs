@@ -15,9 +15,11 @@ use crate::role::Role;
 /// | `detections` | tracker that leads | rows |
 /// | `tracks` | forecast | everybody followed with forecasts |
 /// | `links` | cast | rows of every link |
+/// | `losses`, `bindings`, `decisions` | cast | rows of the radio, where the site has one |
 /// | `warnings/AP` | cast | what changed of the links of an access point |
 /// | `health/ROLE/ID` | everybody | load and what was skipped, once a second |
 /// | `objects/SOURCE` | others' perception | lists of objects in place of stage 1 |
+/// | `reports/SOURCE` | controllers, serving nodes | JSON of what access points heard of devices: `umbracast_io::reports` |
 /// | `config/site`, `config/background/NAME`, `config/weights` | query | settings, from whoever has them |
 /// | `node/ROLE/ID` | liveliness | who is there |
 #[derive(Debug, Clone)]

@@ -1,4 +1,5 @@
-//! Warnings and decisions as JSON over MQTT for clients without Zenoh, sent to an existing broker.
+//! Warnings and decisions as JSON over MQTT for clients without Zenoh, sent to an existing broker, and reports of access points
+//! from it.
 //!
 //! It does not use Zenoh's bridge, because the bridge passes on bytes. Warnings on Zenoh are CDR, and MQTT listeners
 //! expect JSON. `rumqttc` is maintained and small, and needs no runtime that Zenoh does not need already.
@@ -65,13 +66,15 @@ struct State {
 
 impl Sender {
     /// Begins to call the broker, and goes on until it answers. `umbracast/HALL/status` says `online` from then on, and
-    /// `offline` when the last sender of the hall ends or is cut off. `told` gets what happens to the connection.
+    /// `offline` when the last sender of the hall ends or is cut off. `told` gets what happens to the connection, `heard` what is
+    /// sent to `umbracast/HALL/reports`.
     ///
     /// # Errors
     /// A broker's name that is none, a file that cannot be read or that others can read.
     pub fn start(
         settings: &Mqtt,
         hall: &str,
+        heard: impl Fn(&[u8]) -> Result<(), Error> + Send + 'static,
         told: impl Fn(log::Event) + Send + 'static,
     ) -> Result<Self, Error> {
         let (host, port) = address(&settings.broker)?;
@@ -95,11 +98,12 @@ impl Sender {
             client: client.clone(),
             state: state.clone(),
             status,
+            reports: format!("umbracast/{hall}/reports"),
             broker: settings.broker.clone(),
             client_id,
             connected: false,
         };
-        let thread = std::thread::spawn(move || talk.run(connection, told));
+        let thread = std::thread::spawn(move || talk.run(connection, heard, told));
         Ok(Self { client, hall: hall.to_owned(), lost: AtomicU64::new(0), state, thread: Some(thread) })
     }
 
@@ -167,6 +171,8 @@ struct Talk {
     state: Arc<State>,
     /// The topic that says whether the hall has a sender.
     status: String,
+    /// The topic of what access points heard.
+    reports: String,
     broker: String,
     client_id: String,
     connected: bool,
@@ -174,7 +180,12 @@ struct Talk {
 
 impl Talk {
     /// Sends and receives until the client has said good-bye, or nobody is there to say it to.
-    fn run(&mut self, mut connection: Connection, told: impl Fn(log::Event)) {
+    fn run(
+        &mut self,
+        mut connection: Connection,
+        heard: impl Fn(&[u8]) -> Result<(), Error>,
+        told: impl Fn(log::Event),
+    ) {
         use rumqttc::{Event, Outgoing, Packet};
         for event in connection.iter() {
             let stops = self.state.stop.load(Ordering::Acquire);
@@ -186,12 +197,19 @@ impl Talk {
                     self.connected = true;
                     // Another sender of the hall that ends says `offline` for all.
                     let _ = self.client.try_subscribe(&self.status, QoS::AtLeastOnce);
+                    let _ = self.client.try_subscribe(&self.reports, QoS::AtMostOnce);
                     self.say_online();
                 }
-                Ok(Event::Incoming(Packet::Publish(heard)))
-                    if heard.topic == self.status && heard.payload == "offline" && !stops =>
+                Ok(Event::Incoming(Packet::Publish(said)))
+                    if said.topic == self.status && said.payload == "offline" && !stops =>
                 {
                     self.say_online();
+                }
+                Ok(Event::Incoming(Packet::Publish(said))) if said.topic == self.reports => {
+                    if let Err(error) = heard(&said.payload) {
+                        let text = format!("{}: {error}; none of this message is taken", self.reports);
+                        told(log::Event::new(Level::Warn, "reports_refused", text));
+                    }
                 }
                 Ok(Event::Incoming(Packet::PubAck(_))) => {
                     self.state.open.fetch_sub(1, Ordering::AcqRel);
@@ -253,6 +271,10 @@ mod tests {
     use umbracast_io::rows::LinkRow;
     use umbracast_live::warnings;
 
+    fn deaf(_: &[u8]) -> Result<(), Error> {
+        Ok(())
+    }
+
     fn event() -> Event {
         let mut link = LinkRow { track: 7, onset_s: [Some(0.2), Some(0.4), None], ..LinkRow::default() };
         link.p[umbracast::STEPS - 1] = 0.75;
@@ -306,7 +328,7 @@ mod tests {
     #[test]
     fn a_broker_gets_every_warning_as_json_and_is_told_who_is_there() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
-        let sender = Sender::start(&at(&broker), "lab", drop).unwrap();
+        let sender = Sender::start(&at(&broker), "lab", deaf, drop).unwrap();
         sender.send(&event(), 6); // Waits until the broker is there.
         let (mut stream, _) = broker.accept().unwrap();
         let (kind, hello) = packet(&mut stream);
@@ -352,7 +374,7 @@ mod tests {
     fn two_senders_of_a_hall_have_names_of_their_own_and_the_one_that_stays_says_so() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let settings = at(&broker);
-        let _senders = [(); 2].map(|()| Sender::start(&settings, "lab", drop).unwrap());
+        let _senders = [(); 2].map(|()| Sender::start(&settings, "lab", deaf, drop).unwrap());
         let [(mut stays, one), (_ends, other)] = [(); 2].map(|()| taken(&broker));
         assert_ne!(one, other);
         assert!(one.starts_with("umbracast-lab-") && other.starts_with("umbracast-lab-"));
@@ -365,10 +387,32 @@ mod tests {
     }
 
     #[test]
+    fn what_access_points_heard_comes_from_the_broker_and_what_is_none_is_told() {
+        let broker = TcpListener::bind("127.0.0.1:0").unwrap();
+        let (hear, heard) = std::sync::mpsc::channel();
+        let (tell, told) = std::sync::mpsc::channel();
+        let hears = move |json: &[u8]| match json {
+            b"[]" => hear.send(()).map_err(|e| Error::new(e.to_string())),
+            _ => Err(Error::new("expected JSON")),
+        };
+        let sender = Sender::start(&at(&broker), "lab", hears, move |event| drop(tell.send(event)));
+        let (mut stream, _) = taken(&broker);
+        let topic = b"umbracast/lab/reports";
+        for text in ["[]", "{{"] {
+            let head = [0x30, (2 + topic.len() + text.len()) as u8, 0, topic.len() as u8];
+            stream.write_all(&[&head[..], topic, text.as_bytes()].concat()).unwrap();
+        }
+        heard.recv().unwrap();
+        let refused = told.iter().find(|event| event.name == "reports_refused").unwrap();
+        assert_eq!(refused.text, "umbracast/lab/reports: expected JSON; none of this message is taken");
+        drop((stream, broker, sender));
+    }
+
+    #[test]
     fn a_connection_that_somebody_takes_over_is_told() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let (tell, told) = std::sync::mpsc::channel();
-        let sender = Sender::start(&at(&broker), "lab", move |event| drop(tell.send(event)));
+        let sender = Sender::start(&at(&broker), "lab", deaf, move |event| drop(tell.send(event)));
         let (stream, name) = taken(&broker);
         drop(stream);
         let events = [told.recv().unwrap(), told.recv().unwrap()];
@@ -391,10 +435,12 @@ mod tests {
             ca: None,
             plain: false,
         };
-        let sender = Sender::start(&settings, "lab", drop).unwrap();
+        let sender = Sender::start(&settings, "lab", deaf, drop).unwrap();
         (0..WAITING + 10).for_each(|_| sender.send(&event(), 6));
         assert!(sender.lost() >= 10);
         drop(sender);
-        assert!(Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab", drop).is_err());
+        assert!(
+            Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab", deaf, drop).is_err()
+        );
     }
 }

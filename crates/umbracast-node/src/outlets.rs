@@ -15,6 +15,7 @@ pub(crate) struct Outlets {
     links: Option<Outlet>,
     /// Where the site has a radio.
     losses: Option<Outlet>,
+    bindings: Option<Outlet>,
     /// Where it says what changes cost.
     decisions: Option<Outlet>,
     /// Of each access point.
@@ -42,6 +43,7 @@ impl Outlets {
             followed: outlet(row.track || row.forecast, tracks, Urgency::Stage)?,
             links: outlet(row.cast, "links", Urgency::Result)?,
             losses: outlet(row.cast && config.site.has_radio(), "losses", Urgency::Result)?,
+            bindings: outlet(row.cast && config.site.has_radio(), "bindings", Urgency::Result)?,
             decisions: outlet(row.cast && config.site.has_decisions(), "decisions", Urgency::Warning)?,
             warnings: warnings.collect::<Result<_, Error>>()?,
             access_points,
@@ -75,6 +77,9 @@ impl Outlets {
             outlet.put_rows(term, wire::encode(made.time_ns, made.frame, links, names));
             if let Some(outlet) = &self.losses {
                 outlet.put_rows(term, wire::encode(made.time_ns, made.frame, &made.losses, names));
+            }
+            if let Some(outlet) = &self.bindings {
+                outlet.put_rows(term, wire::encode(made.time_ns, made.frame, &made.bindings, names));
             }
         }
         if let (Some(outlet), Some(detections)) = (&self.detections, &made.detections) {

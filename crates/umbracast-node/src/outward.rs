@@ -1,12 +1,14 @@
 //! What a hall sends to other systems: topics of ROS 2, warnings and decisions over MQTT.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use serde::Deserialize;
 use umbracast::{Error, Site};
-use umbracast_live::Published;
+use umbracast_io::reports;
+use umbracast_live::heard::Ear;
 use umbracast_live::log::Event;
 use umbracast_live::run::Listener;
+use umbracast_live::{HostClock, Published};
 use zenoh::Session;
 
 use crate::mqtt::{Mqtt, Sender};
@@ -28,11 +30,13 @@ pub struct Ros2 {
 pub struct Outward {
     face: Option<Mutex<Face>>,
     sender: Option<Sender>,
+    /// As it was last read: reports name its access points.
+    site: Arc<RwLock<Site>>,
 }
 
 impl Outward {
-    /// Opens what is asked for; `None` where that is nothing. Only ROS 2 needs a session. `told` gets what happens to the
-    /// connection with a broker.
+    /// Opens what is asked for; `None` where that is nothing. Only ROS 2 needs a session. `hears` gets what access points heard,
+    /// `told` what happens to the connection with a broker.
     ///
     /// # Errors
     /// A session that cannot be opened, a hall that ROS 2 cannot name, a broker's name that is none.
@@ -42,6 +46,7 @@ impl Outward {
         site: &Site,
         ros2: Option<Ros2>,
         mqtt: Option<&Mqtt>,
+        hears: (Ear, HostClock),
         told: impl Fn(Event) + Send + 'static,
     ) -> Result<Option<Arc<Self>>, Error> {
         let face = |Ros2 { domain, namespace }| {
@@ -49,8 +54,14 @@ impl Outward {
             Face::new(&session()?, domain, &namespace, site).map(Mutex::new)
         };
         let face = ros2.map(face).transpose().map_err(|e| e.within("network.ros2"))?;
-        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall, told)).transpose()?;
-        Ok((face.is_some() || sender.is_some()).then(|| Arc::new(Self { face, sender })))
+        let site = Arc::new(RwLock::new(site.clone()));
+        let (known, (ear, clock)) = (site.clone(), hears);
+        let heard = move |json: &[u8]| {
+            let site = known.read().unwrap_or_else(PoisonError::into_inner);
+            reports::from_json(json, &site, clock.now_ns()).map(|reports| ear(&reports))
+        };
+        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall, heard, told)).transpose()?;
+        Ok((face.is_some() || sender.is_some()).then(|| Arc::new(Self { face, sender, site })))
     }
 
     /// Who tells `listener` tells this too.
@@ -66,6 +77,7 @@ impl Outward {
 
     /// Another site with the same sensors from the next frame on.
     pub fn take_over(&self, site: &Site) {
+        self.site.write().unwrap_or_else(PoisonError::into_inner).clone_from(site);
         if let Some(face) = &self.face {
             face.lock().unwrap_or_else(PoisonError::into_inner).take_over(site);
         }

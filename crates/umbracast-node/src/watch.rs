@@ -8,7 +8,7 @@ use std::time::Duration;
 use umbracast::detect::Point;
 use umbracast::{Config, Error, Outcome};
 use umbracast_io::nodes::{Followed, Foreground};
-use umbracast_io::rows::{self, DecisionRow, DetectionRow, LinkRow, LossRow};
+use umbracast_io::rows::{self, BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow};
 use umbracast_io::{fields, wire};
 use umbracast_live::advice::Advised;
 use umbracast_live::queue::{Popped, Queue, WhenFull};
@@ -48,6 +48,7 @@ pub(crate) enum Part {
     /// Rows, with the term of the tracker that led.
     Links(u64, ZBytes),
     Losses(u64, ZBytes),
+    Bindings(u64, ZBytes),
     Decisions(u64, ZBytes),
     Tracks(ZBytes),
     Detections(u64, ZBytes),
@@ -64,6 +65,7 @@ struct Parts {
     term: u64,
     links: Option<Vec<LinkRow>>,
     losses: Option<Vec<LossRow>>,
+    bindings: Option<Vec<BindingRow>>,
     decisions: Option<Vec<DecisionRow>>,
     tracks: Option<Followed>,
     detections: Option<Vec<DetectionRow>>,
@@ -99,6 +101,7 @@ impl Watch {
         let (has_radio, has_decisions) = (config.site.has_radio(), config.site.has_decisions());
         if has_radio {
             subscribers.push(hear_rows("losses", Part::Losses)?);
+            subscribers.push(hear_rows("bindings", Part::Bindings)?);
         }
         if has_decisions {
             subscribers.push(hear_rows("decisions", Part::Decisions)?);
@@ -189,6 +192,11 @@ impl Gather {
                 let Some(parts) = self.led(term, time_ns) else { return };
                 parts.losses = Some(rows);
             }
+            Part::Bindings(term, bytes) => {
+                let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
+                let Some(parts) = self.led(term, time_ns) else { return };
+                parts.bindings = Some(rows);
+            }
             Part::Decisions(term, bytes) => {
                 let Some((_, time_ns, rows)) = wire::decode(&bytes.to_bytes(), &names) else { return };
                 let Some(parts) = self.led(term, time_ns) else { return };
@@ -257,7 +265,7 @@ impl Gather {
             parts.links.is_some()
                 && parts.tracks.is_some()
                 && parts.detections.is_some()
-                && (!has_radio || parts.losses.is_some())
+                && (!has_radio || parts.losses.is_some() && parts.bindings.is_some())
                 && (!has_decisions || parts.decisions.is_some())
                 && (!points_wanted || points >= seen)
         };
@@ -306,6 +314,7 @@ impl Gather {
             tracks,
             links,
             losses: parts.losses.unwrap_or_default(),
+            bindings: parts.bindings.unwrap_or_default(),
             decisions,
             events,
             advice,

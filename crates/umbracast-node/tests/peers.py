@@ -52,7 +52,7 @@ def type_name(dds):
 
 
 def rows(message):
-    for name in ("detections", "tracks", "blockages", "losses", "decisions", "transforms", "markers"):
+    for name in ("detections", "tracks", "blockages", "losses", "bindings", "decisions", "transforms", "markers"):
         if hasattr(message, name):
             return len(getattr(message, name))
     return message.width * message.height if hasattr(message, "width") else None

@@ -16,7 +16,7 @@ use umbracast::geometry::DVec3;
 use umbracast::site::{Handover, Radio};
 use umbracast_io::nodes::Warning;
 use umbracast_io::results::Results;
-use umbracast_io::rows::{DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
+use umbracast_io::rows::{BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use umbracast_node::hall::{Hall, Urgency};
 use umbracast_node::keys::Keys;
 use umbracast_node::ros2::{self, Face, Node};
@@ -80,6 +80,8 @@ fn clients_of_others_list_decode_and_send() {
                     tracks: &tracks,
                     links: &[link],
                     losses: &[LossRow { track: 17, ..LossRow::default() }],
+                    bindings: &[BindingRow { device: 1, track: 17, ..BindingRow::default() }],
+                    reports: &[],
                     decisions: &[DecisionRow { track: 17, ..DecisionRow::default() }],
                     foreground: Some(&points),
                 };
@@ -115,8 +117,17 @@ fn clients_of_others_list_decode_and_send() {
     assert_eq!((&found["complete"], &found["answered"]), (&true.into(), &true.into()), "{found}");
     assert_eq!(found["warning"], serde_json::json!(["umbracast/lab/warnings/side", "warning", 0.75]));
     let topics = found["topics"].as_object().unwrap();
-    let expected =
-        ["blockages", "decisions", "detections", "foreground", "losses", "markers", "people", "tracks"];
+    let expected = [
+        "bindings",
+        "blockages",
+        "decisions",
+        "detections",
+        "foreground",
+        "losses",
+        "markers",
+        "people",
+        "tracks",
+    ];
     let mut expected: Vec<String> = expected.iter().map(|name| format!("/umbracast/{name}")).collect();
     expected.insert(0, "/tf".to_owned());
     assert_eq!(topics.keys().cloned().collect::<Vec<_>>(), expected);

@@ -27,6 +27,7 @@ pub struct Outcome {
     tracks: PyOnceLock<Py<Table>>,
     links: PyOnceLock<Py<Table>>,
     links_db: PyOnceLock<Py<Table>>,
+    bindings: PyOnceLock<Py<Table>>,
     decisions: PyOnceLock<Py<Table>>,
 }
 
@@ -51,6 +52,7 @@ impl Outcome {
             tracks: PyOnceLock::new(),
             links: PyOnceLock::new(),
             links_db: PyOnceLock::new(),
+            bindings: PyOnceLock::new(),
             decisions: PyOnceLock::new(),
         }
     }
@@ -97,6 +99,12 @@ impl Outcome {
     #[getter]
     fn links_db(&self, py: Python) -> PyResult<Py<Table>> {
         self.table(py, &self.links_db, &self.rows.losses)
+    }
+
+    /// Who may carry which device that was heard (`Pipeline.hear`), likeliest first.
+    #[getter]
+    fn bindings(&self, py: Python) -> PyResult<Py<Table>> {
+        self.table(py, &self.bindings, &self.rows.bindings)
     }
 
     /// What to do about each device; empty where the site does not say what changes cost.

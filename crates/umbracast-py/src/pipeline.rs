@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::{Health, STEP_NS};
 use umbracast_io::outcome_tables::OutcomeRows;
-use umbracast_io::setup;
+use umbracast_io::{reports, setup};
 
 use crate::frame::Frame;
 use crate::outcome::Outcome;
@@ -62,6 +62,18 @@ impl Pipeline {
             let frame = self.frame_of(&frame?, None)?;
             py.detach(|| self.pipeline.learn_empty(&frame));
         }
+        Ok(())
+    }
+
+    /// Takes what access points heard of devices since the last frame: (time in nanoseconds, access point's name, device's number,
+    /// dBm). The next frames' `bindings` say who carries which device.
+    fn hear(&mut self, reports: Vec<(i64, String, u64, f64)>) -> PyResult<()> {
+        let report = |(place, (time_ns, name, device, power_dbm)): (usize, (i64, String, u64, f64))| {
+            reports::named(time_ns, &name, device, power_dbm, self.site.site())
+                .map_err(|e| refused(e.within(format!("report {place}"))))
+        };
+        let reports: Vec<_> = reports.into_iter().enumerate().map(report).collect::<PyResult<_>>()?;
+        self.pipeline.hear(&reports);
         Ok(())
     }
 

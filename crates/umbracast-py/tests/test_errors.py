@@ -86,3 +86,10 @@ def test_a_recording_tells_where_its_sensors_hang(command, tmp_path):
     recording = umbracast.read(tmp_path / "sim" / "scene-0000.mcap")
     found = umbracast.calibrate(recording)
     assert len(found["sensors"]) == 2 and "position_m" in found["toml"]
+
+
+def test_reports():
+    pipeline = umbracast.Pipeline()
+    assert "report 0: access_point: expected one of the site's that has a radio (none has), found \"side\"" in told(
+        lambda: pipeline.hear([(100_000_000, "side", 7, -60.0)])
+    )

@@ -11,6 +11,7 @@ use umbracast::lidar::udp_port;
 use umbracast::site::Sensor;
 use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_eval::run::chain::{self, CIRCLE_M};
+use umbracast_live::heard::Ear;
 use umbracast_live::log::{Event, Form, Level, Log, Watch};
 use umbracast_live::receive::Door;
 use umbracast_live::record::RecordSettings;
@@ -53,11 +54,14 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
         whole: whole.clone(),
     };
     let title = if args.demo { format!("{}, simulated", config.site.name) } else { config.site.name.clone() };
-    let shown = Shown { whole, ..Shown::live(&config.site, &counters, clock, &title) };
+    let heard = counters.clone();
+    let ear: Ear = Arc::new(move |reports| heard.heard.push(reports));
+    let shown =
+        Shown { whole, ear: Some(ear.clone()), ..Shown::live(&config.site, &counters, clock, &title) };
     let page = Page::open(&args.page, shown)?;
     let (form, quiet) = log_of(args, common);
     let told = say::events(form, quiet, clock);
-    let outward = Outward::of_site_file(args.site.site.as_deref(), &config.site, told)?;
+    let outward = Outward::of_site_file(args.site.site.as_deref(), &config.site, (ear, clock), told)?;
     let live = Live::start(settings, outward.beside(page.listener()))?;
     for (sensor, address) in config.site.sensors.iter().zip(live.receivers().bound()) {
         say::line(format_args!("{}: UDP port {}", sensor.name, address.port()));

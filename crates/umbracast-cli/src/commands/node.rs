@@ -10,12 +10,13 @@ use umbracast::config::ForecastMethod;
 use umbracast::forecast::Weights;
 use umbracast::lidar::Packet;
 use umbracast::{Config, Error, Frame, Health, Site};
-use umbracast_live::HostClock;
-use umbracast_live::Published;
+use umbracast_io::reports;
+use umbracast_live::heard::Ear;
 use umbracast_live::log::Form;
 use umbracast_live::receive::{Arrived, Door};
 use umbracast_live::run::{Counters, Listener};
-use umbracast_node::hall::Hall;
+use umbracast_live::{HostClock, Published};
+use umbracast_node::hall::{Hall, Urgency};
 use umbracast_node::keys::Keys;
 use umbracast_node::meet::{self, Unanswered};
 use umbracast_node::network::{self, Mode, Network};
@@ -76,17 +77,21 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let (empty, shared) = empty(args, &config, &sensors, &stages, &hall, shared)?;
     let (weights, shared) = weights(args, &config, &stages, &hall, shared)?;
     let counters = Arc::new(Counters::default());
-    let page = match stages.contains(&Role::Serve) {
-        true => Page::open(&args.page, Shown::live(&config.site, &counters, clock, &config.site.name))?,
-        false => Page::default(),
+    let ear = stages.contains(&Role::Serve).then(|| ear(&hall, &config.site)).transpose()?;
+    let page = match &ear {
+        Some(ear) => {
+            let shown = Shown::live(&config.site, &counters, clock, &config.site.name);
+            Page::open(&args.page, Shown { ear: Some(ear.clone()), ..shown })?
+        }
+        None => Page::default(),
     };
     let session = hall.session().clone();
-    let outward = match stages.contains(&Role::Serve) {
-        true => {
+    let outward = match ear {
+        Some(ear) => {
             let told = say::events(Form::Text, common.quiet, clock);
-            Outward::of_network(&network, || Ok(session), &name, &config.site, told)?
+            Outward::of_network(&network, || Ok(session), &name, &config.site, (ear, clock), told)?
         }
-        false => Outward::default(),
+        None => Outward::default(),
     };
     let mut record = live::recorder(&args.record);
     if stages.contains(&Role::Record) && record.is_none() {
@@ -133,6 +138,13 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let summary = node.stop();
     page.close();
     Ok(tell(&summary, &names, &watch, common))
+}
+
+/// Passes what access points heard on to the nodes that cast.
+fn ear(hall: &Hall, site: &Site) -> Result<Ear, Error> {
+    let key = hall.keys().of(&format!("reports/{}", hall.id()));
+    let (outlet, site) = (hall.outlet(&key, Urgency::Rest)?, site.clone());
+    Ok(Arc::new(move |reports| outlet.put_bytes(reports::to_json(reports, &site).into_bytes())))
 }
 
 /// The page, and what `/metrics` counts.

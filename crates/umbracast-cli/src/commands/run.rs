@@ -9,10 +9,12 @@ use std::time::Duration;
 
 use umbracast::detect::doubled;
 use umbracast::forecast::Weights;
+use umbracast::radio::Report;
 use umbracast::site::Sensor;
-use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline};
+use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline, Site};
 use umbracast_io::outcome_tables::{OutcomeRows, OutcomeTables};
 use umbracast_io::recording::{RecordingWriter, Results};
+use umbracast_io::reports::{self, Reports};
 use umbracast_live::latency::Latencies;
 
 use crate::args::{Common, Run};
@@ -33,6 +35,7 @@ struct Step {
     frame: u64,
     took: Duration,
     rows: OutcomeRows,
+    heard: Vec<Report>,
     doubled: usize,
 }
 
@@ -41,6 +44,8 @@ struct Method<'a> {
     config: &'a Config,
     weights: &'a Weights,
     empty: &'a [Frame],
+    /// What access points heard, where it is not in the recordings.
+    reports: Option<&'a Path>,
     /// Where recordings of the results go, and whether with points.
     recordings: Option<(&'a Path, bool)>,
 }
@@ -65,7 +70,13 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     setup::make_dir(&args.out)?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let recordings = args.mcap.then_some((args.out.as_path(), args.points));
-    let method = Method { config: &config, weights: &weights, empty: &empty, recordings };
+    let method = Method {
+        config: &config,
+        weights: &weights,
+        empty: &empty,
+        reports: args.reports.as_deref(),
+        recordings,
+    };
     let watch = Stopwatch::start();
     let mut tables = OutcomeTables::create(&args.out, &config.site, args.csv, true)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
@@ -174,6 +185,15 @@ fn refuse_twice(numbered: &[(u32, &Input)]) -> Result<(), Error> {
     Ok(())
 }
 
+/// What access points heard: as given, else as the recording holds it.
+pub fn heard(scene: u32, input: &Input, given: Option<&Path>, site: &Site) -> Result<Reports, Error> {
+    match (given, input) {
+        (Some(file), _) => Reports::read(file, scene, site),
+        (None, Input::Recording(file)) if site.has_radio() => Reports::recorded(file, site),
+        _ => Ok(Reports::default()),
+    }
+}
+
 /// Gives what was skipped and lost.
 fn run_scene(
     scene: u32,
@@ -181,18 +201,21 @@ fn run_scene(
     method: &Method,
     results: &SyncSender<Step>,
 ) -> Result<(Health, Vec<String>), Error> {
-    let Method { config, weights, empty, recordings } = method;
+    let Method { config, weights, empty, reports, recordings } = method;
+    let mut reports = heard(scene, input, *reports, &config.site)?;
     let mut pipeline = Pipeline::new(config, Some(weights))?;
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     let mut recording = recordings.map(|(folder, points)| Recording::new(folder, scene, config, points));
     let (mut health, mut stage_health) = (Health::default(), Health::default());
     let lost = input.frames(&config.site, &mut health, |frame| {
         let watch = Stopwatch::start();
+        let heard = reports.before(frame.time_ns);
+        pipeline.hear(&heard);
         let outcome = pipeline.step(frame);
         let took = watch.elapsed();
         let rows = OutcomeRows::of(scene, outcome);
         let doubled = doubled(&outcome.foreground, &outcome.clusters);
-        let step = Step { frame: frame.index, took, rows, doubled };
+        let step = Step { frame: frame.index, took, rows, heard, doubled };
         stage_health = outcome.health;
         if let Some(recording) = &mut recording {
             recording.write(&step, outcome)?;
@@ -249,6 +272,8 @@ impl<'a> Recording<'a> {
             tracks: &step.rows.tracks,
             links: &step.rows.links,
             losses: &step.rows.losses,
+            bindings: &step.rows.bindings,
+            reports: &reports::rows(step.frame, time_ns, &step.heard),
             decisions: &step.rows.decisions,
             foreground: self.points.then_some(&outcome.foreground),
         })

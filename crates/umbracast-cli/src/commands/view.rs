@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use umbracast::{Config, Error, Frame, Health, Pipeline};
+use umbracast_io::reports::Reports;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables;
 use umbracast_live::advice::Advised;
@@ -85,6 +86,8 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
 /// One method on one input.
 struct Shows {
     pipeline: Pipeline,
+    /// What access points heard, as the recording holds it.
+    heard: Reports,
     sensors: usize,
     names: Arc<[String]>,
     warnings: Warnings,
@@ -99,10 +102,19 @@ impl Shows {
             frames.iter().for_each(|frame| pipeline.learn_empty(frame));
         }
         let (sensors, names) = (config.site.sensors.len(), published::access_points(&config.site));
-        Ok(Self { pipeline, sensors, names, warnings: Warnings::default(), advised: Advised::default() })
+        let heard = super::run::heard(0, input, None, &config.site)?;
+        Ok(Self {
+            pipeline,
+            heard,
+            sensors,
+            names,
+            warnings: Warnings::default(),
+            advised: Advised::default(),
+        })
     }
 
     fn step(&mut self, frame: &Frame, clock: HostClock) -> Published {
+        self.pipeline.hear(&self.heard.before(frame.time_ns));
         let outcome = self.pipeline.step(frame);
         let mut published = Published::of(outcome, frame, self.sensors, &self.names);
         published.events = self.warnings.changes(&published.links, &self.names);

@@ -2,6 +2,7 @@
 
 use umbracast::detect::Detection;
 use umbracast::lidar::Views;
+use umbracast::radio::Binder;
 use umbracast::track::Tracker;
 use umbracast::{Config, STEP_NS};
 use umbracast_io::fields::{Message, decode, encode};
@@ -9,7 +10,7 @@ use umbracast_io::messages::{read_scan, read_sensor_packets, scan, sensor_packet
 use umbracast_io::nodes::{Followed, Foreground, NodeHealth, Priors, TrackerState, Warning};
 use umbracast_io::rows::{DetectionRow, LinkRow, TrackRow};
 use umbracast_io::wire::{self, WireRow};
-use umbracast_io::{objects, point_cloud};
+use umbracast_io::{objects, point_cloud, reports};
 
 use super::{Target, packets, step};
 
@@ -22,6 +23,8 @@ pub const ROWS: Target = Target { name: "rows", corpus: row_messages, check: row
 pub const CLOUDS: Target = Target { name: "clouds", corpus: cloud_messages, check: cloud_message };
 /// A list of objects gives detections that a tracker can follow, or nothing. The first eight bytes are the frame's time.
 pub const OBJECTS: Target = Target { name: "objects", corpus: lists, check: list };
+/// JSON of reports gives reports that a binder can take, or a sentence; what is passed on is read again as it was.
+pub const REPORTS: Target = Target { name: "reports", corpus: reported, check: report };
 
 /// What is read is no larger than so many times its bytes.
 const GROWTH: usize = 64;
@@ -201,6 +204,30 @@ fn list(input: &[u8]) -> bool {
         tracker.update(&views, &found, &mut tracks);
         assert!(tracks.len() <= 2 * found.len());
         assert!(tracks.iter().all(step::is_finite), "{tracks:?}");
+    }
+    true
+}
+
+fn reported() -> Vec<Vec<u8>> {
+    let one = r#"{ "access_point": "side", "device": 17, "power_dbm": -63.5 }"#;
+    let many = r#"[ { "time_ns": 200000000, "access_point": "side", "device": 17, "power_dbm": -63.5 },
+        { "time_ns": 180000000, "access_point": "centre", "device": 18446744073709551615, "power_dbm": -7e1 } ]"#;
+    vec![one.into(), many.into()]
+}
+
+fn report(bytes: &[u8]) -> bool {
+    let mut site = Config::default().site;
+    site.access_points.iter_mut().for_each(|ap| ap.radio = Some(umbracast::site::Radio::default()));
+    let now_ns = 2 * STEP_NS;
+    let Ok(came) = reports::from_json(bytes, &site, now_ns) else { return false };
+    let again = reports::from_json(reports::to_json(&came, &site).as_bytes(), &site, now_ns);
+    assert_eq!(again.as_deref().ok(), Some(&came[..]));
+    let (mut binder, mut bindings) = (Binder::new(&site), Vec::new());
+    binder.hear(&came.iter().map(|came| came.report).collect::<Vec<_>>());
+    let outcome = step::outcome();
+    for frame in 1..4 {
+        binder.bind(frame * STEP_NS, &outcome.tracks, &outcome.losses, &mut bindings);
+        assert!(bindings.iter().all(|binding| (0.0..=1.0 + 1e-9).contains(&binding.p)), "{bindings:?}");
     }
     true
 }

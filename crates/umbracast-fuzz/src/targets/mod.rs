@@ -24,7 +24,7 @@ pub struct Target {
 }
 
 /// Every target.
-pub const TARGETS: [Target; 22] = [
+pub const TARGETS: [Target; 23] = [
     files::MCAP,
     tables::PARQUET,
     files::CSV,
@@ -44,6 +44,7 @@ pub const TARGETS: [Target; 22] = [
     messages::ROWS,
     messages::CLOUDS,
     messages::OBJECTS,
+    messages::REPORTS,
     requests::HTTP,
     plans::PLANS,
     step::STEP,

@@ -4,7 +4,8 @@ use std::fs;
 
 use umbracast::decide::Action;
 use umbracast_io::rows::{
-    DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow,
+    BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, ReportRow,
+    TrackRow,
 };
 use umbracast_io::tables::{self, Cell, Row, describe, path_in};
 
@@ -32,6 +33,8 @@ fn written() -> Vec<Vec<u8>> {
         table_of::<LinkRow>(5),
         table_of::<LossRow>(6),
         table_of::<DecisionRow>(7),
+        table_of::<BindingRow>(8),
+        table_of::<ReportRow>(9),
     ]
 }
 
@@ -63,7 +66,7 @@ fn table_of<R: Row>(kind: u8) -> Vec<u8> {
 
 fn table(input: &[u8]) -> bool {
     let Some((kind, bytes)) = input.split_first() else { return false };
-    match kind % 8 {
+    match kind % 10 {
         0 => rows_of::<PeopleRow>(bytes),
         1 => rows_of::<PeopleLinkRow>(bytes),
         2 => rows_of::<DetectionRow>(bytes),
@@ -71,7 +74,9 @@ fn table(input: &[u8]) -> bool {
         4 => rows_of::<TrackRow>(bytes),
         5 => rows_of::<LinkRow>(bytes),
         6 => rows_of::<LossRow>(bytes),
-        _ => rows_of::<DecisionRow>(bytes),
+        7 => rows_of::<DecisionRow>(bytes),
+        8 => rows_of::<BindingRow>(bytes),
+        _ => rows_of::<ReportRow>(bytes),
     }
 }
 

@@ -6,7 +6,8 @@ use umbracast::STEPS;
 use umbracast::decide::Action;
 
 use crate::rows::{
-    DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, TrackRow,
+    BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, ReportRow,
+    TrackRow,
 };
 
 /// A row of a table.
@@ -294,5 +295,32 @@ impl Row for DecisionRow {
         see(plain("deadline_s"), Cell::MaybeF64(&mut self.deadline_s));
         see(plain("saved_s"), Cell::F64(&mut self.saved_s));
         see(plain("p_out"), Cell::F64(&mut self.p_out));
+    }
+}
+
+impl Row for BindingRow {
+    const TABLE: &'static str = "bindings";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("device"), Cell::U64(&mut self.device));
+        see(plain("track"), Cell::U64(&mut self.track));
+        see(plain("p"), Cell::F64(&mut self.p));
+    }
+}
+
+impl Row for ReportRow {
+    const TABLE: &'static str = "reports";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("heard_ns"), Cell::I64(&mut self.heard_ns));
+        see(plain("access_point"), Cell::AccessPoint(&mut self.access_point));
+        see(plain("device"), Cell::U64(&mut self.device));
+        see(plain("power_dbm"), Cell::F64(&mut self.power_dbm));
     }
 }

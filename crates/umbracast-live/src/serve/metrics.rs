@@ -46,6 +46,11 @@ pub fn text(watched: &Watched, newest: &Published, connections: &Connections) ->
     let state =
         |blocked: bool| newest.links.iter().filter(|link| link.is_blocked() == blocked).count() as f64;
     gauge(&mut out, "links_blocked", "Links blocked now.", state(true));
+    let what = "Reports of access points that were taken.";
+    counter(&mut out, "reports_total", what, counters.heard.taken() as f64);
+    let what = "Reports that came while too many waited, or of which nothing could be made.";
+    let skipped = counters.heard.lost() + counters.reports_skipped.load(Ordering::Relaxed);
+    counter(&mut out, "reports_skipped_total", what, skipped as f64);
     gauge(&mut out, "streams", "Open WebSockets and event streams.", connections.streams() as f64);
     let what = "Connections closed unheard because there were too many.";
     counter(&mut out, "connections_refused_total", what, connections.refused() as f64);

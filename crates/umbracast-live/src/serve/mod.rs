@@ -9,6 +9,7 @@
 //! | `/api/recording` | a recording that is looked at; below it its frames and scans |
 //! | `/api/plan/NAME` | what the page of `plan` asks |
 //! | `/api/live` | WebSocket: every frame, or the newest that a slow client can take |
+//! | `/api/reports` | takes what access points heard of devices (POST) |
 //! | `/api/events` | server-sent events: warnings, blockages, clear links, decisions |
 //! | `/api/openapi.json` | this interface, with the JSON Schema of every row |
 //! | `/health` | 200 while frames come, 503 while they do not |
@@ -18,6 +19,7 @@
 //! only, never from the pipeline, which only leaves the newest frame here.
 
 mod planned;
+mod reported;
 mod watched;
 mod tls;
 mod connections;
@@ -217,6 +219,7 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/api/recording/frames", get(looked_at::frames))
         .route("/api/recording/scan", get(looked_at::recorded_scan))
         .route("/api/plan/{name}", post(planned::answer))
+        .route("/api/reports", post(reported::take))
         .route("/api/events", get(events))
         .route("/api/openapi.json", get(async || Json(openapi::document())))
         .route("/health", get(health))

@@ -1,7 +1,7 @@
 //! The interface as OpenAPI 3.1, with the rows' schemas made from their columns.
 
 use serde_json::{Value, json};
-use umbracast_io::rows::{DecisionRow, LinkRow, LossRow, TrackRow};
+use umbracast_io::rows::{BindingRow, DecisionRow, LinkRow, LossRow, TrackRow};
 use umbracast_io::wire;
 
 /// The document.
@@ -26,6 +26,7 @@ pub fn document() -> Value {
             "/api/recording": json_of("Of view: how many frames are computed, and of what; 404 of other commands", json!({ "type": "object" })),
             "/api/recording/frames": json_of("?from=&count=: for each frame what every mode says, and the truth", json!({ "type": "array", "items": { "type": "object" } })),
             "/api/recording/scan": text_of("?frame=: its whole scan, as /api/scan", "application/octet-stream"),
+            "/api/reports": reports_path(),
             "/api/events": text_of("Server-sent events: warning, blocked, clear, gone, an Event as JSON each; decision, a DecisionEvent", "text/event-stream"),
             "/health": json_of("200 while frames come, 503 while they do not", json!({ "type": "object" })),
             "/metrics": text_of("Counters and histograms for Prometheus", "text/plain"),
@@ -34,11 +35,40 @@ pub fn document() -> Value {
             "Track": wire::json_schema::<TrackRow>(),
             "Blockage": wire::json_schema::<LinkRow>(),
             "Loss": wire::json_schema::<LossRow>(),
+            "Binding": wire::json_schema::<BindingRow>(),
+            "Report": report_schema(),
             "Decision": wire::json_schema::<DecisionRow>(),
             "Frame": frame_schema(),
             "Event": event_schema(),
             "DecisionEvent": decision_event_schema(),
         } }
+    })
+}
+
+fn reports_path() -> Value {
+    let one = json!({ "$ref": "#/components/schemas/Report" });
+    let schema = json!({ "oneOf": [one, { "type": "array", "items": one }] });
+    json!({ "post": {
+        "summary": "What access points heard of devices: one report or a list",
+        "requestBody": { "required": true, "content": { "application/json": { "schema": schema } } },
+        "responses": {
+            "202": { "description": "All are taken with the next frame" },
+            "400": { "description": "One cannot be, and none was taken; says which, expected and found" },
+        },
+    } })
+}
+
+fn report_schema() -> Value {
+    json!({
+        "title": "Report",
+        "type": "object",
+        "required": ["access_point", "device", "power_dbm"],
+        "properties": {
+            "time_ns": { "type": "integer", "description": "When it was heard, in the sensors' time; just now, where it is missing." },
+            "access_point": { "type": "string", "description": "Its name in the site file; it has a radio there." },
+            "device": { "type": "integer", "description": "The network's name of the device." },
+            "power_dbm": { "type": "number", "description": "Received power of the reference signal." },
+        }
     })
 }
 
@@ -62,6 +92,7 @@ fn frame_schema() -> Value {
             "tracks": list("Track"),
             "blockages": list("Blockage"),
             "losses": list("Loss"),
+            "bindings": list("Binding"),
             "decisions": list("Decision"),
             "events": { "type": "array", "items": { "oneOf": [
                 { "$ref": "#/components/schemas/Event" }, { "$ref": "#/components/schemas/DecisionEvent" } ] } },

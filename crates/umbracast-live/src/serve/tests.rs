@@ -49,6 +49,54 @@ fn get(server: &Server, path: &str, heads: &str) -> (u16, String) {
     (head.split(' ').nth(1).unwrap().parse().unwrap(), body.to_owned())
 }
 
+/// Status and body of the answer to a body that is posted.
+fn post(server: &Server, path: &str, heads: &str, body: &str) -> (u16, String) {
+    let (mut stream, host) = (TcpStream::connect(server.address()).unwrap(), server.address());
+    let length = body.len();
+    write!(
+        stream,
+        "POST {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Length: {length}\r\n{heads}\r\n{body}"
+    )
+    .unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+    (head.split(' ').nth(1).unwrap().parse().unwrap(), body.to_owned())
+}
+
+#[test]
+fn reports_are_posted_by_who_may_and_what_is_none_is_told() {
+    let mut site = Config::default().site;
+    site.access_points[0].radio = Some(umbracast::site::Radio::default());
+    let name = site.access_points[0].name.clone();
+    let (counters, clock) = (Arc::new(Counters::default()), HostClock::start());
+    let mut watched = Watched::new(site, counters.clone(), clock, "a test");
+    let heard = counters.clone();
+    watched.ear = Some(Arc::new(move |reports| heard.heard.push(reports)));
+    let token = "sixteen characters";
+    let door = Door { token: Some(token.to_owned()), ..Door::at(SocketAddr::from(([127, 0, 0, 1], 0))) };
+    let server = start(door, watched).unwrap();
+    let one = format!("{{\"access_point\":\"{name}\",\"device\":7,\"power_dbm\":-61.5}}");
+    assert_eq!(post(&server, "/api/reports", "", &one).0, 401);
+    let bearer = format!("Authorization: Bearer {token}\r\n");
+    let two = format!("[{one},{one}]");
+    assert_eq!(post(&server, "/api/reports", &bearer, &two), (202, String::new()));
+    let now_ns = clock.now_ns();
+    let reports = counters.heard.take(now_ns, now_ns);
+    assert_eq!((reports.len(), reports[1].device, reports[1].power_dbm), (2, 7, -61.5));
+    assert!((now_ns - reports[0].time_ns).abs() < 60_000_000_000, "heard just now");
+    let (status, told) = post(&server, "/api/reports", &bearer, &two.replace(&name, "attic"));
+    assert_eq!(status, 400);
+    assert!(
+        told.starts_with("report 0: access_point: expected one of the site's that has a radio"),
+        "{told}"
+    );
+    assert!(counters.heard.take(0, 0).is_empty(), "none of them is taken");
+    let metrics = get(&server, "/metrics", &bearer).1;
+    assert!(metrics.contains("\numbracast_reports_total 2\n"), "{metrics}");
+    server.stop();
+}
+
 #[test]
 fn curl_gets_what_the_page_gets() {
     let (server, clock) = server(None);

@@ -6,6 +6,7 @@ use umbracast::Site;
 
 use super::planned::Planner;
 use crate::clock::HostClock;
+use crate::heard::Ear;
 use crate::recording::Recording;
 use crate::run::Counters;
 use crate::whole::Whole;
@@ -26,12 +27,14 @@ pub struct Watched {
     pub recording: Option<Arc<Recording>>,
     /// Who answers the page of `plan`; then that page is served in place of the one that watches.
     pub planner: Option<Planner>,
+    /// Who takes what access points heard of devices, where somebody does.
+    pub ear: Option<Ear>,
 }
 
 impl Watched {
     /// A live run of that site, under that title.
     pub fn new(site: Site, counters: Arc<Counters>, clock: HostClock, title: impl Into<String>) -> Self {
         let (whole, title) = (Arc::default(), title.into());
-        Self { site, counters, clock, title, whole, recording: None, planner: None }
+        Self { site, counters, clock, title, whole, recording: None, planner: None, ear: None }
     }
 }
