@@ -206,6 +206,61 @@ fn what_a_live_run_heard_is_heard_again_from_its_recording() {
 }
 
 #[test]
+fn a_data_set_is_scored_without_us() {
+    let out = folder("dataset");
+    let (set, answers) = (out.join("set"), out.join("answers"));
+    let words =
+        ["network", "--dataset", text(&set), "--csv", "--scenes", "1", "--seconds", "20", "--people", "4"];
+    done(
+        &[&words[..], &["--seed", "120000", "--carrier", "28", "--access-points", "2", "--truth", "edges"]]
+            .concat(),
+    );
+    let csv = |name: &str| fs::read_to_string(set.join(name)).expect("a table");
+    assert_eq!(csv("split.csv"), "scene,seed,split\n0,120000,train\n");
+    assert_eq!(csv("devices.csv").lines().count(), 5);
+    // Every 10 ms, two access points, four people.
+    assert_eq!(csv("radio.csv").lines().count(), 1 + 2000 * 8);
+    assert!(
+        csv("labels.csv")
+            .starts_with("scene,frame,time_ns,access_point,person,x_m,y_m,loss_now_db,loss_s1_db,")
+    );
+    let reports = set.join("reports.csv");
+    done(&["run", text(&set), "--csv", "--reports", text(&reports), "--out", text(&answers)]);
+    assert!(fs::read_to_string(answers.join("bindings.csv")).expect("a table").lines().count() > 100);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/dataset/score.py");
+    let score = |split: &str| {
+        Command::new("python3")
+            .arg(&script)
+            .args([&set, &answers])
+            .args(["--split", split])
+            .output()
+            .expect("python3")
+    };
+    let said = score("train");
+    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+    let said = String::from_utf8_lossy(&said.stdout).into_owned();
+    let value = |name: &str| {
+        let line =
+            said.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {said}"));
+        line.rsplit(' ').next().and_then(|value| value.parse::<f64>().ok()).expect("a number")
+    };
+    assert!(value("share followed") > 0.8 && value("F1 of out within 300 ms") > 0.6, "{said}");
+    assert!(value("expected calibration error") < 0.1, "{said}");
+    assert!(!score("test").status.success(), "there is no such scene");
+    // The same set as if it had been measured.
+    let words = ["network", "--measured", text(&set), "--reports", text(&reports), "--json"];
+    let said = umbracast(&words).output().expect("runs").stdout;
+    let fit: serde_json::Value = serde_json::from_slice(&said).expect("JSON");
+    assert!(fit["links"].as_u64() >= Some(4), "{fit}");
+    assert!(
+        fit["ahead"][0]["rmse_db"].as_f64() < Some(9.0) && fit["f1_out_300_ms"].as_f64() > Some(0.4),
+        "{fit}"
+    );
+    let refused = umbracast(&["network", "--measured", text(&set)]).output().expect("runs");
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("are there reports"), "nothing was heard");
+}
+
+#[test]
 fn a_network_is_played_alike_on_any_number_of_threads_and_traced_for_another_simulator() {
     let out = folder("network");
     let words = [

@@ -234,6 +234,35 @@ pub struct ReportRow {
     pub power_dbm: f64,
 }
 
+/// Truth of the radio: what bodies cost one link at one instant.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct RadioRow {
+    pub scene: u32,
+    pub time_ns: i64,
+    pub access_point: u32,
+    pub person: u32,
+    pub loss_db: f64,
+}
+
+/// What of that truth is to be foreseen from one frame on.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LabelRow {
+    pub scene: u32,
+    pub frame: u64,
+    pub time_ns: i64,
+    pub access_point: u32,
+    pub person: u32,
+    /// Where the person is.
+    pub x_m: f64,
+    pub y_m: f64,
+    /// Now, then at steps 1..=9.
+    pub loss_db: [f64; 1 + STEPS],
+    /// Whether the loss is the margin or more now, then at any instant of windows 1..=9.
+    pub out: [bool; 1 + STEPS],
+    /// Until a link that is not out now first is; null where it is not within the steps.
+    pub onset_s: Option<f64>,
+}
+
 /// The rows of one outcome.
 pub fn of_outcome(scene: u32, outcome: &Outcome, tracks: &mut Vec<TrackRow>, links: &mut Vec<LinkRow>) {
     tracks.reserve(outcome.tracks.len());

@@ -19,4 +19,6 @@ pub mod experiment;
 pub mod fades;
 pub mod passages;
 pub mod trace;
+pub mod dataset;
+pub mod measured;
 pub mod report;

@@ -66,9 +66,26 @@ pub struct Network {
     /// --out. `ns3` is for examples/ns3/umbracast-loss.h.
     #[arg(long, value_name = "SIMULATOR", value_parser = ["ns3"], requires = "out", conflicts_with_all = ["policies", "losses"])]
     pub trace: Option<String>,
+    /// Write a data set instead of playing policies, of the first case alone: recordings of LiDARs, who was where, losses every
+    /// 10 ms, labels, reports of power, and a split (docs/NETWORK.md).
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["policies", "losses", "trace", "out"])]
+    pub dataset: Option<PathBuf>,
+    /// With --dataset: every table as CSV too.
+    #[arg(long, requires = "dataset")]
+    pub csv: bool,
+    /// Compare the losses told with measured ones instead: recordings, or captures, of a site whose access points have radios.
+    /// Power comes from --reports, or from the recordings.
+    #[arg(long, value_name = "INPUT", num_args = 1.., conflicts_with_all = ["policies", "losses", "trace", "out", "dataset"])]
+    pub measured: Vec<PathBuf>,
+    /// With --measured: what access points heard of devices, as for `run`.
+    #[arg(long, value_name = "FILE", requires = "measured")]
+    pub reports: Option<PathBuf>,
+    /// With --measured: the hall without people. Default: empty.mcap beside the recordings.
+    #[arg(long, value_name = "PATH", requires = "measured")]
+    pub empty: Option<PathBuf>,
     /// Compare the shape of real fades with the model's instead: a table of passages in the form of IMMERSE
     /// (docs/NETWORK.md).
-    #[arg(long, value_name = "TRACES.csv", conflicts_with_all = ["policies", "losses", "trace"])]
+    #[arg(long, value_name = "TRACES.csv", conflicts_with_all = ["policies", "losses", "trace", "dataset"])]
     pub shape: Option<PathBuf>,
     /// Folder for the table, network.csv, and the same as network.json.
     #[arg(long, value_name = "DIR", conflicts_with = "losses")]

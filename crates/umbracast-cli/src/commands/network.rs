@@ -1,15 +1,20 @@
 //! `network`: what forecasts of blockage gain a network, in closed loop.
 
+use std::path::Path;
+
 use umbracast::forecast::Weights;
-use umbracast::{Config, Error, Mode};
+use umbracast::{Config, Error, Health, Mode, Pipeline};
 use umbracast_network::case::{Sweep, with_radios};
+use umbracast_network::dataset::DataSet;
 use umbracast_network::experiment::{self, Spec};
 use umbracast_network::hall::{Crowd, Hall};
+use umbracast_network::measured::{Fit, Measured};
 use umbracast_network::policy::Policy;
 use umbracast_network::{fades, passages, report, trace};
 
 use crate::args::{Common, Network};
 use crate::ending::Ending;
+use crate::input;
 use crate::progress::bar;
 use crate::{say, setup};
 
@@ -23,9 +28,15 @@ pub fn run(args: &Network, common: &Common) -> Result<Ending, Error> {
         });
         return Ok(Ending::Done);
     }
+    if !args.measured.is_empty() {
+        return measured(args, common);
+    }
     let site = setup::config(Mode::Default, args.site.site.as_deref())?;
     let is_given = site.site.has_radio();
     let config = with_radios(&site, args.own_body);
+    if let Some(folder) = &args.dataset {
+        return dataset(args, common, &config, is_given, folder);
+    }
     let policies = if args.policies.is_empty() { Policy::ALL.to_vec() } else { args.policies.clone() };
     let weights = setup::weights(None)?;
     let paper: Option<&Weights> =
@@ -85,6 +96,74 @@ pub fn run(args: &Network, common: &Common) -> Result<Ending, Error> {
         setup::write(&folder.join("network.json"), &json)?;
     }
     say::text(&if common.json { json } else { played + &report::to_text(&rows) });
+    Ok(Ending::Done)
+}
+
+/// Compares what is told of recordings with the power that was heard in them.
+fn measured(args: &Network, common: &Common) -> Result<Ending, Error> {
+    let inputs = input::scenes(&args.measured)?;
+    let mut config = setup::config(Mode::Default, args.site.site.as_deref())?;
+    if args.site.site.is_none() {
+        config.site = input::recorded_site(&inputs)?.unwrap_or(config.site);
+    }
+    if !config.site.has_radio() {
+        return Err(Error::new("site.access_points: expected one with `radio`, found none"));
+    }
+    let inputs = input::of_site(inputs, &config.site)?;
+    let mut health = Health::default();
+    let empty = args.empty.clone().or_else(|| input::empty_beside(&inputs[0]));
+    let empty = empty.map(|path| input::empty_frames(&path, &config, &mut health)).transpose()?;
+    let (mut measured, mut lost) = (Vec::new(), Vec::new());
+    for (place, input) in inputs.iter().enumerate() {
+        let scene = input::scene_number(input).unwrap_or(place as u32);
+        let mut reports = super::run::heard(scene, input, args.reports.as_deref(), &config.site)?;
+        let mut pipeline = Pipeline::new(&config, None)?;
+        empty.iter().flat_map(|(frames, _)| frames).for_each(|frame| pipeline.learn_empty(frame));
+        let mut of_scene = Measured::default();
+        lost.extend(input.frames(&config.site, &mut health, |frame| {
+            let heard = reports.before(frame.time_ns);
+            pipeline.hear(&heard);
+            of_scene.take(&config.site, &heard, pipeline.step(frame));
+            Ok(())
+        })?);
+        measured.push(of_scene.fit(&config.site));
+    }
+    let fit = Fit::sum(&measured);
+    if fit.links == 0 {
+        return Err(Error::new(
+            "expected devices that were bound to people and heard in sight for a second, found none: are there reports \
+             (--reports), of these times, and people?",
+        ));
+    }
+    say::text(&if common.json { format!("{}\n", fit.to_json()) } else { fit.to_text() });
+    if lost.is_empty() { Ok(Ending::Done) } else { Ok(Ending::DataLost(lost.join("; "))) }
+}
+
+/// Writes the first case of the sweep as a data set.
+fn dataset(
+    args: &Network,
+    common: &Common,
+    config: &Config,
+    is_given: bool,
+    folder: &Path,
+) -> Result<Ending, Error> {
+    let people = args.people[0];
+    let case = sweep(args, people, config, is_given).cases()[0];
+    let config = Config::of_run(&case.config(config)?.to_toml(), "network")?;
+    setup::make_dir(folder)?;
+    setup::write(&folder.join("config.toml"), config.to_toml())?;
+    let crowd = Crowd { preset: args.preset, people, seconds: args.seconds.into() };
+    let first = args.seed.unwrap_or(setup::TEST_SEED);
+    let progress = bar(args.scenes.into(), "scenes written", common.quiet);
+    setup::with_threads(common.threads, || -> Result<(), Error> {
+        let mut set = DataSet::create(folder, &config, args.csv)?;
+        for scene in 0..args.scenes {
+            set.add(scene, crowd, first + u64::from(scene), case.truth)?;
+            progress.inc(1);
+        }
+        set.finish()
+    })??;
+    progress.finish_and_clear();
     Ok(Ending::Done)
 }
 

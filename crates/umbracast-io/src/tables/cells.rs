@@ -6,8 +6,8 @@ use umbracast::STEPS;
 use umbracast::decide::Action;
 
 use crate::rows::{
-    BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, ReportRow,
-    TrackRow,
+    BindingRow, DecisionRow, DetectionRow, LabelRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow,
+    RadioRow, ReportRow, TrackRow,
 };
 
 /// A row of a table.
@@ -322,5 +322,40 @@ impl Row for ReportRow {
         see(plain("access_point"), Cell::AccessPoint(&mut self.access_point));
         see(plain("device"), Cell::U64(&mut self.device));
         see(plain("power_dbm"), Cell::F64(&mut self.power_dbm));
+    }
+}
+
+impl Row for RadioRow {
+    const TABLE: &'static str = "radio";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("access_point"), Cell::AccessPoint(&mut self.access_point));
+        see(plain("person"), Cell::U32(&mut self.person));
+        see(plain("loss_db"), Cell::F64(&mut self.loss_db));
+    }
+}
+
+impl Row for LabelRow {
+    const TABLE: &'static str = "labels";
+
+    fn visit(&mut self, see: &mut dyn FnMut(Name, Cell)) {
+        see(plain("scene"), Cell::U32(&mut self.scene));
+        see(plain("frame"), Cell::U64(&mut self.frame));
+        see(plain("time_ns"), Cell::I64(&mut self.time_ns));
+        see(plain("access_point"), Cell::AccessPoint(&mut self.access_point));
+        see(plain("person"), Cell::U32(&mut self.person));
+        see(plain("x_m"), Cell::F64(&mut self.x_m));
+        see(plain("y_m"), Cell::F64(&mut self.y_m));
+        for (h, value) in self.loss_db.iter_mut().enumerate() {
+            let name = if h == 0 { plain("loss_now_db") } else { Name("loss_s", Some(h), "_db") };
+            see(name, Cell::F64(value));
+        }
+        for (w, value) in self.out.iter_mut().enumerate() {
+            let name = if w == 0 { plain("out_now") } else { Name("out_w", Some(w), "") };
+            see(name, Cell::Bool(value));
+        }
+        see(plain("onset_s"), Cell::MaybeF64(&mut self.onset_s));
     }
 }
