@@ -5,6 +5,7 @@
 mod args;
 mod ending;
 mod setup;
+mod inputs;
 mod say;
 mod run_json;
 mod progress;
@@ -23,7 +24,6 @@ use clap::{CommandFactory, FromArgMatches};
 
 use args::{Cli, Command};
 use ending::Ending;
-use umbracast_io::input;
 
 /// Zenoh is 200 crates, which most users need not build.
 #[cfg(not(feature = "node"))]

@@ -23,7 +23,7 @@ use umbracast_sim::sensor::Sensors;
 
 use crate::args::{self, Common, LogForm, RecordArgs};
 use crate::ending::Ending;
-use crate::input;
+use crate::inputs;
 use crate::outward::Outward;
 use crate::page::{Page, Shown};
 use crate::run_json::{RunJson, Stopwatch};
@@ -44,7 +44,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     let whole = Arc::new(Whole::default());
     let settings = Settings {
         weights: Some(setup::weights(args.weights.as_deref())?),
-        empty: empty_frames(args, &config)?,
+        empty: empty_frames(args, &config, common)?,
         doors: doors(&config.site, args.port, args.demo)?,
         record: recorder(&args.record),
         config: config.clone(),
@@ -180,13 +180,22 @@ pub fn recorder(args: &RecordArgs) -> Option<RecordSettings> {
 }
 
 /// The hall without people, as given; a demonstration simulates it.
-fn empty_frames(args: &args::Live, config: &Config) -> Result<Vec<Frame>, Error> {
-    match (&args.empty, args.demo) {
+fn empty_frames(args: &args::Live, config: &Config, common: &Common) -> Result<Vec<Frame>, Error> {
+    match (args.empty.as_deref(), args.demo) {
         (Some(path), _) => {
-            input::empty_frames(path, config, &mut Health::default()).map(|(frames, _)| frames)
+            let (site, mut health) = (&config.site, Health::default());
+            let read = inputs::empty_frames(Some(path), None, &args.captures, site, &mut health, common);
+            read.map(|(frames, _)| frames)
         }
         (None, true) => chain::empty_frames(&config.site, TEST_SEED),
-        (None, false) => Ok(Vec::new()),
+        (None, false) => {
+            say::caution(
+                "no empty hall is given, so the background is learned on the way: people who stand from the start cannot be told \
+                 from furniture, and the first frames cannot be trusted. Record two seconds without people (--record) and give \
+                 them with --empty",
+            );
+            Ok(Vec::new())
+        }
     }
 }
 

@@ -10,6 +10,7 @@ use umbracast::config::ForecastMethod;
 use umbracast::forecast::Weights;
 use umbracast::lidar::Packet;
 use umbracast::{Config, Error, Frame, Health, Site};
+use umbracast_io::input::{self, Given, Input};
 use umbracast_live::HostClock;
 use umbracast_live::Published;
 use umbracast_live::log::Form;
@@ -28,7 +29,6 @@ use super::live;
 use crate::alive::Alive;
 use crate::args::{self, Common};
 use crate::ending::Ending;
-use crate::input::{self, Input};
 use crate::outward::Outward;
 use crate::page::{Page, Shown};
 use crate::run_json::{RunJson, Stopwatch};
@@ -226,11 +226,12 @@ fn empty(
     let site = &config.site;
     if let Some(path) = &args.empty {
         let mut packets = vec![Vec::new(); site.sensors.len()];
-        one_input(path, site)?.packets(site, |sensor, packet: Packet| {
+        let empty = input::empty_hall(&[path.clone()], site, &[])?;
+        empty.packets(site, |sensor, packet: Packet| {
             packets[sensor].push(packet);
             Ok(())
         })?;
-        let (frames, _) = input::empty_frames(path, config, &mut Health::default())?;
+        let (frames, _) = empty.all_frames(site, &mut Health::default())?;
         return Ok((frames, shared.with_empty(hall, site, &packets)));
     }
     if !stages.contains(&Role::Sensor) {
@@ -294,7 +295,7 @@ fn weights(
 }
 
 fn one_input(path: &Path, site: &Site) -> Result<Input, Error> {
-    let mut inputs = input::of_site(input::scenes(std::slice::from_ref(&path.to_owned()))?, site)?;
+    let mut inputs = Given::of(&[path.to_owned()])?.of_site(site, &[])?.scenes;
     match (inputs.pop(), inputs.is_empty()) {
         (Some(input), true) => Ok(input),
         _ => Err(Error::new("expected one scene, found several").within(path.display())),

@@ -12,7 +12,7 @@ use umbracast_io::pcap::{Datagram, PcapWriter};
 use umbracast_io::recording::RecordingWriter;
 
 use crate::args::{Packets, Simulate};
-use crate::input;
+use umbracast_io::input;
 
 /// Files that appear under their names only when they are whole, so that a run that was stopped leaves none behind that
 /// looks finished.
