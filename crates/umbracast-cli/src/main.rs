@@ -46,6 +46,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Run(args) => commands::run::run(&args, &cli.common),
         Command::Cast(args) => commands::cast::run(&args, &cli.common),
+        Command::Export(args) => commands::export::run(&args, &cli.common),
         Command::Live(args) => commands::live::run(&args, &cli.common),
         #[cfg(feature = "node")]
         Command::Node(args) => commands::node::run(&args, &cli.common),

@@ -12,6 +12,7 @@ mod live;
 mod calibrate;
 mod captures;
 mod cast;
+mod export;
 mod network;
 mod plan;
 #[cfg(feature = "node")]
@@ -24,6 +25,7 @@ pub use captures::CaptureArgs;
 pub use cast::Cast;
 use crowd::one_or_more;
 pub use crowd::{BodyArgs, CrowdArgs, Replay};
+pub use export::{Export, ExportForm};
 #[cfg(feature = "node")]
 pub use fleet::Fleet;
 pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
@@ -69,6 +71,8 @@ pub enum Command {
     Run(Run),
     /// Turn tracks of another program into links: CSV or Parquet with number, time, position and velocity.
     Cast(Cast),
+    /// Write scans, foreground, ways and links in forms that other programs open: PCD, PLY, LAS, GeoJSON.
+    Export(Export),
     /// Receive sensors' packets, run all stages as frames close, serve a page with warnings, and record.
     Live(Live),
     /// Run one process of a hall whose stages run on several hosts, over Zenoh.
