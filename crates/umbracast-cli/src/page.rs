@@ -25,13 +25,18 @@ pub struct Shown<'a> {
     pub whole: Arc<Whole>,
     /// The frames of a recording, where one is looked at.
     pub recording: Option<Arc<Recording>>,
+    /// Who takes lists of objects of another perception, by source.
+    pub objects: Option<Objects>,
 }
+
+/// Takes a list of objects: its source's name, and the bytes.
+pub type Objects = Box<dyn Fn(&str, &[u8]) + Send + Sync>;
 
 impl<'a> Shown<'a> {
     /// A hall that is watched as it is.
     pub fn live(site: &'a Site, counters: &Arc<Counters>, clock: HostClock, title: &str) -> Self {
         let (counters, title) = (counters.clone(), title.to_owned());
-        Self { site, counters, clock, title, whole: Arc::default(), recording: None }
+        Self { site, counters, clock, title, whole: Arc::default(), recording: None, objects: None }
     }
 }
 
@@ -56,6 +61,7 @@ impl Page {
             umbracast_live::serve::Watched::new(shown.site.clone(), shown.counters, shown.clock, shown.title);
         watched.whole = shown.whole;
         watched.recording = shown.recording;
+        watched.objects = shown.objects;
         Self::serve(args, watched)
     }
 

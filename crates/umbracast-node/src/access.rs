@@ -188,7 +188,12 @@ impl Work {
                     ..of_all
                 }
             }
-            Kind::Objects => Rights { writes: keys(&["objects/*"]), asks: keys(&["config/site"]), ..rights },
+            Kind::Objects => Rights {
+                writes: keys(&["objects/*"]),
+                reads: keys(&["json", "warnings/*"]),
+                asks: keys(&["config/site"]),
+                ..rights
+            },
             Kind::Ros2(domain) => Rights {
                 writes: vec![format!("{domain}/**")],
                 reads: [keys(&["**"]), vec![format!("{domain}/**")]].concat(),
@@ -221,14 +226,14 @@ fn of_role(role: Role) -> (Ends, Ends, Ends, Ends) {
             (&["tracks"], &["followed", "state"], &["state"], &["state", "config/site", "config/weights"])
         }
         Role::Cast => (
-            &["links", "losses", "decisions", "warnings/*"],
+            &["links", "losses", "decisions", "warnings/*", "json"],
             &["tracks", "state"],
             &["state"],
             &["state", "config/site"],
         ),
         Role::Record | Role::Serve => (&[], &["**"], &["state"], &[]),
         Role::Display => (&[], &["**"], &[], &[]),
-        Role::Controller => (&[], &["links", "losses", "decisions", "warnings/*"], &[], &[]),
+        Role::Controller => (&[], &["links", "losses", "decisions", "warnings/*", "json"], &[], &[]),
         Role::Router => (&[], &[], &[], &[]), // Of no hall: see above.
     }
 }

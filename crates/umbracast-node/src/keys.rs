@@ -16,6 +16,7 @@ use crate::role::Role;
 /// | `tracks` | forecast | everybody followed with forecasts |
 /// | `links` | cast | rows of every link |
 /// | `warnings/AP` | cast | what changed of the links of an access point |
+/// | `json` | cast | tracks, links, losses and decisions of a frame as JSON, while somebody listens |
 /// | `health/ROLE/ID` | everybody | load and what was skipped, once a second |
 /// | `objects/SOURCE` | others' perception | lists of objects in place of stage 1 |
 /// | `config/site`, `config/background/NAME`, `config/weights` | query | settings, from whoever has them |

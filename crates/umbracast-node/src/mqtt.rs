@@ -1,4 +1,5 @@
-//! Warnings and decisions as JSON over MQTT for clients without Zenoh, sent to an existing broker.
+//! Warnings, decisions and frames as JSON over MQTT for clients without Zenoh, sent to an existing broker; and lists of objects
+//! from it.
 //!
 //! It does not use Zenoh's bridge, because the bridge passes on bytes. Warnings on Zenoh are CDR, and MQTT listeners
 //! expect JSON. `rumqttc` is maintained and small, and needs no runtime that Zenoh does not need already.
@@ -13,6 +14,7 @@ use std::time::Duration;
 use rumqttc::{Client, Connection, LastWill, MqttOptions, QoS, TlsConfiguration, Transport};
 use serde::Deserialize;
 use umbracast::Error;
+use umbracast_live::Published;
 use umbracast_live::advice::Advice;
 use umbracast_live::log::{self, Level};
 use umbracast_live::warnings::Event;
@@ -21,6 +23,10 @@ use crate::secrets;
 
 /// Warnings that wait for the broker; more are lost, and counted.
 const WAITING: usize = 4096;
+/// While so many messages wait for the broker's acknowledgment, a frame is left out: the next one is worth more.
+const FRAMES_WAITING: i64 = 16;
+/// The longest message: a list or a frame of a thousand people.
+const LONGEST_BYTES: usize = 4 << 20;
 /// A broker that does not answer is called again after so long.
 const RETRY: Duration = Duration::from_secs(1);
 /// A broker is asked whether it is there when it was silent for so long.
@@ -44,12 +50,19 @@ pub struct Mqtt {
     /// Warnings and password go to a broker on another host as they are. Without `ca` that has to be said.
     #[serde(default)]
     pub plain: bool,
+    /// Takes lists of objects from `umbracast/HALL/objects/SOURCE`.
+    #[serde(default)]
+    pub objects: bool,
+    /// Sends each frame with its tracks and links to `umbracast/HALL/frames`.
+    #[serde(default)]
+    pub frames: bool,
 }
 
 /// Sends the warnings of a hall.
 pub struct Sender {
     client: Client,
     hall: String,
+    frames: bool,
     lost: AtomicU64,
     state: Arc<State>,
     thread: Option<JoinHandle<()>>,
@@ -65,7 +78,8 @@ struct State {
 
 impl Sender {
     /// Begins to call the broker, and goes on until it answers. `umbracast/HALL/status` says `online` from then on, and
-    /// `offline` when the last sender of the hall ends or is cut off. `told` gets what happens to the connection.
+    /// `offline` when the last sender of the hall ends or is cut off. `told` gets what happens to the connection, and `heard` each
+    /// list of objects with its source, if the settings take any.
     ///
     /// # Errors
     /// A broker's name that is none, a file that cannot be read or that others can read.
@@ -73,6 +87,7 @@ impl Sender {
         settings: &Mqtt,
         hall: &str,
         told: impl Fn(log::Event) + Send + 'static,
+        heard: impl Fn(&str, &[u8]) + Send + 'static,
     ) -> Result<Self, Error> {
         let (host, port) = address(&settings.broker)?;
         // A name of its own: a broker throws out whoever had the same name before.
@@ -80,6 +95,7 @@ impl Sender {
         let mut options = MqttOptions::new(&client_id, host, port);
         let status = format!("umbracast/{hall}/status");
         options.set_keep_alive(KEEP_ALIVE);
+        options.set_max_packet_size(LONGEST_BYTES, LONGEST_BYTES);
         options.set_last_will(LastWill::new(&status, "offline", QoS::AtLeastOnce, true));
         if let Some(user) = &settings.user {
             let password = settings.password_file.as_deref().map(secrets::first_line).transpose()?;
@@ -95,12 +111,14 @@ impl Sender {
             client: client.clone(),
             state: state.clone(),
             status,
+            objects: settings.objects.then(|| format!("umbracast/{hall}/objects/")),
             broker: settings.broker.clone(),
             client_id,
             connected: false,
         };
-        let thread = std::thread::spawn(move || talk.run(connection, told));
-        Ok(Self { client, hall: hall.to_owned(), lost: AtomicU64::new(0), state, thread: Some(thread) })
+        let thread = std::thread::spawn(move || talk.run(connection, told, heard));
+        let (hall, frames, lost) = (hall.to_owned(), settings.frames, AtomicU64::new(0));
+        Ok(Self { client, hall, frames, lost, state, thread: Some(thread) })
     }
 
     /// Sends what a link has come to, as the page's events say it, to `umbracast/HALL/warnings/AP`, at least once. Waits for
@@ -117,6 +135,14 @@ impl Sender {
     pub fn advise(&self, advice: &Advice, term: u64) {
         let topic = format!("umbracast/{}/decisions/{}", self.hall, advice.decision.track);
         self.publish(&topic, advice.json(), term);
+    }
+
+    /// Sends a frame as `/api/frame` of the page says it, where the settings ask for frames and the broker keeps up.
+    pub fn frame(&self, frame: &Published) {
+        if self.frames && self.state.open.load(Ordering::Acquire) < FRAMES_WAITING {
+            let json = serde_json::to_value(frame.json(false, None)).unwrap_or_default();
+            self.publish(&format!("umbracast/{}/frames", self.hall), json, frame.term);
+        }
     }
 
     fn publish(&self, topic: &str, mut json: serde_json::Value, term: u64) {
@@ -167,6 +193,8 @@ struct Talk {
     state: Arc<State>,
     /// The topic that says whether the hall has a sender.
     status: String,
+    /// What topics of lists of objects begin with, where they are taken.
+    objects: Option<String>,
     broker: String,
     client_id: String,
     connected: bool,
@@ -174,7 +202,7 @@ struct Talk {
 
 impl Talk {
     /// Sends and receives until the client has said good-bye, or nobody is there to say it to.
-    fn run(&mut self, mut connection: Connection, told: impl Fn(log::Event)) {
+    fn run(&mut self, mut connection: Connection, told: impl Fn(log::Event), heard: impl Fn(&str, &[u8])) {
         use rumqttc::{Event, Outgoing, Packet};
         for event in connection.iter() {
             let stops = self.state.stop.load(Ordering::Acquire);
@@ -186,12 +214,19 @@ impl Talk {
                     self.connected = true;
                     // Another sender of the hall that ends says `offline` for all.
                     let _ = self.client.try_subscribe(&self.status, QoS::AtLeastOnce);
+                    if let Some(objects) = &self.objects {
+                        let _ = self.client.try_subscribe(format!("{objects}+"), QoS::AtMostOnce);
+                    }
                     self.say_online();
                 }
-                Ok(Event::Incoming(Packet::Publish(heard)))
-                    if heard.topic == self.status && heard.payload == "offline" && !stops =>
+                Ok(Event::Incoming(Packet::Publish(said)))
+                    if said.topic == self.status && said.payload == "offline" && !stops =>
                 {
                     self.say_online();
+                }
+                Ok(Event::Incoming(Packet::Publish(said))) => {
+                    let source = self.objects.as_ref().and_then(|objects| said.topic.strip_prefix(objects));
+                    source.into_iter().for_each(|source| heard(source, &said.payload));
                 }
                 Ok(Event::Incoming(Packet::PubAck(_))) => {
                     self.state.open.fetch_sub(1, Ordering::AcqRel);
@@ -306,7 +341,7 @@ mod tests {
     #[test]
     fn a_broker_gets_every_warning_as_json_and_is_told_who_is_there() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
-        let sender = Sender::start(&at(&broker), "lab", drop).unwrap();
+        let sender = Sender::start(&at(&broker), "lab", drop, |_, _| {}).unwrap();
         sender.send(&event(), 6); // Waits until the broker is there.
         let (mut stream, _) = broker.accept().unwrap();
         let (kind, hello) = packet(&mut stream);
@@ -352,7 +387,7 @@ mod tests {
     fn two_senders_of_a_hall_have_names_of_their_own_and_the_one_that_stays_says_so() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let settings = at(&broker);
-        let _senders = [(); 2].map(|()| Sender::start(&settings, "lab", drop).unwrap());
+        let _senders = [(); 2].map(|()| Sender::start(&settings, "lab", drop, |_, _| {}).unwrap());
         let [(mut stays, one), (_ends, other)] = [(); 2].map(|()| taken(&broker));
         assert_ne!(one, other);
         assert!(one.starts_with("umbracast-lab-") && other.starts_with("umbracast-lab-"));
@@ -368,7 +403,7 @@ mod tests {
     fn a_connection_that_somebody_takes_over_is_told() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let (tell, told) = std::sync::mpsc::channel();
-        let sender = Sender::start(&at(&broker), "lab", move |event| drop(tell.send(event)));
+        let sender = Sender::start(&at(&broker), "lab", move |event| drop(tell.send(event)), |_, _| {});
         let (stream, name) = taken(&broker);
         drop(stream);
         let events = [told.recv().unwrap(), told.recv().unwrap()];
@@ -377,9 +412,46 @@ mod tests {
         drop((broker, sender));
     }
 
+    #[test]
+    fn lists_of_objects_come_in_and_frames_go_out_where_that_is_asked_for() {
+        let broker = TcpListener::bind("127.0.0.1:0").unwrap();
+        let settings = Mqtt { objects: true, frames: true, ..at(&broker) };
+        let (hear, heard) = std::sync::mpsc::channel();
+        let hear = move |source: &str, list: &[u8]| drop(hear.send((source.to_owned(), list.to_vec())));
+        let sender = Sender::start(&settings, "lab", drop, hear).unwrap();
+        let (mut stream, _) = taken(&broker);
+        assert_eq!(publication(&mut stream).1, "online");
+        for topic in ["umbracast/lab/objects/cameras", "umbracast/lab/other"] {
+            // A list is longer than what brokers' clients take unless they are told to.
+            let body = [&[0, topic.len() as u8], topic.as_bytes(), &[b'7'; 20_000]].concat();
+            let length = [
+                (body.len() % 128) as u8 | 128,
+                (body.len() / 128 % 128) as u8 | 128,
+                (body.len() / 16_384) as u8,
+            ];
+            stream.write_all(&[&[0x30], &length[..], &body].concat()).unwrap();
+        }
+        let (source, list) = heard.recv_timeout(Duration::from_secs(5)).unwrap();
+        assert_eq!((source.as_str(), list.len()), ("cameras", 20_000));
+        let frame = Published { time_ns: 300, term: 6, ..Published::default() };
+        (0..100).for_each(|_| sender.frame(&frame));
+        assert_eq!(sender.lost(), 0, "frames that a slow broker does not take are left out");
+        let (topic, text, number) = unacknowledged(&mut stream);
+        let told: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            (topic.as_str(), &told["time_ns"], &told["term"]),
+            ("umbracast/lab/frames", &300.into(), &6.into())
+        );
+        acknowledge(&mut stream, number);
+        assert!(heard.try_recv().is_err(), "another topic is no list");
+        drop(stream);
+        drop(sender);
+    }
+
     fn at(broker: &TcpListener) -> Mqtt {
         let broker = broker.local_addr().unwrap().to_string();
-        Mqtt { broker, user: None, password_file: None, ca: None, plain: false }
+        let (objects, frames) = (false, false);
+        Mqtt { broker, user: None, password_file: None, ca: None, plain: false, objects, frames }
     }
 
     #[test]
@@ -390,11 +462,16 @@ mod tests {
             password_file: None,
             ca: None,
             plain: false,
+            objects: false,
+            frames: false,
         };
-        let sender = Sender::start(&settings, "lab", drop).unwrap();
+        let sender = Sender::start(&settings, "lab", drop, |_, _| {}).unwrap();
         (0..WAITING + 10).for_each(|_| sender.send(&event(), 6));
         assert!(sender.lost() >= 10);
         drop(sender);
-        assert!(Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab", drop).is_err());
+        assert!(
+            Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab", drop, |_, _| {})
+                .is_err()
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! What a hall sends to other systems: topics of ROS 2, warnings and decisions over MQTT.
+//! What a hall sends to other systems and takes from them: topics of ROS 2; warnings, decisions, frames and lists of objects over
+//! MQTT.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -10,6 +11,7 @@ use umbracast_live::run::Listener;
 use zenoh::Session;
 
 use crate::mqtt::{Mqtt, Sender};
+use crate::objects::lists_into;
 use crate::ros2::{Face, names};
 
 /// `[network.ros2]` of the site file.
@@ -37,7 +39,7 @@ impl Outward {
     /// # Errors
     /// A session that cannot be opened, a hall that ROS 2 cannot name, a broker's name that is none.
     pub fn open(
-        session: impl FnOnce() -> Result<Session, Error>,
+        session: impl Fn() -> Result<Session, Error>,
         hall: &str,
         site: &Site,
         ros2: Option<Ros2>,
@@ -49,7 +51,10 @@ impl Outward {
             Face::new(&session()?, domain, &namespace, site).map(Mutex::new)
         };
         let face = ros2.map(face).transpose().map_err(|e| e.within("network.ros2"))?;
-        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall, told)).transpose()?;
+        let objects = mqtt.filter(|mqtt| mqtt.objects).map(|_| session()).transpose()?;
+        let pass_on = objects.map(|session| lists_into(session, hall));
+        let pass_on = move |source: &str, list: &[u8]| pass_on.iter().for_each(|put| put(source, list));
+        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall, told, pass_on)).transpose()?;
         Ok((face.is_some() || sender.is_some()).then(|| Arc::new(Self { face, sender })))
     }
 
@@ -74,6 +79,7 @@ impl Outward {
     /// Tells a frame; waits for nobody.
     fn tell(&self, published: &Published) {
         if let Some(sender) = &self.sender {
+            sender.frame(published);
             published.events.iter().for_each(|event| sender.send(event, published.term));
             published.advice.iter().for_each(|advice| sender.advise(advice, published.term));
         }

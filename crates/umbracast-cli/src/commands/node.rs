@@ -20,6 +20,7 @@ use umbracast_node::hall::Hall;
 use umbracast_node::keys::Keys;
 use umbracast_node::meet::{self, Unanswered};
 use umbracast_node::network::{self, Mode, Network};
+use umbracast_node::objects::lists_into;
 use umbracast_node::role::Role;
 use umbracast_node::share::{self, Shared};
 use umbracast_node::summary::Summary;
@@ -77,14 +78,19 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let (weights, shared) = weights(args, &config, &stages, &hall, shared)?;
     let counters = Arc::new(Counters::default());
     let page = match stages.contains(&Role::Serve) {
-        true => Page::open(&args.page, Shown::live(&config.site, &counters, clock, &config.site.name))?,
+        true => {
+            let mut shown = Shown::live(&config.site, &counters, clock, &config.site.name);
+            let take = || -> crate::page::Objects { Box::new(lists_into(hall.session().clone(), &name)) };
+            shown.objects = args.objects.then(take);
+            Page::open(&args.page, shown)?
+        }
         false => Page::default(),
     };
     let session = hall.session().clone();
     let outward = match stages.contains(&Role::Serve) {
         true => {
             let told = say::events(Form::Text, common.quiet, clock);
-            Outward::of_network(&network, || Ok(session), &name, &config.site, told)?
+            Outward::of_network(&network, || Ok(session.clone()), &name, &config.site, told)?
         }
         false => Outward::default(),
     };
@@ -226,7 +232,7 @@ fn empty(
     let site = &config.site;
     if let Some(path) = &args.empty {
         let mut packets = vec![Vec::new(); site.sensors.len()];
-        let empty = input::empty_hall(&[path.clone()], site, &[])?;
+        let empty = input::empty_hall(std::slice::from_ref(path), site, &[])?;
         empty.packets(site, |sensor, packet: Packet| {
             packets[sensor].push(packet);
             Ok(())
