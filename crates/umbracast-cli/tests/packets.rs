@@ -174,6 +174,38 @@ fn ranges_that_the_site_file_does_not_know_are_told() {
                   rotation_deg = { yaw = 0.0, pitch = 20.0, roll = 0.0 }";
     fs::write(&site, sensor).expect("writes");
     let told = ends_with(0, &["run", text(&file), "--site", text(&site), "--out", text(&folder.join("out"))]);
-    assert!(told.contains("100 % of 100 returns were left out") && told.contains("door: 0.5 to 50 m"), "{told}");
+    assert!(
+        told.contains("100 % of 100 returns were left out") && told.contains("door: 0.5 to 50 m"),
+        "{told}"
+    );
     assert!(told.contains("in 1 frame(s)"), "{told}");
+}
+
+#[test]
+fn names_with_spaces_make_topics_and_files_without() {
+    let folder = folder("spaces");
+    let site = folder.join("families.toml");
+    fs::write(&site, FAMILIES.replace("\"hdl\"", "\"above the door\"")).expect("writes");
+    let sim = simulate(&folder, Some(text(&site)));
+    let told = ends_with(0, &["inspect", text(&sim.join("scene-0000.mcap"))]);
+    assert!(told.contains("/above_the_door/packets") && !told.contains("/above the"), "{told}");
+    // Read back as the sensor's.
+    let [recorded, captured] = ["from-mcap", "from-pcap"].map(|name| folder.join(name));
+    ends_with(0, &["run", text(&sim.join("scene-0000.mcap")), "--no-empty", "--out", text(&recorded)]);
+    let capture = sim.join("scene-0000.pcap");
+    ends_with(0, &["run", text(&capture), "--site", text(&site), "--no-empty", "--out", text(&captured)]);
+    same_tables(&recorded, &captured);
+}
+
+#[test]
+fn two_sensors_at_one_port_are_told_before_they_are_listened_to() {
+    let folder = folder("one-port");
+    let site = folder.join("site.toml");
+    fs::write(&site, FAMILIES.replace("udp_port = 2370", "udp_port = 2368")).expect("writes");
+    let told = ends_with(0, &["config", "--check", text(&site)]);
+    let why = "sensors \"hdl\" and \"hesai\": expected an `address` or a `udp_port` of its own for each";
+    assert!(told.contains("site.toml: understood") && told.contains(why), "{told}");
+    for command in ["check", "live"] {
+        assert!(ends_with(1, &[command, "--site", text(&site)]).contains(why), "{command}");
+    }
 }

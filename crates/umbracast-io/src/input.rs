@@ -6,7 +6,7 @@ use umbracast::lidar::{Assembler, Cloud, Frame, Packet, Scan};
 use umbracast::{Config, Error, Health, STEP_NS, Site};
 
 use crate::pcd::read_pcd;
-use crate::recording::{Entry, RecordingReader};
+use crate::recording::{self, Entry, RecordingReader};
 use crate::setup;
 
 mod sink;
@@ -319,7 +319,7 @@ fn recorded_packets(file: &Path, site: &Site, sink: PacketSink) -> Result<Option
     };
     while let Some(entry) = reader.next_entry()? {
         let Entry::Packets(name, packets) = entry else { continue };
-        let Some(sensor) = site.sensors.iter().position(|sensor| sensor.name == name) else {
+        let Some(sensor) = recording::sensor_of(site, &name) else {
             let known: Vec<&str> = site.sensors.iter().map(|s| s.name.as_str()).collect();
             let story = format!("sensor {name:?}: expected one of the site's, {}", known.join(", "));
             return Err(Error::new(story).within(file.display()));

@@ -165,7 +165,28 @@ pub fn doors(site: &Site, port: Option<u16>, demo: bool) -> Result<Vec<Door>, Er
         let from = sensor.address_bytes().filter(|_| !demo).map(IpAddr::from);
         Ok(Door { sensor: number, port, from })
     };
-    site.sensors.iter().enumerate().map(door).collect()
+    let doors: Vec<Door> = site.sensors.iter().enumerate().map(door).collect::<Result<_, _>>()?;
+    told_apart(site, &doors)?;
+    Ok(doors)
+}
+
+/// Refuses two sensors of one port that no address tells apart.
+fn told_apart(site: &Site, doors: &[Door]) -> Result<(), Error> {
+    for (d, one) in doors.iter().enumerate().filter(|(_, door)| door.port != 0) {
+        let same = |other: &&Door| {
+            let apart = matches!((other.from, one.from), (Some(a), Some(b)) if a != b);
+            other.port == one.port && !apart
+        };
+        if let Some(other) = doors[..d].iter().find(same) {
+            let [first, second] = [other, one].map(|door| &site.sensors[door.sensor].name);
+            return Err(Error::new(format!(
+                "sensors {first:?} and {second:?}: expected an `address` or a `udp_port` of its own for each in the site file, or \
+                 --port, found both at UDP port {}",
+                one.port
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// The recorder's settings; none where nothing is recorded.
@@ -234,13 +255,13 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
         .with("frames_skipped", summary.frames_skipped)
         .with("latency_ms_median", latency.quantile_ms(0.5))
         .with("latency_ms_p99", latency.quantile_ms(0.99))
-        .with("latency_ms_max", latency.longest().as_secs_f64() * 1e3)
+        .with("latency_ms_max", latency.longest().as_nanos() as f64 / 1e6)
         .with("step_ms_median", step.quantile_ms(0.5))
         .with("step_ms_p99", step.quantile_ms(0.99))
         .with("health", summary.health)
         .with("recorder", &summary.recorded);
     if let Some(sent) = sent {
-        json = json.with("packets_sent", sent.packets).with("sent_late_ms_max", sent.latest_ns as f64 * 1e-6);
+        json = json.with("packets_sent", sent.packets).with("sent_late_ms_max", sent.latest_ns as f64 / 1e6);
     }
     let text = format!(
         "{} frames of {} packets in {:.1} s: {:.2} ms from the last packet to the warning (median), {:.2} ms (99 %)",

@@ -46,7 +46,7 @@ pub fn run(args: &ReplayPackets, common: &Common) -> Result<Ending, Error> {
     let summary = RunJson::new("replay", &watch)
         .with("packets", sent.packets)
         .with("failed", sent.failed)
-        .with("late_ms_max", sent.latest_ns as f64 * 1e-6);
+        .with("late_ms_max", sent.latest_ns as f64 / 1e6);
     summary.print(common, &format!("{} packets sent in {:.1} s", sent.packets, watch.seconds()));
     if lost.is_empty() { Ok(Ending::Done) } else { Ok(Ending::DataLost(lost.join("; "))) }
 }
