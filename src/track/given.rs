@@ -91,11 +91,11 @@ impl Track {
 
 /// The observation windows of such tracks.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Windows(BTreeMap<u64, Vec<Observed>>);
+pub struct Windows(BTreeMap<u64, Vec<Observed>>);
 
 impl Windows {
     /// Takes a frame's tracks and gives each its window: states a step apart and this one. Who is not there is forgotten.
-    pub(crate) fn follow(&mut self, time_ns: i64, tracks: &mut [Track]) {
+    pub fn follow(&mut self, time_ns: i64, tracks: &mut [Track]) {
         self.0.retain(|id, _| tracks.iter().any(|track| track.id == *id));
         let longest_ns = STEP_NS * OBSERVED as i64;
         for track in tracks {

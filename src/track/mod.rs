@@ -26,7 +26,8 @@ mod paper;
 
 pub use crate::gait::GaitPhase;
 pub use followed::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
-pub(crate) use given::Windows;
+#[doc(hidden)] // For tracks that come over a wire, where stages are processes.
+pub use given::Windows;
 #[doc(hidden)] // Tests turn its numbers; `Tracker` chooses by the config.
 pub use mixture::MixtureTracker;
 #[doc(hidden)] // What tests and ablations turn.

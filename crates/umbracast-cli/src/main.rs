@@ -5,6 +5,7 @@
 mod args;
 mod ending;
 mod setup;
+mod inputs;
 mod say;
 mod run_json;
 mod progress;
@@ -23,7 +24,6 @@ use clap::{CommandFactory, FromArgMatches};
 
 use args::{Cli, Command};
 use ending::Ending;
-use umbracast_io::input;
 
 /// Zenoh is 200 crates, which most users need not build.
 #[cfg(not(feature = "node"))]
@@ -46,6 +46,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Run(args) => commands::run::run(&args, &cli.common),
         Command::Cast(args) => commands::cast::run(&args, &cli.common),
+        Command::Export(args) => commands::export::run(&args, &cli.common),
         Command::Live(args) => commands::live::run(&args, &cli.common),
         #[cfg(feature = "node")]
         Command::Node(args) => commands::node::run(&args, &cli.common),

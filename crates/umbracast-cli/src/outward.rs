@@ -28,6 +28,11 @@ impl Outward {
         use umbracast_node::network::Network;
         let Some(file) = file else { return Ok(Self::default()) };
         let network = Network::of_site_file(&crate::setup::read_text(file)?, file)?;
+        if network.mqtt.as_ref().is_some_and(|mqtt| mqtt.objects) {
+            let story = "network.mqtt.objects: `live` reads sensors' packets alone; lists of objects go to \
+                         `umbracast node track,forecast,cast,serve`";
+            return Err(Error::new(story).within(file.display()));
+        }
         Self::of_network(
             &network,
             || network.open(),
@@ -41,7 +46,7 @@ impl Outward {
     /// The same of settings that are read already.
     pub fn of_network(
         network: &umbracast_node::network::Network,
-        session: impl FnOnce() -> Result<umbracast_node::Session, Error>,
+        session: impl Fn() -> Result<umbracast_node::Session, Error>,
         hall: &str,
         site: &Site,
         hears: (Ear, HostClock),

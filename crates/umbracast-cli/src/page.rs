@@ -28,13 +28,27 @@ pub struct Shown<'a> {
     pub recording: Option<Arc<Recording>>,
     /// Who takes what access points heard of devices, where somebody does.
     pub ear: Option<Ear>,
+    /// Who takes lists of objects of another perception, by source.
+    pub objects: Option<Objects>,
 }
+
+/// Takes a list of objects: its source's name, and the bytes.
+pub type Objects = Box<dyn Fn(&str, &[u8]) + Send + Sync>;
 
 impl<'a> Shown<'a> {
     /// A hall that is watched as it is.
     pub fn live(site: &'a Site, counters: &Arc<Counters>, clock: HostClock, title: &str) -> Self {
         let (counters, title) = (counters.clone(), title.to_owned());
-        Self { site, counters, clock, title, whole: Arc::default(), recording: None, ear: None }
+        Self {
+            site,
+            counters,
+            clock,
+            title,
+            whole: Arc::default(),
+            recording: None,
+            ear: None,
+            objects: None,
+        }
     }
 }
 
@@ -60,6 +74,7 @@ impl Page {
         watched.whole = shown.whole;
         watched.recording = shown.recording;
         watched.ear = shown.ear;
+        watched.objects = shown.objects;
         Self::serve(args, watched)
     }
 

@@ -45,6 +45,11 @@ impl Ranges {
         }
     }
 
+    /// How many there are.
+    pub fn len(&self) -> u64 {
+        self.0.iter().map(|(first, last)| last - first + 1).sum()
+    }
+
     /// True before the first one.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

@@ -21,6 +21,11 @@ pub fn note(note: &str) {
     eprintln!("umbracast: note: {note}");
 }
 
+/// What the user should know before the result is used: to stderr.
+pub fn caution(caution: &str) {
+    eprintln!("umbracast: caution: {caution}");
+}
+
 /// Writes a line.
 pub fn line(line: impl std::fmt::Display) {
     text(&format!("{line}\n"));

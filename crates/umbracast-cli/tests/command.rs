@@ -328,7 +328,7 @@ fn a_capture_among_recordings_is_refused_because_it_names_no_site() {
 }
 
 #[test]
-fn captures_of_other_sensors_end_with_code_3_and_may_show_the_empty_hall() {
+fn captures_of_other_sensors_are_refused_with_what_was_expected_and_found() {
     let folder = folder("foreign_captures");
     for name in ["east.pcap", "west.pcap"] {
         let file = fs::File::create(folder.join(name)).expect("creates");
@@ -344,9 +344,12 @@ fn captures_of_other_sensors_end_with_code_3_and_may_show_the_empty_hall() {
     }
     let (east, west) = (folder.join("east.pcap"), folder.join("west.pcap"));
     let out = folder.join("out");
-    let message =
-        ends_with(3, &["run", text(&east), text(&west), "--empty", text(&folder), "--out", text(&out)]);
-    assert!(message.contains("east.pcap and 1 more: expected frames"), "{message}");
+    let message = ends_with(1, &["run", text(&east), text(&west), "--out", text(&out)]);
+    let expected =
+        "east.pcap: expected packets of lidar_east (hdl-32e): 1206 bytes to port 2368, or of lidar_west";
+    assert!(message.contains(expected) || message.contains("lidar_west (hdl-32e): 1206 bytes"), "{message}");
+    assert!(message.contains("found 1 packet of 64 bytes from 10.0.0.1 to port 7502"), "{message}");
+    assert!(!out.exists(), "refused before anything is written");
 }
 
 #[test]

@@ -118,13 +118,94 @@ fn captures_of_single_sensors_are_one_scene() {
     let file = |name: &str| text(&sim.join(name)).to_owned();
     let (east, west) = (file("scene-0000-lidar_east.pcap"), file("scene-0000-lidar_west.pcap"));
     let other = file("scene-0001-lidar_east.pcap");
-    let (captures, recording) = (folder.join("from-pcap"), folder.join("from-mcap"));
+    let [captures, swapped, recording] = ["from-pcap", "swapped", "from-mcap"].map(|name| folder.join(name));
     let no_empty = ["--no-empty", "--out"];
     ends_with(0, &[&["run", &east, &west], &no_empty[..], &[text(&captures)]].concat());
+    ends_with(0, &[&["run", &west, &east], &no_empty[..], &[text(&swapped)]].concat());
     ends_with(0, &[&["run", &file("scene-0000.mcap")], &no_empty[..], &[text(&recording)]].concat());
     same_tables(&captures, &recording);
+    same_tables(&swapped, &recording);
+    assert!(
+        !ends_with(0, &["run", &east, &west, "--no-empty", "--out", text(&captures)]).contains("caution")
+    );
+    let told = ends_with(0, &["run", &east, &west, "--out", text(&captures)]);
+    assert!(told.contains("no empty hall was given") && told.contains("in 15 frame(s)"), "{told}");
     let told = ends_with(1, &["run", &east, &west, &other, "--out", text(&folder.join("out"))]);
     assert!(told.contains("expected 2 captures, one for each sensor") && told.contains("found 3"), "{told}");
+
+    // As a shell's glob gives them, with the empty hall among them.
+    let empty = ["empty-lidar_east.pcap", "empty-lidar_west.pcap"].map(file);
+    let [globbed, from_folder] = ["globbed", "from-folder"].map(|name| folder.join(name));
+    let output = Command::new(env!("CARGO_BIN_EXE_umbracast"))
+        .args(["run", &empty[0], &empty[1], &west, &east, "--out", text(&globbed)])
+        .output()
+        .expect("starts");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("scene-0000-lidar_east.pcap -> lidar_east (its name)"), "{told}");
+    assert!(told.contains("empty-lidar_west.pcap -> lidar_west (its name)"), "{told}");
+    ends_with(0, &["run", &file("scene-0000.mcap"), "--out", text(&from_folder)]);
+    same_tables(&globbed, &from_folder);
     let told = ends_with(1, &["simulate", "--packets", "pcap"]);
     assert!(told.contains("expected --out"), "{told}");
+}
+
+#[test]
+fn ranges_that_the_site_file_does_not_know_are_told() {
+    let folder = folder("far-ranges");
+    let cloud = umbracast_io::pcd::PcdCloud {
+        width: 100,
+        height: 1,
+        viewpoint: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        // Millimetres, as some exporters write them.
+        fields: ["x", "y", "z"]
+            .map(|name| umbracast_io::pcd::PcdField {
+                name: name.to_owned(),
+                kind: umbracast_io::pcd::PcdKind::F32,
+                count: 1,
+                values: (0..100).map(|n| 4000.0 + f64::from(n)).collect(),
+            })
+            .into(),
+    };
+    let (file, site) = (folder.join("0.pcd"), folder.join("points.toml"));
+    let bytes = umbracast_io::pcd::write_pcd(&cloud, umbracast_io::pcd::PcdEncoding::Binary);
+    fs::write(&file, bytes).expect("writes");
+    let sensor = "[[site.sensors]]\nname = \"door\"\nmodel = \"points\"\nposition_m = [0.0, 0.0, 3.0]\n\
+                  rotation_deg = { yaw = 0.0, pitch = 20.0, roll = 0.0 }";
+    fs::write(&site, sensor).expect("writes");
+    let told = ends_with(0, &["run", text(&file), "--site", text(&site), "--out", text(&folder.join("out"))]);
+    assert!(
+        told.contains("100 % of 100 returns were left out") && told.contains("door: 0.5 to 50 m"),
+        "{told}"
+    );
+    assert!(told.contains("in 1 frame(s)"), "{told}");
+}
+
+#[test]
+fn names_with_spaces_make_topics_and_files_without() {
+    let folder = folder("spaces");
+    let site = folder.join("families.toml");
+    fs::write(&site, FAMILIES.replace("\"hdl\"", "\"above the door\"")).expect("writes");
+    let sim = simulate(&folder, Some(text(&site)));
+    let told = ends_with(0, &["inspect", text(&sim.join("scene-0000.mcap"))]);
+    assert!(told.contains("/above_the_door/packets") && !told.contains("/above the"), "{told}");
+    // Read back as the sensor's.
+    let [recorded, captured] = ["from-mcap", "from-pcap"].map(|name| folder.join(name));
+    ends_with(0, &["run", text(&sim.join("scene-0000.mcap")), "--no-empty", "--out", text(&recorded)]);
+    let capture = sim.join("scene-0000.pcap");
+    ends_with(0, &["run", text(&capture), "--site", text(&site), "--no-empty", "--out", text(&captured)]);
+    same_tables(&recorded, &captured);
+}
+
+#[test]
+fn two_sensors_at_one_port_are_told_before_they_are_listened_to() {
+    let folder = folder("one-port");
+    let site = folder.join("site.toml");
+    fs::write(&site, FAMILIES.replace("udp_port = 2370", "udp_port = 2368")).expect("writes");
+    let told = ends_with(0, &["config", "--check", text(&site)]);
+    let why = "sensors \"hdl\" and \"hesai\": expected an `address` or a `udp_port` of its own for each";
+    assert!(told.contains("site.toml: understood") && told.contains(why), "{told}");
+    for command in ["check", "live"] {
+        assert!(ends_with(1, &[command, "--site", text(&site)]).contains(why), "{command}");
+    }
 }

@@ -6,13 +6,18 @@ use umbracast::lidar::{Assembler, Cloud, Frame, Packet, Scan};
 use umbracast::{Config, Error, Health, STEP_NS, Site};
 
 use crate::pcd::read_pcd;
-use crate::recording::{Entry, RecordingReader};
+use crate::recording::{self, Entry, RecordingReader};
 use crate::setup;
 
 mod sink;
 mod captures;
+mod look;
+mod words;
+mod matching;
 mod point_clouds;
 
+pub use captures::Capture;
+pub use matching::Told;
 use sink::{PacketSink, Sink, drain};
 
 /// The recording without people, beside those of a simulation.
@@ -36,72 +41,151 @@ pub enum Input {
     Recording(PathBuf),
     /// PCD clouds of one sensor, a frame each, in natural order of their names.
     Clouds(Vec<PathBuf>),
-    /// Captures: one for each sensor in the site's order, or one of all.
-    Captures(Vec<PathBuf>),
+    /// Captures: one for each sensor, or one of all.
+    Captures(Vec<Capture>),
 }
 
-/// The scenes that the arguments name.
-///
-/// # Errors
-/// A file of another kind, or a folder without input.
-pub fn scenes(paths: &[PathBuf]) -> Result<Vec<Input>, Error> {
-    let (mut files, mut folders_of_clouds) = (Vec::new(), Vec::new());
-    for path in paths {
-        if path.is_dir() {
-            let found = folder(path)?;
-            let clouds: Vec<PathBuf> =
-                found.iter().filter(|file| file.extension().is_some_and(|e| e == "pcd")).cloned().collect();
-            if !clouds.is_empty() {
-                folders_of_clouds.push(Input::Clouds(clouds));
+/// The files that arguments name, before the site is known.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Given {
+    recordings: Vec<PathBuf>,
+    clouds: Vec<Vec<PathBuf>>,
+    captures: Vec<PathBuf>,
+    /// Files and folders that are named as the empty hall, beside others that are not.
+    empty: Vec<PathBuf>,
+}
+
+/// The scenes of a site, and the hall without people.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Inputs {
+    /// In the order in which they are run.
+    pub scenes: Vec<Input>,
+    /// The empty hall, where one is named among the scenes or lies beside them.
+    pub empty: Option<Input>,
+}
+
+impl Given {
+    /// Sorts files and the files of folders by what they are. What is named as the empty hall (`empty.mcap`,
+    /// `empty-east.pcap`, a folder `empty`) is no scene, unless nothing else is given.
+    ///
+    /// # Errors
+    /// A file of another kind, or a folder without input.
+    pub fn of(paths: &[PathBuf]) -> Result<Self, Error> {
+        let (mut files, mut empty, mut given) = (Vec::new(), Vec::new(), Self::default());
+        let mut sort = |found: Vec<PathBuf>| {
+            for file in found {
+                if words::is_empty_hall(&file) { empty.push(file) } else { files.push(file) }
+            }
+        };
+        for path in paths {
+            if !path.is_dir() || words::is_empty_hall(path) {
+                sort(vec![path.clone()]);
                 continue;
             }
+            let found = folder(path)?;
             if found.is_empty() {
-                return Err(Error::new(
-                    "expected .mcap, .db3, .pcd or .pcap files in the folder, found none",
-                )
-                .within(path.display()));
+                let story = "expected .mcap, .db3, .pcd or .pcap files in the folder, found none";
+                return Err(Error::new(story).within(path.display()));
             }
-            files.extend(found);
-        } else {
-            files.push(path.clone());
+            match found.iter().all(|file| file.extension().is_some_and(|e| e == "pcd")) {
+                true => given.clouds.push(found),
+                false => sort(found),
+            }
         }
-    }
-    let (mut scenes, mut clouds, mut captures) = (Vec::new(), Vec::new(), Vec::new());
-    for file in files {
-        match file.extension().and_then(|e| e.to_str()) {
-            Some("mcap" | "db3") => scenes.push(Input::Recording(file)),
-            Some("pcd") => clouds.push(file),
-            Some("pcap") => captures.push(file),
-            _ if !file.exists() => return Err(Error::new("no such file or folder").within(file.display())),
-            _ => return Err(Error::new("expected .mcap, .db3, .pcd or .pcap").within(file.display())),
+        if files.is_empty() && given.clouds.is_empty() {
+            files = std::mem::take(&mut empty);
+            let folders = files.extract_if(.., |file| file.is_dir()).collect::<Vec<_>>();
+            for path in folders {
+                files.extend(folder(&path)?);
+            }
         }
+        given.empty = empty;
+        let mut clouds = Vec::new();
+        for file in files {
+            match file.extension().and_then(|e| e.to_str()) {
+                Some("mcap" | "db3") => given.recordings.push(file),
+                Some("pcd") => clouds.push(file),
+                Some("pcap") => given.captures.push(file),
+                _ if !file.exists() => {
+                    return Err(Error::new("no such file or folder").within(file.display()));
+                }
+                _ => return Err(Error::new("expected .mcap, .db3, .pcd or .pcap").within(file.display())),
+            }
+        }
+        if !clouds.is_empty() {
+            setup::sort_naturally(&mut clouds);
+            given.clouds.push(clouds);
+        }
+        Ok(given)
     }
-    scenes.extend(folders_of_clouds);
-    if !clouds.is_empty() {
-        setup::sort_naturally(&mut clouds);
-        scenes.push(Input::Clouds(clouds));
+
+    /// The site on which all recordings were made; none where none says so. Captures and clouds never say.
+    ///
+    /// # Errors
+    /// Recordings of different sites, or one beside input that names none.
+    pub fn site(&self) -> Result<Option<Site>, Error> {
+        let mut first: Option<Site> = None;
+        for file in &self.recordings {
+            let site = recorded_site(file)?;
+            if let (Some(first), Some(site)) = (&first, &site)
+                && site != first
+            {
+                let (expected, found) = (&first.name, &site.name);
+                let story = format!(
+                    "site: expected {expected:?} as in the first recording, found another, {found:?}"
+                );
+                return Err(Error::new(story).within(file.display()));
+            }
+            first = first.or(site);
+        }
+        let silent = self.clouds.first().and_then(|clouds| clouds.first()).or(self.captures.first());
+        if let (Some(site), Some(silent)) = (&first, silent) {
+            let story = format!(
+                "expected --site, or only recordings as inputs: a recording names its site, {:?}, and this input names none",
+                site.name
+            );
+            return Err(Error::new(story).within(silent.display()));
+        }
+        Ok(first)
     }
-    if !captures.is_empty() {
-        scenes.push(Input::Captures(captures));
+
+    /// The scenes: captures have found their sensors. `told` says of some which sensor they are of.
+    ///
+    /// # Errors
+    /// Captures that find no sensor, or more than one ([`matching::in_scenes`]).
+    pub fn of_site(&self, site: &Site, told: &[Told]) -> Result<Inputs, Error> {
+        let mut scenes: Vec<Input> = self.recordings.iter().cloned().map(Input::Recording).collect();
+        scenes.extend(self.clouds.iter().cloned().map(Input::Clouds));
+        if !self.captures.is_empty() {
+            let captures = matching::in_scenes(&self.captures, site, told)?;
+            scenes.extend(captures.into_iter().map(Input::Captures));
+        }
+        let empty = match (&self.empty[..], scenes.first()) {
+            ([], Some(Input::Recording(file))) => {
+                let beside = file.parent().unwrap_or(Path::new(".")).join(EMPTY);
+                (beside.is_file() && beside != *file).then_some(Input::Recording(beside))
+            }
+            ([], _) => None,
+            (empty, _) => Some(empty_hall(empty, site, told)?),
+        };
+        Ok(Inputs { scenes, empty })
     }
-    Ok(scenes)
 }
 
-/// The same where the site is known: captures of all its sensors are scenes of their own.
+/// The hall without people, in any form that input may have.
 ///
 /// # Errors
-/// Captures that are neither a whole recording each nor one for each sensor.
-pub fn of_site(inputs: Vec<Input>, site: &Site) -> Result<Vec<Input>, Error> {
-    let mut scenes = Vec::new();
-    for input in inputs {
-        match input {
-            Input::Captures(files) => {
-                scenes.extend(captures::in_scenes(files, site)?.into_iter().map(Input::Captures));
-            }
-            other => scenes.push(other),
+/// More than one scene, and whatever [`Given::of`] and [`Given::of_site`] fail with.
+pub fn empty_hall(paths: &[PathBuf], site: &Site, told: &[Told]) -> Result<Input, Error> {
+    let mut scenes = Given::of(paths)?.of_site(site, told)?.scenes;
+    match (scenes.pop(), &scenes[..]) {
+        (Some(empty), []) => Ok(empty),
+        (last, others) => {
+            let all: Vec<String> = others.iter().chain(&last).map(Input::to_string).collect();
+            let story = format!("the empty hall: expected one scene, found {}", all.join(", "));
+            Err(Error::new(story))
         }
     }
-    Ok(scenes)
 }
 
 /// Whether one capture of all of a site's sensors could be read.
@@ -111,8 +195,8 @@ pub fn can_share_a_capture(site: &Site) -> bool {
 
 /// A folder's recordings, or its clouds, or its captures.
 fn folder(path: &Path) -> Result<Vec<PathBuf>, Error> {
-    let mut files = recordings(path)?;
-    for extension in ["db3", "pcd", "pcap"] {
+    let mut files = Vec::new();
+    for extension in ["mcap", "db3", "pcd", "pcap"] {
         if files.is_empty() {
             files = setup::files_with_extension(path, extension)?;
         }
@@ -127,66 +211,23 @@ pub fn recordings(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(files)
 }
 
-/// The site on which all inputs were recorded; none where none says so. Captures and clouds never say.
-///
-/// # Errors
-/// Recordings of different sites, or one beside input that names none.
-pub fn recorded_site(inputs: &[Input]) -> Result<Option<Site>, Error> {
-    let mut first: Option<Site> = None;
-    for input in inputs {
-        let site = input.site()?;
-        if let (Some(first), Some(site)) = (&first, &site)
-            && site != first
-        {
-            let (expected, found) = (&first.name, &site.name);
-            let story =
-                format!("site: expected {expected:?} as in the first recording, found another, {found:?}");
-            return Err(Error::new(story).within(input));
+/// The site that a recording was made on, where it says so.
+fn recorded_site(file: &Path) -> Result<Option<Site>, Error> {
+    match RecordingReader::open(file)?.next_entry()? {
+        Some(Entry::Config(text)) => {
+            let place = format!("{}: recorded configuration", file.display());
+            Ok(Some(Config::site_of_run(&text, &place)?))
         }
-        first = first.or(site);
+        _ => Ok(None),
     }
-    let silent = inputs.iter().find(|input| !matches!(input, Input::Recording(_)));
-    if let (Some(site), Some(silent)) = (&first, silent) {
-        let story = format!(
-            "expected --site, or only recordings as inputs: a recording names its site, {:?}, and this input names none",
-            site.name
-        );
-        return Err(Error::new(story).within(silent));
-    }
-    Ok(first)
-}
-
-/// The recording without people that `simulate` wrote beside this one, if it did.
-pub fn empty_beside(input: &Input) -> Option<PathBuf> {
-    let Input::Recording(file) = input else { return None };
-    Some(file.parent().unwrap_or(Path::new(".")).join(EMPTY)).filter(|path| path.is_file())
-}
-
-/// The frames of the hall without people, in any form that input may have, and what was lost of them.
-///
-/// # Errors
-/// More than one scene, and whatever [`Input::frames`] fails with.
-pub fn empty_frames(
-    path: &Path,
-    config: &Config,
-    health: &mut Health,
-) -> Result<(Vec<Frame>, Option<String>), Error> {
-    let [empty] = &of_site(scenes(std::slice::from_ref(&path.to_owned()))?, &config.site)?[..] else {
-        return Err(Error::new("expected one scene without people, found several").within(path.display()));
-    };
-    let mut frames = Vec::new();
-    let lost = empty.frames(&config.site, health, |frame| {
-        frames.push(frame.clone());
-        Ok(())
-    })?;
-    Ok((frames, lost))
 }
 
 impl std::fmt::Display for Input {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (first, more) = match self {
             Self::Recording(file) => (file, 0),
-            Self::Clouds(files) | Self::Captures(files) => (&files[0], files.len() - 1),
+            Self::Clouds(files) => (&files[0], files.len() - 1),
+            Self::Captures(captures) => (&captures[0].file, captures.len() - 1),
         };
         write!(f, "{}", first.display())?;
         if more > 0 { write!(f, " and {more} more") } else { Ok(()) }
@@ -194,20 +235,28 @@ impl std::fmt::Display for Input {
 }
 
 impl Input {
-    /// The site that the input was recorded on, where it says so.
+    /// Every frame, all at once, as the empty hall is learned; what is broken is counted. Says what was lost at the end of a
+    /// damaged file.
     ///
     /// # Errors
-    /// A recording that cannot be read, or whose configuration is not understood.
-    pub fn site(&self) -> Result<Option<Site>, Error> {
-        let Self::Recording(file) = self else { return Ok(None) };
-        let mut reader = RecordingReader::open(file)?;
-        match reader.next_entry()? {
-            Some(Entry::Config(text)) => {
-                let place = format!("{}: recorded configuration", file.display());
-                Ok(Some(Config::site_of_run(&text, &place)?))
-            }
-            _ => Ok(None),
-        }
+    /// As [`Self::frames`].
+    pub fn all_frames(
+        &self,
+        site: &Site,
+        health: &mut Health,
+    ) -> Result<(Vec<Frame>, Option<String>), Error> {
+        let mut frames = Vec::new();
+        let lost = self.frames(site, health, |frame| {
+            frames.push(frame.clone());
+            Ok(())
+        })?;
+        Ok((frames, lost))
+    }
+
+    /// A line for each capture: which sensors it was found to be of, and by what.
+    pub fn matched(&self, site: &Site) -> Vec<String> {
+        let Self::Captures(captures) = self else { return Vec::new() };
+        captures.iter().map(|capture| capture.told(site)).collect()
     }
 
     /// Gives every frame to `sink`; what is broken is counted. Says what was lost at the end of a damaged file.
@@ -270,7 +319,7 @@ fn recorded_packets(file: &Path, site: &Site, sink: PacketSink) -> Result<Option
     };
     while let Some(entry) = reader.next_entry()? {
         let Entry::Packets(name, packets) = entry else { continue };
-        let Some(sensor) = site.sensors.iter().position(|sensor| sensor.name == name) else {
+        let Some(sensor) = recording::sensor_of(site, &name) else {
             let known: Vec<&str> = site.sensors.iter().map(|s| s.name.as_str()).collect();
             let story = format!("sensor {name:?}: expected one of the site's, {}", known.join(", "));
             return Err(Error::new(story).within(file.display()));

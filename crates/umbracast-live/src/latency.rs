@@ -65,7 +65,7 @@ impl Latencies {
 
     /// The same in milliseconds.
     pub fn quantile_ms(&self, share: f64) -> f64 {
-        self.quantile(share).as_secs_f64() * 1e3
+        self.quantile(share).as_nanos() as f64 / 1e6
     }
 
     /// How many took no longer than this, within the histogram's steps.

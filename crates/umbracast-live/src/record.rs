@@ -323,7 +323,7 @@ fn recordings_in(folder: &Path, site: &str) -> VecDeque<PathBuf> {
 
 /// A site's name as a file's: it must not lead out of the folder.
 fn file_name(site: &str) -> String {
-    site.chars().map(|c| if c.is_alphanumeric() || "-_ ".contains(c) { c } else { '_' }).collect()
+    site.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect()
 }
 
 /// A time as a file's name holds it: `20261122T070503.250Z`.
@@ -409,7 +409,7 @@ mod tests {
 
     #[test]
     fn a_site_s_name_does_not_lead_out_of_the_folder() {
-        assert_eq!(file_name("../hall 3/east"), "___hall 3_east");
+        assert_eq!(file_name("../hall 3/east"), "___hall_3_east");
     }
 
     #[test]

@@ -188,7 +188,12 @@ impl Work {
                     ..of_all
                 }
             }
-            Kind::Objects => Rights { writes: keys(&["objects/*"]), asks: keys(&["config/site"]), ..rights },
+            Kind::Objects => Rights {
+                writes: keys(&["objects/*"]),
+                reads: keys(&["json", "warnings/*"]),
+                asks: keys(&["config/site"]),
+                ..rights
+            },
             Kind::Ros2(domain) => Rights {
                 writes: vec![format!("{domain}/**")],
                 reads: [keys(&["**"]), vec![format!("{domain}/**")]].concat(),
@@ -221,7 +226,7 @@ fn of_role(role: Role) -> (Ends, Ends, Ends, Ends) {
             (&["tracks"], &["followed", "state"], &["state"], &["state", "config/site", "config/weights"])
         }
         Role::Cast => (
-            &["links", "losses", "bindings", "decisions", "warnings/*"],
+            &["links", "losses", "bindings", "decisions", "warnings/*", "json"],
             &["tracks", "state", "reports/*"],
             &["state"],
             &["state", "config/site"],
@@ -230,7 +235,7 @@ fn of_role(role: Role) -> (Ends, Ends, Ends, Ends) {
         Role::Serve => (&["reports/*"], &["**"], &["state"], &[]),
         Role::Display => (&[], &["**"], &[], &[]),
         Role::Controller => {
-            (&["reports/*"], &["links", "losses", "bindings", "decisions", "warnings/*"], &[], &[])
+            (&["reports/*"], &["links", "losses", "bindings", "decisions", "warnings/*", "json"], &[], &[])
         }
         Role::Router => (&[], &[], &[], &[]), // Of no hall: see above.
     }

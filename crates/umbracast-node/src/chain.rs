@@ -7,11 +7,11 @@ use umbracast::decide::Decider;
 use umbracast::detect::{self, Clocks, Clusterer, Measurer, Prior};
 use umbracast::forecast::{Forecaster, Weights};
 use umbracast::radio::{Binder, Fader, Report};
-use umbracast::track::Tracker;
+use umbracast::track::{Tracker, Windows};
 use umbracast::{Config, Error, Outcome, STEP_NS};
 use umbracast_io::nodes::{Followed, Priors, TrackerState, Warning};
 use umbracast_io::rows;
-use umbracast_io::rows::{BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow};
+use umbracast_io::rows::{BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, TrackRow};
 use umbracast_live::warnings::{Event, Warnings};
 
 use crate::join::Joined;
@@ -54,6 +54,8 @@ pub struct Chain {
     clusterer: Clusterer,
     measurer: Measurer,
     tracker: Option<Tracker>,
+    /// Of tracks of another perception.
+    windows: Windows,
     forecaster: Option<Forecaster>,
     caster: Option<Caster>,
     fader: Fader,
@@ -83,6 +85,8 @@ pub struct Made {
     pub detections: Option<Vec<DetectionRow>>,
     /// Everybody followed, with forecasts if stage 2 is in the row.
     pub followed: Option<Followed>,
+    /// The rows of everybody followed, where links are.
+    pub tracks: Vec<TrackRow>,
     /// Every link.
     pub links: Option<Vec<LinkRow>>,
     /// What each of them loses.
@@ -111,12 +115,13 @@ impl Made {
             tracks.chain(followed.forecasts.iter_mut().map(|forecast| &mut forecast.track))
         });
         let links = self.links.iter_mut().flatten().map(|link| &mut link.track);
-        let losses = self.losses.iter_mut().map(|loss| &mut loss.track);
-        let bindings = self.bindings.iter_mut().map(|binding| &mut binding.track);
-        let decisions = self.decisions.iter_mut().map(|decision| &mut decision.track);
+        let rows = self.tracks.iter_mut().map(|row| &mut row.track);
+        let losses = self.losses.iter_mut().map(|row| &mut row.track);
+        let bindings = self.bindings.iter_mut().map(|row| &mut row.track);
+        let decisions = self.decisions.iter_mut().map(|row| &mut row.track);
         let warnings = self.warnings.iter_mut().map(|warning| &mut warning.track);
-        let of_radio = losses.chain(bindings).chain(decisions);
-        let all = followed.chain(links).chain(of_radio).chain(warnings).chain(&mut self.numbers);
+        let radio = losses.chain(bindings).chain(decisions);
+        let all = followed.chain(links).chain(rows).chain(radio).chain(warnings).chain(&mut self.numbers);
         all.for_each(|old| *old = number(*old));
     }
 
@@ -137,6 +142,7 @@ impl Chain {
             clusterer: Clusterer::new(&config.detect, &config.site),
             measurer: Measurer::new(&config.detect, &config.site),
             tracker: row.track.then(|| Tracker::new(&config.track, &config.site)),
+            windows: Windows::default(),
             forecaster: row.forecast.then(|| Forecaster::new(&config.forecast, weights)).transpose()?,
             caster: row.cast.then(|| Caster::new(&config.blockage, &config.site)),
             fader: Fader::new(&config.site),
@@ -179,18 +185,27 @@ impl Chain {
         o.health = joined.health;
         o.foreground = joined.foreground;
         detect::keep_most(&mut o.foreground, &mut o.health);
-        tracker.priors(time_ns, &mut self.priors);
-        match joined.detections {
-            Some(detections) => o.detections = detections,
-            None => {
-                self.clocks.put_right(&mut o.foreground);
-                self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);
-                self.clocks.follow(&o.foreground, &o.clusters, &self.priors);
-                self.measurer.detections(&o.foreground, &o.clusters, &self.priors, &mut o.detections);
+        let are_followed = joined.tracks.is_some();
+        if let Some(tracks) = joined.tracks {
+            // Whoever follows people elsewhere expects nothing of our detector.
+            self.priors.clear();
+            o.detections.clear();
+            o.tracks = tracks;
+            self.windows.follow(time_ns, &mut o.tracks);
+        } else {
+            tracker.priors(time_ns, &mut self.priors);
+            match joined.detections {
+                Some(detections) => o.detections = detections,
+                None => {
+                    self.clocks.put_right(&mut o.foreground);
+                    self.clusterer.clusters(&o.foreground, &self.priors, &mut o.clusters);
+                    self.clocks.follow(&o.foreground, &o.clusters, &self.priors);
+                    self.measurer.detections(&o.foreground, &o.clusters, &self.priors, &mut o.detections);
+                }
             }
+            tracker.update(&joined.views, &o.detections, &mut o.tracks);
+            tracker.priors(time_ns + STEP_NS, &mut self.priors);
         }
-        tracker.update(&joined.views, &o.detections, &mut o.tracks);
-        tracker.priors(time_ns + STEP_NS, &mut self.priors);
         o.health.frames_out_of_order = o.health.frames_out_of_order.saturating_add(self.out_of_order);
         o.health.clocks_corrected = self.clocks.corrected();
         let made = Made {
@@ -201,7 +216,8 @@ impl Chain {
             }),
             detections: Some(rows::detections(0, o).collect()),
             closed_ns: joined.closed_ns,
-            numbers: o.tracks.iter().map(|track| track.id).collect(),
+            // Numbers of others are theirs: no tracker that takes over gives new ones.
+            numbers: o.tracks.iter().filter(|_| !are_followed).map(|track| track.id).collect(),
             ..Made::default()
         };
         let sensors = joined.views.of_scans.iter().map(|view| view.sensor as u32).collect();
@@ -326,7 +342,7 @@ impl Chain {
             let events = self.warnings.changes(&links, &self.access_points);
             let warning = |event: &Event| warning(event, o.time_ns, o.frame, made.closed_ns);
             made.warnings = events.iter().map(warning).collect();
-            made.links = Some(links);
+            (made.tracks, made.links) = (tracks, Some(links));
             made.losses = rows::losses(0, o).collect();
             made.bindings = rows::bindings(0, o).collect();
             made.decisions = rows::decisions(0, o).collect();

@@ -217,6 +217,11 @@ impl Outlet {
         let _ = self.publisher.put(rows).attachment(term.to_le_bytes()).wait();
     }
 
+    /// Whether anybody listens; true where that cannot be known.
+    pub fn is_heard(&self) -> bool {
+        self.publisher.matching_status().wait().map_or(true, |status| status.matching())
+    }
+
     /// Publishes bytes.
     pub fn put_bytes(&self, bytes: Vec<u8>) {
         self.count(&bytes);

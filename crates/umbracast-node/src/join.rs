@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use umbracast::detect::{Detection, Point};
 use umbracast::lidar::Views;
+use umbracast::track::Track;
 use umbracast::{Health, Site};
 use umbracast_io::nodes::Foreground;
 
@@ -84,6 +85,8 @@ pub struct Joined {
     pub anew: bool,
     /// Everybody that another perception saw, in place of the foreground.
     pub detections: Option<Vec<Detection>>,
+    /// Everybody that another perception follows, in place of the tracker.
+    pub tracks: Option<Vec<Track>>,
 }
 
 impl Join {

@@ -17,6 +17,7 @@ use crate::role::Role;
 /// | `links` | cast | rows of every link |
 /// | `losses`, `bindings`, `decisions` | cast | rows of the radio, where the site has one |
 /// | `warnings/AP` | cast | what changed of the links of an access point |
+/// | `json` | cast | tracks, links, losses and decisions of a frame as JSON, while somebody listens |
 /// | `health/ROLE/ID` | everybody | load and what was skipped, once a second |
 /// | `objects/SOURCE` | others' perception | lists of objects in place of stage 1 |
 /// | `reports/SOURCE` | controllers, serving nodes | JSON of what access points heard of devices: `umbracast_io::reports` |

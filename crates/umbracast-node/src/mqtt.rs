@@ -1,5 +1,5 @@
-//! Warnings and decisions as JSON over MQTT for clients without Zenoh, sent to an existing broker, and reports of access points
-//! from it.
+//! Warnings, decisions and frames as JSON over MQTT for clients without Zenoh, sent to an existing broker; and reports of access
+//! points and lists of objects from it.
 //!
 //! It does not use Zenoh's bridge, because the bridge passes on bytes. Warnings on Zenoh are CDR, and MQTT listeners
 //! expect JSON. `rumqttc` is maintained and small, and needs no runtime that Zenoh does not need already.
@@ -14,6 +14,7 @@ use std::time::Duration;
 use rumqttc::{Client, Connection, LastWill, MqttOptions, QoS, TlsConfiguration, Transport};
 use serde::Deserialize;
 use umbracast::Error;
+use umbracast_live::Published;
 use umbracast_live::advice::Advice;
 use umbracast_live::log::{self, Level};
 use umbracast_live::warnings::Event;
@@ -22,6 +23,10 @@ use crate::secrets;
 
 /// Warnings that wait for the broker; more are lost, and counted.
 const WAITING: usize = 4096;
+/// While so many messages wait for the broker's acknowledgment, a frame is left out: the next one is worth more.
+const FRAMES_WAITING: i64 = 16;
+/// The longest message: a list or a frame of a thousand people.
+const LONGEST_BYTES: usize = 4 << 20;
 /// A broker that does not answer is called again after so long.
 const RETRY: Duration = Duration::from_secs(1);
 /// A broker is asked whether it is there when it was silent for so long.
@@ -45,15 +50,40 @@ pub struct Mqtt {
     /// Warnings and password go to a broker on another host as they are. Without `ca` that has to be said.
     #[serde(default)]
     pub plain: bool,
+    /// Takes lists of objects from `umbracast/HALL/objects/SOURCE`.
+    #[serde(default)]
+    pub objects: bool,
+    /// Sends each frame with its tracks and links to `umbracast/HALL/frames`.
+    #[serde(default)]
+    pub frames: bool,
 }
 
 /// Sends the warnings of a hall.
 pub struct Sender {
     client: Client,
     hall: String,
+    frames: bool,
     lost: AtomicU64,
     state: Arc<State>,
     thread: Option<JoinHandle<()>>,
+}
+
+type TakesReports = dyn Fn(&[u8]) -> Result<(), Error> + Send;
+type TakesObjects = dyn Fn(&str, &[u8]) + Send;
+
+/// Who takes what a broker has for the hall. They are called on the connection's thread, and wait for nobody.
+pub struct Hears {
+    /// What access points heard, of `umbracast/HALL/reports`; an error is told.
+    pub reports: Box<TakesReports>,
+    /// Lists of objects with their source, of `umbracast/HALL/objects/SOURCE`, if the settings take any.
+    pub objects: Box<TakesObjects>,
+}
+
+impl Default for Hears {
+    /// Nobody.
+    fn default() -> Self {
+        Self { reports: Box::new(|_| Ok(())), objects: Box::new(|_, _| {}) }
+    }
 }
 
 /// What the sender and the thread that talks to the broker share.
@@ -66,15 +96,15 @@ struct State {
 
 impl Sender {
     /// Begins to call the broker, and goes on until it answers. `umbracast/HALL/status` says `online` from then on, and
-    /// `offline` when the last sender of the hall ends or is cut off. `told` gets what happens to the connection, `heard` what is
-    /// sent to `umbracast/HALL/reports`.
+    /// `offline` when the last sender of the hall ends or is cut off. `told` gets what happens to the connection, `hears` what the
+    /// broker has for the hall.
     ///
     /// # Errors
     /// A broker's name that is none, a file that cannot be read or that others can read.
     pub fn start(
         settings: &Mqtt,
         hall: &str,
-        heard: impl Fn(&[u8]) -> Result<(), Error> + Send + 'static,
+        hears: Hears,
         told: impl Fn(log::Event) + Send + 'static,
     ) -> Result<Self, Error> {
         let (host, port) = address(&settings.broker)?;
@@ -83,6 +113,7 @@ impl Sender {
         let mut options = MqttOptions::new(&client_id, host, port);
         let status = format!("umbracast/{hall}/status");
         options.set_keep_alive(KEEP_ALIVE);
+        options.set_max_packet_size(LONGEST_BYTES, LONGEST_BYTES);
         options.set_last_will(LastWill::new(&status, "offline", QoS::AtLeastOnce, true));
         if let Some(user) = &settings.user {
             let password = settings.password_file.as_deref().map(secrets::first_line).transpose()?;
@@ -99,12 +130,14 @@ impl Sender {
             state: state.clone(),
             status,
             reports: format!("umbracast/{hall}/reports"),
+            objects: settings.objects.then(|| format!("umbracast/{hall}/objects/")),
             broker: settings.broker.clone(),
             client_id,
             connected: false,
         };
-        let thread = std::thread::spawn(move || talk.run(connection, heard, told));
-        Ok(Self { client, hall: hall.to_owned(), lost: AtomicU64::new(0), state, thread: Some(thread) })
+        let thread = std::thread::spawn(move || talk.run(connection, &hears, told));
+        let (hall, frames, lost) = (hall.to_owned(), settings.frames, AtomicU64::new(0));
+        Ok(Self { client, hall, frames, lost, state, thread: Some(thread) })
     }
 
     /// Sends what a link has come to, as the page's events say it, to `umbracast/HALL/warnings/AP`, at least once. Waits for
@@ -121,6 +154,14 @@ impl Sender {
     pub fn advise(&self, advice: &Advice, term: u64) {
         let topic = format!("umbracast/{}/decisions/{}", self.hall, advice.decision.track);
         self.publish(&topic, advice.json(), term);
+    }
+
+    /// Sends a frame as `/api/frame` of the page says it, where the settings ask for frames and the broker keeps up.
+    pub fn frame(&self, frame: &Published) {
+        if self.frames && self.state.open.load(Ordering::Acquire) < FRAMES_WAITING {
+            let json = serde_json::to_value(frame.json(false, None)).unwrap_or_default();
+            self.publish(&format!("umbracast/{}/frames", self.hall), json, frame.term);
+        }
     }
 
     fn publish(&self, topic: &str, mut json: serde_json::Value, term: u64) {
@@ -173,6 +214,8 @@ struct Talk {
     status: String,
     /// The topic of what access points heard.
     reports: String,
+    /// What topics of lists of objects begin with, where they are taken.
+    objects: Option<String>,
     broker: String,
     client_id: String,
     connected: bool,
@@ -180,12 +223,7 @@ struct Talk {
 
 impl Talk {
     /// Sends and receives until the client has said good-bye, or nobody is there to say it to.
-    fn run(
-        &mut self,
-        mut connection: Connection,
-        heard: impl Fn(&[u8]) -> Result<(), Error>,
-        told: impl Fn(log::Event),
-    ) {
+    fn run(&mut self, mut connection: Connection, hears: &Hears, told: impl Fn(log::Event)) {
         use rumqttc::{Event, Outgoing, Packet};
         for event in connection.iter() {
             let stops = self.state.stop.load(Ordering::Acquire);
@@ -198,6 +236,9 @@ impl Talk {
                     // Another sender of the hall that ends says `offline` for all.
                     let _ = self.client.try_subscribe(&self.status, QoS::AtLeastOnce);
                     let _ = self.client.try_subscribe(&self.reports, QoS::AtMostOnce);
+                    if let Some(objects) = &self.objects {
+                        let _ = self.client.try_subscribe(format!("{objects}+"), QoS::AtMostOnce);
+                    }
                     self.say_online();
                 }
                 Ok(Event::Incoming(Packet::Publish(said)))
@@ -206,10 +247,14 @@ impl Talk {
                     self.say_online();
                 }
                 Ok(Event::Incoming(Packet::Publish(said))) if said.topic == self.reports => {
-                    if let Err(error) = heard(&said.payload) {
+                    if let Err(error) = (hears.reports)(&said.payload) {
                         let text = format!("{}: {error}; none of this message is taken", self.reports);
                         told(log::Event::new(Level::Warn, "reports_refused", text));
                     }
+                }
+                Ok(Event::Incoming(Packet::Publish(said))) => {
+                    let source = self.objects.as_ref().and_then(|objects| said.topic.strip_prefix(objects));
+                    source.into_iter().for_each(|source| (hears.objects)(source, &said.payload));
                 }
                 Ok(Event::Incoming(Packet::PubAck(_))) => {
                     self.state.open.fetch_sub(1, Ordering::AcqRel);
@@ -271,10 +316,6 @@ mod tests {
     use umbracast_io::rows::LinkRow;
     use umbracast_live::warnings;
 
-    fn deaf(_: &[u8]) -> Result<(), Error> {
-        Ok(())
-    }
-
     fn event() -> Event {
         let mut link = LinkRow { track: 7, onset_s: [Some(0.2), Some(0.4), None], ..LinkRow::default() };
         link.p[umbracast::STEPS - 1] = 0.75;
@@ -328,7 +369,7 @@ mod tests {
     #[test]
     fn a_broker_gets_every_warning_as_json_and_is_told_who_is_there() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
-        let sender = Sender::start(&at(&broker), "lab", deaf, drop).unwrap();
+        let sender = Sender::start(&at(&broker), "lab", Hears::default(), drop).unwrap();
         sender.send(&event(), 6); // Waits until the broker is there.
         let (mut stream, _) = broker.accept().unwrap();
         let (kind, hello) = packet(&mut stream);
@@ -374,7 +415,7 @@ mod tests {
     fn two_senders_of_a_hall_have_names_of_their_own_and_the_one_that_stays_says_so() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let settings = at(&broker);
-        let _senders = [(); 2].map(|()| Sender::start(&settings, "lab", deaf, drop).unwrap());
+        let _senders = [(); 2].map(|()| Sender::start(&settings, "lab", Hears::default(), drop).unwrap());
         let [(mut stays, one), (_ends, other)] = [(); 2].map(|()| taken(&broker));
         assert_ne!(one, other);
         assert!(one.starts_with("umbracast-lab-") && other.starts_with("umbracast-lab-"));
@@ -391,10 +432,11 @@ mod tests {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let (hear, heard) = std::sync::mpsc::channel();
         let (tell, told) = std::sync::mpsc::channel();
-        let hears = move |json: &[u8]| match json {
+        let reports = move |json: &[u8]| match json {
             b"[]" => hear.send(()).map_err(|e| Error::new(e.to_string())),
             _ => Err(Error::new("expected JSON")),
         };
+        let hears = Hears { reports: Box::new(reports), ..Hears::default() };
         let sender = Sender::start(&at(&broker), "lab", hears, move |event| drop(tell.send(event)));
         let (mut stream, _) = taken(&broker);
         let topic = b"umbracast/lab/reports";
@@ -412,7 +454,8 @@ mod tests {
     fn a_connection_that_somebody_takes_over_is_told() {
         let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let (tell, told) = std::sync::mpsc::channel();
-        let sender = Sender::start(&at(&broker), "lab", deaf, move |event| drop(tell.send(event)));
+        let sender =
+            Sender::start(&at(&broker), "lab", Hears::default(), move |event| drop(tell.send(event)));
         let (stream, name) = taken(&broker);
         drop(stream);
         let events = [told.recv().unwrap(), told.recv().unwrap()];
@@ -421,9 +464,47 @@ mod tests {
         drop((broker, sender));
     }
 
+    #[test]
+    fn lists_of_objects_come_in_and_frames_go_out_where_that_is_asked_for() {
+        let broker = TcpListener::bind("127.0.0.1:0").unwrap();
+        let settings = Mqtt { objects: true, frames: true, ..at(&broker) };
+        let (hear, heard) = std::sync::mpsc::channel();
+        let hear = move |source: &str, list: &[u8]| drop(hear.send((source.to_owned(), list.to_vec())));
+        let hears = Hears { objects: Box::new(hear), ..Hears::default() };
+        let sender = Sender::start(&settings, "lab", hears, drop).unwrap();
+        let (mut stream, _) = taken(&broker);
+        assert_eq!(publication(&mut stream).1, "online");
+        for topic in ["umbracast/lab/objects/cameras", "umbracast/lab/other"] {
+            // A list is longer than what brokers' clients take unless they are told to.
+            let body = [&[0, topic.len() as u8], topic.as_bytes(), &[b'7'; 20_000]].concat();
+            let length = [
+                (body.len() % 128) as u8 | 128,
+                (body.len() / 128 % 128) as u8 | 128,
+                (body.len() / 16_384) as u8,
+            ];
+            stream.write_all(&[&[0x30], &length[..], &body].concat()).unwrap();
+        }
+        let (source, list) = heard.recv_timeout(Duration::from_secs(5)).unwrap();
+        assert_eq!((source.as_str(), list.len()), ("cameras", 20_000));
+        let frame = Published { time_ns: 300, term: 6, ..Published::default() };
+        (0..100).for_each(|_| sender.frame(&frame));
+        assert_eq!(sender.lost(), 0, "frames that a slow broker does not take are left out");
+        let (topic, text, number) = unacknowledged(&mut stream);
+        let told: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            (topic.as_str(), &told["time_ns"], &told["term"]),
+            ("umbracast/lab/frames", &300.into(), &6.into())
+        );
+        acknowledge(&mut stream, number);
+        assert!(heard.try_recv().is_err(), "another topic is no list");
+        drop(stream);
+        drop(sender);
+    }
+
     fn at(broker: &TcpListener) -> Mqtt {
         let broker = broker.local_addr().unwrap().to_string();
-        Mqtt { broker, user: None, password_file: None, ca: None, plain: false }
+        let (objects, frames) = (false, false);
+        Mqtt { broker, user: None, password_file: None, ca: None, plain: false, objects, frames }
     }
 
     #[test]
@@ -434,13 +515,16 @@ mod tests {
             password_file: None,
             ca: None,
             plain: false,
+            objects: false,
+            frames: false,
         };
-        let sender = Sender::start(&settings, "lab", deaf, drop).unwrap();
+        let sender = Sender::start(&settings, "lab", Hears::default(), drop).unwrap();
         (0..WAITING + 10).for_each(|_| sender.send(&event(), 6));
         assert!(sender.lost() >= 10);
         drop(sender);
         assert!(
-            Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab", deaf, drop).is_err()
+            Sender::start(&Mqtt { broker: "nowhere".to_owned(), ..settings }, "lab", Hears::default(), drop)
+                .is_err()
         );
     }
 }

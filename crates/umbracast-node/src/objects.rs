@@ -1,17 +1,32 @@
 //! Lists of another perception system as frames, in place of front ends. Pure: the caller gives the time of day.
 
 use umbracast::lidar::{View, Views};
-use umbracast::{Health, STEP_NS, Site};
+use umbracast::{Health, STEP_NS, Site, site};
 use umbracast_io::objects::{self, ObjectList};
 
+use zenoh::{Session, Wait};
+
 use crate::join::Joined;
+use crate::keys::{Keys, chunk};
 
 /// When nothing that could be used has come for so long, another source and another time are taken as they come.
 const SILENCE_NS: i64 = 1_000_000_000;
 
+/// Puts lists that come otherwise than over Zenoh where the tracker of a hall hears them: takes the source's name, and the bytes.
+pub fn lists_into(session: Session, hall: &str) -> impl Fn(&str, &[u8]) + Send + Sync + 'static {
+    let keys = Keys::new(hall);
+    move |source, list| {
+        // A source that is no chunk of a key, or a session that was closed: nobody can be told.
+        if let Ok(source) = chunk(source) {
+            let _ = session.put(keys.of(&format!("objects/{source}")), list).wait();
+        }
+    }
+}
+
 /// Takes the lists of one source and gives frames in order of time.
 #[derive(Debug)]
 pub struct Lists {
+    hall: site::Hall,
     /// Where the sensors hang, whose beams nobody told.
     views: Vec<View>,
     source: String,
@@ -30,6 +45,7 @@ impl Lists {
             fan: None,
         };
         Self {
+            hall: site.hall.clone(),
             views: site.sensors.iter().enumerate().map(view).collect(),
             source: String::new(),
             last_ns: None,
@@ -57,14 +73,24 @@ impl Lists {
         }
         (self.last_ns, self.used_ns) = (Some(time_ns), now_ns);
         source.clone_into(&mut self.source);
-        let (detections, none) = objects::detections(list, time_ns);
+        let (mut tracks, mut detections) = (None, None);
+        let none = if list.tracked {
+            let (found, none) = objects::tracks(list, time_ns, &self.hall);
+            tracks = Some(found);
+            none
+        } else {
+            let (found, none) = objects::detections(list, time_ns);
+            detections = Some(found);
+            none
+        };
         self.health.points_invalid = self.health.points_invalid.saturating_add(none);
         Some(Joined {
             views: Views { time_ns, of_scans: self.views.clone() },
             health: self.health,
             closed_ns: now_ns,
             anew: silent,
-            detections: Some(detections),
+            detections,
+            tracks,
             ..Joined::default()
         })
     }
@@ -80,13 +106,14 @@ mod tests {
 
     fn list(time_ns: i64, x_m: f64) -> ObjectList {
         let object = Object {
+            id: 7.into(),
             position_m: vec![x_m, 0.0],
-            size_m: [0.4, 0.6, 1.7],
+            size_m: Some([0.4, 0.6, 1.7]),
             velocity_mps: vec![1.0, 0.0],
-            heading_rad: 0.0,
+            heading_rad: None,
             sigma_m: None,
         };
-        ObjectList { time_ns, objects: vec![object] }
+        ObjectList { time_ns, tracked: false, objects: vec![object] }
     }
 
     #[test]

@@ -18,6 +18,8 @@ pub(crate) struct Outlets {
     bindings: Option<Outlet>,
     /// Where it says what changes cost.
     decisions: Option<Outlet>,
+    /// All of it as JSON, for who listens.
+    json: Option<Outlet>,
     /// Of each access point.
     warnings: Vec<(String, Outlet)>,
     access_points: Vec<String>,
@@ -45,6 +47,7 @@ impl Outlets {
             losses: outlet(row.cast && config.site.has_radio(), "losses", Urgency::Result)?,
             bindings: outlet(row.cast && config.site.has_radio(), "bindings", Urgency::Result)?,
             decisions: outlet(row.cast && config.site.has_decisions(), "decisions", Urgency::Warning)?,
+            json: outlet(row.cast, "json", Urgency::Result)?,
             warnings: warnings.collect::<Result<_, Error>>()?,
             access_points,
             tracker: hall.id(),
@@ -81,6 +84,20 @@ impl Outlets {
             if let Some(outlet) = &self.bindings {
                 outlet.put_rows(term, wire::encode(made.time_ns, made.frame, &made.bindings, names));
             }
+        }
+        if let (Some(outlet), Some(links)) = (&self.json, &made.links)
+            && outlet.is_heard()
+        {
+            let frame = serde_json::json!({
+                "frame": made.frame,
+                "time_ns": made.time_ns,
+                "term": term,
+                "tracks": wire::Json(&made.tracks, names),
+                "blockages": wire::Json(links, names),
+                "losses": wire::Json(&made.losses, names),
+                "decisions": wire::Json(&made.decisions, names),
+            });
+            outlet.put_bytes(frame.to_string().into_bytes());
         }
         if let (Some(outlet), Some(detections)) = (&self.detections, &made.detections) {
             outlet.put_rows(term, wire::encode(made.time_ns, made.frame, detections, names));

@@ -1,4 +1,5 @@
-//! What a hall sends to other systems: topics of ROS 2, warnings and decisions over MQTT.
+//! What a hall sends to other systems and takes from them: topics of ROS 2; warnings, decisions, frames and lists of objects over
+//! MQTT.
 
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
@@ -11,7 +12,8 @@ use umbracast_live::run::Listener;
 use umbracast_live::{HostClock, Published};
 use zenoh::Session;
 
-use crate::mqtt::{Mqtt, Sender};
+use crate::mqtt::{Hears, Mqtt, Sender};
+use crate::objects::lists_into;
 use crate::ros2::{Face, names};
 
 /// `[network.ros2]` of the site file.
@@ -41,7 +43,7 @@ impl Outward {
     /// # Errors
     /// A session that cannot be opened, a hall that ROS 2 cannot name, a broker's name that is none.
     pub fn open(
-        session: impl FnOnce() -> Result<Session, Error>,
+        session: impl Fn() -> Result<Session, Error>,
         hall: &str,
         site: &Site,
         ros2: Option<Ros2>,
@@ -56,11 +58,15 @@ impl Outward {
         let face = ros2.map(face).transpose().map_err(|e| e.within("network.ros2"))?;
         let site = Arc::new(RwLock::new(site.clone()));
         let (known, (ear, clock)) = (site.clone(), hears);
-        let heard = move |json: &[u8]| {
+        let reports = move |json: &[u8]| {
             let site = known.read().unwrap_or_else(PoisonError::into_inner);
             reports::from_json(json, &site, clock.now_ns()).map(|reports| ear(&reports))
         };
-        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall, heard, told)).transpose()?;
+        let lists = mqtt.filter(|mqtt| mqtt.objects).map(|_| session()).transpose()?;
+        let pass_on = lists.map(|session| lists_into(session, hall));
+        let objects = move |source: &str, list: &[u8]| pass_on.iter().for_each(|put| put(source, list));
+        let hears = Hears { reports: Box::new(reports), objects: Box::new(objects) };
+        let sender = mqtt.map(|mqtt| Sender::start(mqtt, hall, hears, told)).transpose()?;
         Ok((face.is_some() || sender.is_some()).then(|| Arc::new(Self { face, sender, site })))
     }
 
@@ -86,6 +92,7 @@ impl Outward {
     /// Tells a frame; waits for nobody.
     fn tell(&self, published: &Published) {
         if let Some(sender) = &self.sender {
+            sender.frame(published);
             published.events.iter().for_each(|event| sender.send(event, published.term));
             published.advice.iter().for_each(|advice| sender.advise(advice, published.term));
         }

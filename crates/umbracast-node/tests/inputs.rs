@@ -83,6 +83,54 @@ fn people_of_another_perception_are_followed_and_foreseen() {
 }
 
 #[test]
+fn tracks_of_another_perception_are_kept_and_answered_as_json() {
+    let (hall, config) = (hall(), Config::default());
+    let tracks = heard::<Followed>(&hall, "tracks");
+    let (sender, json) = channel();
+    let hear = move |sample: zenoh::sample::Sample| {
+        let frame: serde_json::Value = serde_json::from_slice(&sample.payload().to_bytes()).expect("JSON");
+        let _ = sender.send(frame); // The test may be over.
+    };
+    hall.session().declare_subscriber(hall.keys().of("json")).callback(hear).background().wait().unwrap();
+    let stages = [Role::Track, Role::Forecast, Role::Cast];
+    let node = Node::start(hall.clone(), settings(&stages, &config, Source::Doors(Vec::new()))).unwrap();
+    let mut alone = umbracast::Pipeline::new(&config, None).unwrap();
+    let start_ns = 1_700_000_000_000_000_000;
+    for frame in 0..20_i64 {
+        let (time_ns, x_m) = (start_ns + frame * STEP_NS, 0.125 * frame as f64 - 1.0);
+        // Somebody who would need three frames to be believed, and two who stand too near to be told apart.
+        let list = serde_json::json!({ "time_ns": time_ns, "tracked": true, "objects": [
+            { "id": 812, "position_m": [x_m, 0.5], "velocity_mps": [1.25, 0.0] },
+            { "id": 7, "position_m": [13.0, 0.1], "velocity_mps": [0.0, 0.0] },
+            { "id": 9, "position_m": [13.0, 0.2], "velocity_mps": [0.0, 0.0] },
+            { "id": 10, "position_m": [3.0, 3.0] },
+        ] });
+        hall.session().put(hall.keys().of("objects/vendor"), list.to_string()).wait().unwrap();
+        let found = tracks.recv_timeout(SOON).expect("a frame");
+        let ids: Vec<u64> = found.tracks.iter().map(|track| track.id).collect();
+        assert_eq!((found.time_ns, ids), (time_ns, vec![7, 9, 812]));
+        assert_eq!(found.tracks[2].position_m, DVec2::new(x_m, 0.5));
+        let outcome = alone.step_tracks(frame as u64, time_ns, &found.tracks);
+        assert_eq!(outcome.forecasts, found.forecasts, "as one process has them");
+        let told = json.recv_timeout(SOON).expect("a frame as JSON");
+        assert_eq!(
+            (told["time_ns"].as_i64(), told["tracks"][2]["track"].as_u64()),
+            (Some(time_ns), Some(812))
+        );
+        let links = told["blockages"].as_array().expect("links");
+        assert_eq!(links.len(), outcome.blockages.len());
+        for (link, expected) in links.iter().zip(&outcome.blockages) {
+            assert_eq!(
+                (link["p_now"].as_f64(), link["p_w9"].as_f64()),
+                (Some(expected.p_now), Some(expected.p[8]))
+            );
+        }
+    }
+    let summary = node.stop();
+    assert_eq!((summary.frames, summary.broken, summary.health.points_invalid), (20, 0, 20));
+}
+
+#[test]
 fn packets_of_drivers_give_foreground() {
     let (hall, config) = (hall(), Config::default());
     let topics = (0..config.site.sensors.len()).map(|s| (s, format!("/lidar_{s}/velodyne_packets")));

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 
 use pyo3::prelude::*;
-use umbracast::{Config, Error, Health, Mode};
-use umbracast_io::input::{self, Input};
+use umbracast::{Error, Health};
+use umbracast_io::input::{self, Given, Input, Inputs};
 
 use crate::frame::Frame;
 use crate::site::Site;
@@ -20,6 +20,7 @@ const AHEAD: usize = 4;
 #[pyclass(frozen, module = "umbracast")]
 pub struct Recording {
     input: Input,
+    empty: Option<Input>,
     site: Site,
 }
 
@@ -35,17 +36,17 @@ pub fn read(path: &Bound<PyAny>, site: Option<&Bound<PyAny>>) -> PyResult<Record
     if let Some(path) = paths.iter().find(|path| !path.exists()) {
         return Err(refused(Error::new("no such file or folder").within(path.display())));
     }
-    let inputs = input::scenes(&paths).map_err(refused)?;
+    let given = Given::of(&paths).map_err(refused)?;
     let site = match site {
         Some(site) => Site::given(Some(site))?,
-        None => match input::recorded_site(&inputs).map_err(refused)? {
+        None => match given.site().map_err(refused)? {
             Some(site) => Site::recorded(site),
             None => Site::given(None)?,
         },
     };
-    let mut inputs = input::of_site(inputs, site.site()).map_err(refused)?;
+    let Inputs { scenes: mut inputs, empty } = given.of_site(site.site(), &[]).map_err(refused)?;
     match (inputs.pop(), inputs.len()) {
-        (Some(input), 0) => Ok(Recording { input, site }),
+        (Some(input), 0) => Ok(Recording { input, empty, site }),
         (None, _) => Err(wrong("expected a recording, found no file")),
         (Some(_), more) => {
             Err(wrong(format!("expected one scene, found {}: {} and others", more + 1, inputs[0])))
@@ -73,9 +74,8 @@ impl Recording {
 
     /// The frames without people that lie beside the recording, and what was lost of them.
     pub fn empty_beside(&self) -> Result<(Vec<umbracast::Frame>, Option<String>), Error> {
-        let Some(path) = input::empty_beside(&self.input) else { return Ok((Vec::new(), None)) };
-        let config = Config { site: self.site.site().clone(), ..Config::for_mode(Mode::Default) };
-        input::empty_frames(&path, &config, &mut Health::default())
+        let Some(empty) = &self.empty else { return Ok((Vec::new(), None)) };
+        empty.all_frames(self.site.site(), &mut Health::default())
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::SiteArgs;
+use super::{CaptureArgs, SiteArgs};
 
 /// `calibrate`
 #[derive(Debug, Args)]
@@ -15,8 +15,10 @@ pub struct Calibrate {
     pub recording: Vec<PathBuf>,
     #[command(flatten)]
     pub site: SiteArgs,
-    /// The hall without people, in any form that RECORDING may have. Default: empty.mcap beside the recording;
-    /// without it the background is learned while running.
+    #[command(flatten)]
+    pub captures: CaptureArgs,
+    /// The hall without people, in any form that RECORDING may have. Default: what is named `empty` among the
+    /// recordings, or empty.mcap beside them; without it the background is learned while running.
     #[arg(long, value_name = "PATH")]
     pub empty: Option<PathBuf>,
     /// Learn the background while running, even if there is an empty recording.

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use umbracast::{Error, Mode};
 
-use super::{CrowdArgs, SiteArgs};
+use super::{CaptureArgs, CrowdArgs, SiteArgs};
 
 /// `--log`
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -33,6 +33,8 @@ pub struct Live {
     /// The hall without people: a recording, clouds or captures. Default: the background is learned while running.
     #[arg(long, value_name = "PATH")]
     pub empty: Option<PathBuf>,
+    #[command(flatten)]
+    pub captures: CaptureArgs,
     /// Weights of the LSTM in place of the embedded ones.
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
@@ -70,11 +72,13 @@ pub struct Check {
 /// `view`
 #[derive(Debug, Args)]
 pub struct View {
-    /// A recording, clouds or captures.
+    /// A recording, clouds or captures, in any form that `run` reads.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub site: SiteArgs,
+    #[command(flatten)]
+    pub captures: CaptureArgs,
     /// The method: hdl, paper or default.
     #[arg(long, default_value = "default")]
     pub mode: Mode,
@@ -103,6 +107,8 @@ pub struct ReplayPackets {
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub site: SiteArgs,
+    #[command(flatten)]
+    pub captures: CaptureArgs,
     /// Addresses for the sensors' packets, in the site's order. Further sensors use the last address with the ports
     /// after it.
     #[arg(long, default_value = "127.0.0.1:2368", value_name = "HOST:PORT", value_delimiter = ',')]

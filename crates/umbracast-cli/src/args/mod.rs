@@ -10,7 +10,9 @@ use umbracast_sim::crowd::Preset;
 mod crowd;
 mod live;
 mod calibrate;
+mod captures;
 mod cast;
+mod export;
 mod network;
 mod plan;
 #[cfg(feature = "node")]
@@ -19,9 +21,11 @@ mod node;
 mod fleet;
 
 pub use calibrate::Calibrate;
+pub use captures::CaptureArgs;
 pub use cast::Cast;
 use crowd::one_or_more;
 pub use crowd::{BodyArgs, CrowdArgs, Replay};
+pub use export::{Export, ExportForm};
 #[cfg(feature = "node")]
 pub use fleet::Fleet;
 pub use live::{Check, Live, LogForm, Packets, PageArgs, RecordArgs, ReplayPackets, View};
@@ -67,6 +71,8 @@ pub enum Command {
     Run(Run),
     /// Turn tracks of another program into links: CSV or Parquet with number, time, position and velocity.
     Cast(Cast),
+    /// Write scans, foreground, ways and links in forms that other programs open: PCD, PLY, LAS, GeoJSON.
+    Export(Export),
     /// Receive sensors' packets, run all stages as frames close, serve a page with warnings, and record.
     Live(Live),
     /// Run one process of a hall whose stages run on several hosts, over Zenoh.
@@ -195,17 +201,19 @@ pub struct Simulate {
 #[derive(Debug, Args)]
 pub struct Run {
     /// A folder of recordings or PCD clouds, or files: .mcap, .db3, .pcd or .pcap. A capture with all sensors is a
-    /// scene of its own. Captures of single sensors are one scene together; give one for each sensor, in the site's
-    /// order.
+    /// scene of its own. Captures of single sensors are one scene together; give one for each sensor, in any order.
+    /// Files and folders named `empty`, such as empty-east.pcap, are the hall without people.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub site: SiteArgs,
+    #[command(flatten)]
+    pub captures: CaptureArgs,
     /// The method: hdl, paper or default.
     #[arg(long, default_value = "default")]
     pub mode: Mode,
-    /// The hall without people, in any form that INPUT may have. Default: empty.mcap beside the recordings; without
-    /// it the background is learned while running.
+    /// The hall without people, in any form that INPUT may have. Default: what is named `empty` among the inputs, or
+    /// empty.mcap beside the recordings; without it the background is learned while running.
     #[arg(long, value_name = "PATH")]
     pub empty: Option<PathBuf>,
     /// Learn the background while running, even if there is an empty recording.

@@ -10,7 +10,7 @@ use umbracast_network::policy::Policy;
 use umbracast_network::truth::TruthModel;
 use umbracast_sim::crowd::Preset;
 
-use super::SiteArgs;
+use super::{CaptureArgs, SiteArgs};
 
 /// `network`
 #[derive(Debug, Args)]
@@ -77,6 +77,8 @@ pub struct Network {
     /// Power comes from --reports, or from the recordings.
     #[arg(long, value_name = "INPUT", num_args = 1.., conflicts_with_all = ["policies", "losses", "trace", "out", "dataset"])]
     pub measured: Vec<PathBuf>,
+    #[command(flatten)]
+    pub captures: CaptureArgs,
     /// With --measured: what access points heard of devices, as for `run`.
     #[arg(long, value_name = "FILE", requires = "measured")]
     pub reports: Option<PathBuf>,

@@ -67,6 +67,9 @@ pub struct Node {
     pub weights: Option<PathBuf>,
     #[command(flatten)]
     pub page: PageArgs,
+    /// Take lists of objects of another perception by WebSocket too, at /api/objects/SOURCE of the page.
+    #[arg(long)]
+    pub objects: bool,
     #[command(flatten)]
     pub record: RecordArgs,
     /// Answer HTTP at this address with 200 while the node lives, for the probes of a cluster. (A service of systemd needs

@@ -14,10 +14,10 @@ use umbracast_sim::crowd::Preset;
 
 use crate::args::{Ablate, BodyArgs, Common, Replay};
 use crate::ending::Ending;
-use crate::input::Input;
 use crate::progress::bar;
 use crate::run_json::Stopwatch;
 use crate::{crowds, say, setup};
+use umbracast_io::input::Input;
 
 /// People of a drawn scene.
 const PEOPLE: usize = 10;

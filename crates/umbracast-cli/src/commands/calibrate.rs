@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use umbracast::{Config, Error, Health, Mode};
+use umbracast::{Config, Error, Frame, Health, Mode};
 use umbracast_calibrate::{Calibration, Frame as Held, of_recording, write_into};
+use umbracast_io::input::{Input, Inputs};
 
 use crate::args::{Calibrate, Common};
 use crate::ending::Ending;
-use crate::input::{self, Input};
+use crate::inputs;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup;
 
@@ -15,19 +16,25 @@ mod picture;
 
 /// Finds the poses and writes them.
 pub fn run(args: &Calibrate, common: &Common) -> Result<Ending, Error> {
-    let inputs = input::scenes(&args.recording)?;
     let mut config = setup::config(Mode::Default, args.site.site.as_deref())?;
-    if args.site.site.is_none() {
-        config.site = input::recorded_site(&inputs)?.unwrap_or(config.site);
-    }
-    let inputs = input::of_site(inputs, &config.site)?;
-    let [recording] = &inputs[..] else {
-        let found = inputs.len();
+    let site_file = args.site.site.as_deref();
+    let Inputs { scenes, empty } =
+        inputs::read(&args.recording, &args.captures, site_file, &mut config.site, common)?;
+    let [recording] = &scenes[..] else {
+        let found = scenes.len();
         return Err(Error::new(format!("expected one scene, found {found}")));
     };
     let watch = Stopwatch::start();
     let (mut health, mut lost) = (Health::default(), Vec::new());
-    let found = found(args, recording, &config, &mut health, &mut lost)?;
+    let empty = if args.no_empty {
+        Vec::new()
+    } else {
+        let (given, captures) = (args.empty.as_deref(), &args.captures);
+        let (frames, told) = inputs::empty_frames(given, empty, captures, &config.site, &mut health, common)?;
+        lost.extend(told);
+        frames
+    };
+    let found = found(recording, &config, &empty, &mut health, &mut lost)?;
     let text = args.site.site.as_deref().map_or(Ok(String::new()), setup::read_text)?;
     setup::write(&args.out, write_into(&text, &config.site, &found)?)?;
     let picture = args.picture.clone().unwrap_or_else(|| args.out.with_extension("svg"));
@@ -50,23 +57,16 @@ pub fn run(args: &Calibrate, common: &Common) -> Result<Ending, Error> {
 }
 
 fn found(
-    args: &Calibrate,
     recording: &Input,
     config: &Config,
+    empty: &[Frame],
     health: &mut Health,
     lost: &mut Vec<String>,
 ) -> Result<Calibration, Error> {
-    let given = args.empty.clone().or_else(|| input::empty_beside(recording)).filter(|_| !args.no_empty);
-    let mut empty = Vec::new();
-    if let Some(path) = given {
-        let (frames, told) = input::empty_frames(&path, config, health)?;
-        lost.extend(told);
-        empty = frames;
-    }
     let before = *health;
     // The recording may be read twice: what was skipped and lost counts once.
     let mut told = None;
-    let found = of_recording(&config.site, &empty, |take| {
+    let found = of_recording(&config.site, empty, |take| {
         *health = before;
         told = recording.frames(&config.site, health, |frame| {
             take(frame);

@@ -1,6 +1,7 @@
 //! `demo`: one scene, every stage, every mode, scores and report.
 
 use umbracast::{Config, Error, Mode};
+use umbracast_eval::report;
 use umbracast_eval::run::chain;
 
 use crate::args::{Common, Demo};
@@ -25,10 +26,15 @@ pub fn run(args: &Demo, common: &Common) -> Result<Ending, Error> {
         ));
     }
     let scenes = chain::scenes_in(&configs[0].site, &[args.crowd.preset], 1, args.crowd.people, seed)?;
-    let ending =
-        evaluate::in_memory(configs, setup::weights(None)?, (scenes, Vec::new()), Some(&args.out), common)?;
+    let weights = setup::weights(None)?;
+    let scores = evaluate::in_memory(configs, weights, (scenes, Vec::new()), Some(&args.out), common)?;
+    if !common.json
+        && let Some(verdict) = report::verdict(&scores)
+    {
+        say::line(format_args!("\n{verdict}"));
+    }
     if !common.json && cfg!(feature = "serve") {
         say::line("\nTo see people move and links break as they do: umbracast live --demo");
     }
-    Ok(ending)
+    Ok(Ending::Done)
 }

@@ -49,7 +49,8 @@ pub fn run(args: &Evaluate, common: &Common) -> Result<Ending, Error> {
             let weights = setup::weights(args.weights.as_deref())?;
             let (scenes, mut told) = crowds::dressed(drawn, &args.bodies)?;
             told.extend(crowds::through_walls(&scenes, &configs[0].site));
-            in_memory(configs, weights, (scenes, told), args.out.as_deref(), common)
+            in_memory(configs, weights, (scenes, told), args.out.as_deref(), common)?;
+            Ok(Ending::Done)
         }
     }
 }
@@ -61,7 +62,7 @@ pub fn in_memory(
     (scenes, told): crowds::Told,
     out: Option<&Path>,
     common: &Common,
-) -> Result<Ending, Error> {
+) -> Result<Scores, Error> {
     let spec = Spec { configs, weights: Some(weights), scenes, keep: Some(0), ladder: out.is_some() };
     let progress = bar(0, "frames", common.quiet);
     let results = setup::with_threads(common.threads, || {
@@ -83,11 +84,11 @@ pub fn in_memory(
         truth,
         run: &runs[best],
     });
-    let ending = show(&scores, &spec.configs, kept, &told, out, common)?;
+    show(&scores, &spec.configs, kept, &told, out, common)?;
     if let (Some(folder), Some((truth, runs))) = (out, &results[0].kept) {
         write_scene(folder, &spec.configs[best], truth, &runs[best])?;
     }
-    Ok(ending)
+    Ok(scores)
 }
 
 /// The scene that the report shows, as tables: its truth, what the last mode said, and whose track is whose.

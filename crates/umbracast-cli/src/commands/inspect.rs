@@ -253,7 +253,7 @@ fn capture(file: &Path, found: &mut Findings) -> Result<(), Error> {
         *kinds.entry((datagram.port, datagram.payload.len())).or_default() += 1;
     }
     found.say("kind", "capture");
-    found.say("duration_s", (last_ns - first_ns.unwrap_or(last_ns)) as f64 * 1e-9);
+    found.say("duration_s", (last_ns - first_ns.unwrap_or(last_ns)) as f64 / 1e9);
     for ((port, bytes), count) in kinds {
         found.say(&format!("port {port}, {bytes} bytes"), format!("{count} datagrams"));
     }

@@ -24,7 +24,7 @@ use umbracast_sim::sensor::Sensors;
 
 use crate::args::{self, Common, LogForm, RecordArgs};
 use crate::ending::Ending;
-use crate::input;
+use crate::inputs;
 use crate::outward::Outward;
 use crate::page::{Page, Shown};
 use crate::run_json::{RunJson, Stopwatch};
@@ -45,7 +45,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
     let whole = Arc::new(Whole::default());
     let settings = Settings {
         weights: Some(setup::weights(args.weights.as_deref())?),
-        empty: empty_frames(args, &config)?,
+        empty: empty_frames(args, &config, common)?,
         doors: doors(&config.site, args.port, args.demo)?,
         record: recorder(&args.record),
         config: config.clone(),
@@ -169,7 +169,28 @@ pub fn doors(site: &Site, port: Option<u16>, demo: bool) -> Result<Vec<Door>, Er
         let from = sensor.address_bytes().filter(|_| !demo).map(IpAddr::from);
         Ok(Door { sensor: number, port, from })
     };
-    site.sensors.iter().enumerate().map(door).collect()
+    let doors: Vec<Door> = site.sensors.iter().enumerate().map(door).collect::<Result<_, _>>()?;
+    told_apart(site, &doors)?;
+    Ok(doors)
+}
+
+/// Refuses two sensors of one port that no address tells apart.
+fn told_apart(site: &Site, doors: &[Door]) -> Result<(), Error> {
+    for (d, one) in doors.iter().enumerate().filter(|(_, door)| door.port != 0) {
+        let same = |other: &&Door| {
+            let apart = matches!((other.from, one.from), (Some(a), Some(b)) if a != b);
+            other.port == one.port && !apart
+        };
+        if let Some(other) = doors[..d].iter().find(same) {
+            let [first, second] = [other, one].map(|door| &site.sensors[door.sensor].name);
+            return Err(Error::new(format!(
+                "sensors {first:?} and {second:?}: expected an `address` or a `udp_port` of its own for each in the site file, or \
+                 --port, found both at UDP port {}",
+                one.port
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// The recorder's settings; none where nothing is recorded.
@@ -184,13 +205,22 @@ pub fn recorder(args: &RecordArgs) -> Option<RecordSettings> {
 }
 
 /// The hall without people, as given; a demonstration simulates it.
-fn empty_frames(args: &args::Live, config: &Config) -> Result<Vec<Frame>, Error> {
-    match (&args.empty, args.demo) {
+fn empty_frames(args: &args::Live, config: &Config, common: &Common) -> Result<Vec<Frame>, Error> {
+    match (args.empty.as_deref(), args.demo) {
         (Some(path), _) => {
-            input::empty_frames(path, config, &mut Health::default()).map(|(frames, _)| frames)
+            let (site, mut health) = (&config.site, Health::default());
+            let read = inputs::empty_frames(Some(path), None, &args.captures, site, &mut health, common);
+            read.map(|(frames, _)| frames)
         }
         (None, true) => chain::empty_frames(&config.site, TEST_SEED),
-        (None, false) => Ok(Vec::new()),
+        (None, false) => {
+            say::caution(
+                "no empty hall is given, so the background is learned on the way: people who stand from the start cannot be told \
+                 from furniture, and the first frames cannot be trusted. Record two seconds without people (--record) and give \
+                 them with --empty",
+            );
+            Ok(Vec::new())
+        }
     }
 }
 
@@ -229,13 +259,13 @@ fn tell(summary: &Summary, sent: Option<Sent>, watch: &Stopwatch, common: &Commo
         .with("frames_skipped", summary.frames_skipped)
         .with("latency_ms_median", latency.quantile_ms(0.5))
         .with("latency_ms_p99", latency.quantile_ms(0.99))
-        .with("latency_ms_max", latency.longest().as_secs_f64() * 1e3)
+        .with("latency_ms_max", latency.longest().as_nanos() as f64 / 1e6)
         .with("step_ms_median", step.quantile_ms(0.5))
         .with("step_ms_p99", step.quantile_ms(0.99))
         .with("health", summary.health)
         .with("recorder", &summary.recorded);
     if let Some(sent) = sent {
-        json = json.with("packets_sent", sent.packets).with("sent_late_ms_max", sent.latest_ns as f64 * 1e-6);
+        json = json.with("packets_sent", sent.packets).with("sent_late_ms_max", sent.latest_ns as f64 / 1e6);
     }
     let text = format!(
         "{} frames of {} packets in {:.1} s: {:.2} ms from the last packet to the warning (median), {:.2} ms (99 %)",

@@ -3,6 +3,7 @@
 pub mod ablate;
 pub mod calibrate;
 pub mod cast;
+pub mod export;
 pub mod compare;
 pub mod config;
 pub mod coverage;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Health, Mode, Pipeline};
+use umbracast_io::input::{self, Inputs};
 use umbracast_network::case::{Sweep, with_radios};
 use umbracast_network::dataset::DataSet;
 use umbracast_network::experiment::{self, Spec};
@@ -14,7 +15,7 @@ use umbracast_network::{fades, passages, report, trace};
 
 use crate::args::{Common, Network};
 use crate::ending::Ending;
-use crate::input;
+use crate::inputs;
 use crate::progress::bar;
 use crate::{say, setup};
 
@@ -101,24 +102,21 @@ pub fn run(args: &Network, common: &Common) -> Result<Ending, Error> {
 
 /// Compares what is told of recordings with the power that was heard in them.
 fn measured(args: &Network, common: &Common) -> Result<Ending, Error> {
-    let inputs = input::scenes(&args.measured)?;
     let mut config = setup::config(Mode::Default, args.site.site.as_deref())?;
-    if args.site.site.is_none() {
-        config.site = input::recorded_site(&inputs)?.unwrap_or(config.site);
-    }
+    let (captures, site_file) = (&args.captures, args.site.site.as_deref());
+    let Inputs { scenes: inputs, empty } =
+        inputs::read(&args.measured, captures, site_file, &mut config.site, common)?;
     if !config.site.has_radio() {
         return Err(Error::new("site.access_points: expected one with `radio`, found none"));
     }
-    let inputs = input::of_site(inputs, &config.site)?;
-    let mut health = Health::default();
-    let empty = args.empty.clone().or_else(|| input::empty_beside(&inputs[0]));
-    let empty = empty.map(|path| input::empty_frames(&path, &config, &mut health)).transpose()?;
-    let (mut measured, mut lost) = (Vec::new(), Vec::new());
+    let (mut health, given) = (Health::default(), args.empty.as_deref());
+    let (empty, told) = inputs::empty_frames(given, empty, captures, &config.site, &mut health, common)?;
+    let (mut measured, mut lost) = (Vec::new(), Vec::from_iter(told));
     for (place, input) in inputs.iter().enumerate() {
         let scene = input::scene_number(input).unwrap_or(place as u32);
         let mut reports = super::run::heard(scene, input, args.reports.as_deref(), &config.site)?;
         let mut pipeline = Pipeline::new(&config, None)?;
-        empty.iter().flat_map(|(frames, _)| frames).for_each(|frame| pipeline.learn_empty(frame));
+        empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let mut of_scene = Measured::default();
         lost.extend(input.frames(&config.site, &mut health, |frame| {
             let heard = reports.before(frame.time_ns);

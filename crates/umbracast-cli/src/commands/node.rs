@@ -10,6 +10,7 @@ use umbracast::config::ForecastMethod;
 use umbracast::forecast::Weights;
 use umbracast::lidar::Packet;
 use umbracast::{Config, Error, Frame, Health, Site};
+use umbracast_io::input::{self, Given, Input};
 use umbracast_io::reports;
 use umbracast_live::heard::Ear;
 use umbracast_live::log::Form;
@@ -20,6 +21,7 @@ use umbracast_node::hall::{Hall, Urgency};
 use umbracast_node::keys::Keys;
 use umbracast_node::meet::{self, Unanswered};
 use umbracast_node::network::{self, Mode, Network};
+use umbracast_node::objects::lists_into;
 use umbracast_node::role::Role;
 use umbracast_node::share::{self, Shared};
 use umbracast_node::summary::Summary;
@@ -29,7 +31,6 @@ use super::live;
 use crate::alive::Alive;
 use crate::args::{self, Common};
 use crate::ending::Ending;
-use crate::input::{self, Input};
 use crate::outward::Outward;
 use crate::page::{Page, Shown};
 use crate::run_json::{RunJson, Stopwatch};
@@ -80,8 +81,11 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let ear = stages.contains(&Role::Serve).then(|| ear(&hall, &config.site)).transpose()?;
     let page = match &ear {
         Some(ear) => {
-            let shown = Shown::live(&config.site, &counters, clock, &config.site.name);
-            Page::open(&args.page, Shown { ear: Some(ear.clone()), ..shown })?
+            let mut shown = Shown::live(&config.site, &counters, clock, &config.site.name);
+            let take = || -> crate::page::Objects { Box::new(lists_into(hall.session().clone(), &name)) };
+            shown.objects = args.objects.then(take);
+            shown.ear = Some(ear.clone());
+            Page::open(&args.page, shown)?
         }
         None => Page::default(),
     };
@@ -89,7 +93,7 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let outward = match ear {
         Some(ear) => {
             let told = say::events(Form::Text, common.quiet, clock);
-            Outward::of_network(&network, || Ok(session), &name, &config.site, (ear, clock), told)?
+            Outward::of_network(&network, || Ok(session.clone()), &name, &config.site, (ear, clock), told)?
         }
         None => Outward::default(),
     };
@@ -238,11 +242,12 @@ fn empty(
     let site = &config.site;
     if let Some(path) = &args.empty {
         let mut packets = vec![Vec::new(); site.sensors.len()];
-        one_input(path, site)?.packets(site, |sensor, packet: Packet| {
+        let empty = input::empty_hall(std::slice::from_ref(path), site, &[])?;
+        empty.packets(site, |sensor, packet: Packet| {
             packets[sensor].push(packet);
             Ok(())
         })?;
-        let (frames, _) = input::empty_frames(path, config, &mut Health::default())?;
+        let (frames, _) = empty.all_frames(site, &mut Health::default())?;
         return Ok((frames, shared.with_empty(hall, site, &packets)));
     }
     if !stages.contains(&Role::Sensor) {
@@ -306,7 +311,7 @@ fn weights(
 }
 
 fn one_input(path: &Path, site: &Site) -> Result<Input, Error> {
-    let mut inputs = input::of_site(input::scenes(std::slice::from_ref(&path.to_owned()))?, site)?;
+    let mut inputs = Given::of(&[path.to_owned()])?.of_site(site, &[])?.scenes;
     match (inputs.pop(), inputs.is_empty()) {
         (Some(input), true) => Ok(input),
         _ => Err(Error::new("expected one scene, found several").within(path.display())),

@@ -11,7 +11,7 @@ use umbracast_live::send;
 
 use crate::args::{Common, ReplayPackets};
 use crate::ending::Ending;
-use crate::input;
+use crate::inputs;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::{setup, signal};
 
@@ -20,12 +20,9 @@ const AHEAD: usize = 4096;
 
 /// Sends everything, each sensor's packets to a port of its own.
 pub fn run(args: &ReplayPackets, common: &Common) -> Result<Ending, Error> {
-    let inputs = input::scenes(&args.inputs)?;
     let mut site = setup::config(Mode::Default, args.site.site.as_deref())?.site;
-    if args.site.site.is_none() {
-        site = input::recorded_site(&inputs)?.unwrap_or(site);
-    }
-    let inputs = input::of_site(inputs, &site)?;
+    let inputs =
+        inputs::read(&args.inputs, &args.captures, args.site.site.as_deref(), &mut site, common)?.scenes;
     let to = send::addresses(site.sensors.len(), &args.to);
     let asked: Arc<AtomicBool> = signal::asked_to_end()?;
     let watch = Stopwatch::start();
@@ -49,7 +46,7 @@ pub fn run(args: &ReplayPackets, common: &Common) -> Result<Ending, Error> {
     let summary = RunJson::new("replay", &watch)
         .with("packets", sent.packets)
         .with("failed", sent.failed)
-        .with("late_ms_max", sent.latest_ns as f64 * 1e-6);
+        .with("late_ms_max", sent.latest_ns as f64 / 1e6);
     summary.print(common, &format!("{} packets sent in {:.1} s", sent.packets, watch.seconds()));
     if lost.is_empty() { Ok(Ending::Done) } else { Ok(Ending::DataLost(lost.join("; "))) }
 }

@@ -9,9 +9,11 @@ use std::time::Duration;
 
 use umbracast::detect::doubled;
 use umbracast::forecast::Weights;
+use umbracast::lidar::{Cloud, Scan};
 use umbracast::radio::Report;
 use umbracast::site::Sensor;
 use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline, Site};
+use umbracast_io::input::{self, Input, Inputs};
 use umbracast_io::outcome_tables::{OutcomeRows, OutcomeTables};
 use umbracast_io::recording::{RecordingWriter, Results};
 use umbracast_io::reports::{self, Reports};
@@ -19,16 +21,18 @@ use umbracast_live::latency::Latencies;
 
 use crate::args::{Common, Run};
 use crate::ending::Ending;
-use crate::input::{self, Input};
+use crate::inputs;
 use crate::progress::bar;
 use crate::run_json::{Ranges, RunJson, Stopwatch};
-use crate::setup;
+use crate::{say, setup};
 
 /// Frames of a scene that runs ahead of an earlier one, whose rows wait for the tables.
 const AHEAD: usize = 512;
 /// So large a share of doubled detections tells that a sensor hangs elsewhere: next to none are where both hang right, a sixth
 /// and more where one is off by 2 degrees and 10 cm.
 const DOUBLED_SHARE_MAX: f64 = 0.02;
+/// Of so large a share of the returns it is told that they do not fit the sensor's ranges: a few walls behind glass are no more.
+const OUT_OF_RANGE_SHARE_MAX: f64 = 0.3;
 
 /// What came out of one frame.
 struct Step {
@@ -53,20 +57,24 @@ struct Method<'a> {
 /// Every input is a scene with a pipeline of its own. Rows are written as they come, in the order of the scenes: nothing
 /// grows with a recording, which may go on for ever.
 pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
-    let inputs = input::scenes(&args.inputs)?;
     let mut config = setup::config(args.mode, args.site.site.as_deref())?;
-    // A recording brings its site with it; a file given goes before it.
-    if args.site.site.is_none() {
-        config.site = input::recorded_site(&inputs)?.unwrap_or(config.site);
-    }
-    let inputs = input::of_site(inputs, &config.site)?;
+    let site_file = args.site.site.as_deref();
+    let Inputs { scenes: inputs, empty } =
+        inputs::read(&args.inputs, &args.captures, site_file, &mut config.site, common)?;
     let numbered: Vec<(u32, &Input)> = inputs.iter().enumerate().map(number_of).collect();
     if args.mcap {
         refuse_twice(&numbered)?;
     }
     let weights = setup::weights(args.weights.as_deref())?;
     let (mut health, mut lost) = (Health::default(), Vec::new());
-    let empty = empty_frames(args, &inputs[0], &config, &mut health, &mut lost)?;
+    let empty = if args.no_empty {
+        Vec::new()
+    } else {
+        let (given, captures) = (args.empty.as_deref(), &args.captures);
+        let (frames, told) = inputs::empty_frames(given, empty, captures, &config.site, &mut health, common)?;
+        lost.extend(told);
+        frames
+    };
     setup::make_dir(&args.out)?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let recordings = args.mcap.then_some((args.out.as_path(), args.points));
@@ -81,7 +89,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let mut tables = OutcomeTables::create(&args.out, &config.site, args.csv, true)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
     let (mut steps, mut frames) = (Latencies::default(), Vec::new());
-    let (mut detected, mut doubled) = (0, 0);
+    let (mut detected, mut doubled, mut returns) = (0, 0, 0);
     let mut run_some = |some: &[(u32, &Input)]| {
         std::thread::scope(|scope| -> Result<(), Error> {
             let mut running = Vec::new();
@@ -100,8 +108,10 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
                     tables.write(&step.rows)?;
                 }
                 frames.push(numbers);
-                let (scene_health, told) = scene.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+                let (scene_health, of_scene, told) =
+                    scene.join().unwrap_or_else(|panic| resume_unwind(panic))?;
                 health.add(&scene_health);
+                returns += of_scene;
                 lost.extend(told);
                 progress.inc(1);
             }
@@ -117,6 +127,12 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     lost.extend(empty_handed.map(|(input, _)| {
         format!("{input}: expected frames of the site's sensors, found none; `umbracast inspect` says what it holds")
     }));
+    let shortest = frames.iter().map(Ranges::len).min().unwrap_or(0);
+    let mut cautions = Vec::new();
+    if empty.is_empty() && !args.no_empty {
+        cautions.push(inputs::no_empty_hall(shortest));
+    }
+    cautions.extend(out_of_range(&health, returns, &config));
     let summary = RunJson::new("run", &watch)
         .with("mode", args.mode)
         .with("scenes", inputs.len())
@@ -127,6 +143,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         .with("detections", detected)
         .with("detections_doubled", doubled)
         .with("health", health)
+        .with("cautions", &cautions)
         .with("lost", &lost);
     summary.write(&args.out)?;
     let text = format!(
@@ -138,6 +155,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         steps.quantile_ms(0.99)
     );
     summary.print(common, &text);
+    cautions.iter().for_each(|caution| say::caution(caution));
     if doubled as f64 > DOUBLED_SHARE_MAX * detected as f64 {
         lost.push(format!(
             "the sensors disagree: {doubled} of {detected} detections are of one sensor alone, beside one of another; \
@@ -159,6 +177,33 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         return Ok(Ending::DataLost(counts(&health)));
     }
     Ok(Ending::Done)
+}
+
+/// Ranges that do not fit the site file, where they are more than some.
+fn out_of_range(health: &Health, returns: u64, config: &Config) -> Option<String> {
+    let share = health.points_invalid as f64 / returns.max(1) as f64;
+    (share > OUT_OF_RANGE_SHARE_MAX).then(|| {
+        let ranges = |sensor: &Sensor| {
+            let Sensor { name, range_min_m, range_max_m, .. } = sensor;
+            format!("{name}: {range_min_m} to {range_max_m} m")
+        };
+        let of_sensors: Vec<String> = config.site.sensors.iter().map(ranges).collect();
+        format!(
+            "{:.0} % of {returns} returns were left out (points_invalid), as they lie nearer or farther than the site file says \
+             that sensors measure ({}); correct `range_min_m` and `range_max_m`, or the unit of the clouds, which is metres",
+            100.0 * share,
+            of_sensors.join(", ")
+        )
+    })
+}
+
+/// How many returns a frame has.
+fn returns_of(frame: &Frame) -> u64 {
+    let returns = |scan: &Scan| match &scan.cloud {
+        Cloud::Organised(image) => image.range_m.iter().filter(|range_m| **range_m > 0.0).count(),
+        Cloud::Unorganised(points) => points.len(),
+    };
+    frame.scans.iter().map(returns).sum::<usize>() as u64
 }
 
 /// What is not zero of a health account.
@@ -194,20 +239,21 @@ pub fn heard(scene: u32, input: &Input, given: Option<&Path>, site: &Site) -> Re
     }
 }
 
-/// Gives what was skipped and lost.
+/// Gives what was skipped, how many returns there were, and what was lost.
 fn run_scene(
     scene: u32,
     input: &Input,
     method: &Method,
     results: &SyncSender<Step>,
-) -> Result<(Health, Vec<String>), Error> {
+) -> Result<(Health, u64, Vec<String>), Error> {
     let Method { config, weights, empty, reports, recordings } = method;
     let mut reports = heard(scene, input, *reports, &config.site)?;
     let mut pipeline = Pipeline::new(config, Some(weights))?;
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     let mut recording = recordings.map(|(folder, points)| Recording::new(folder, scene, config, points));
-    let (mut health, mut stage_health) = (Health::default(), Health::default());
+    let (mut health, mut stage_health, mut returns) = (Health::default(), Health::default(), 0);
     let lost = input.frames(&config.site, &mut health, |frame| {
+        returns += returns_of(frame);
         let watch = Stopwatch::start();
         let heard = reports.before(frame.time_ns);
         pipeline.hear(&heard);
@@ -223,8 +269,10 @@ fn run_scene(
         results.send(step).map_err(|_| Error::new("the tables ended before their rows"))
     })?;
     recording.map_or(Ok(()), Recording::finish)?;
+    // Returns that packets hold out of range are in no frame.
+    returns += health.points_invalid;
     health.add(&stage_health);
-    Ok((health, lost.into_iter().chain(clocks_apart(input, config, &pipeline)).collect()))
+    Ok((health, returns, lost.into_iter().chain(clocks_apart(input, config, &pipeline)).collect()))
 }
 
 /// How far sensors' clocks were found apart, where they were.
@@ -282,19 +330,4 @@ impl<'a> Recording<'a> {
     fn finish(self) -> Result<(), Error> {
         self.open.map_or(Ok(()), RecordingWriter::finish)
     }
-}
-
-/// The scene without people: as given, in any form that `run` reads, else `empty.mcap` beside the first recording.
-fn empty_frames(
-    args: &Run,
-    first: &Input,
-    config: &Config,
-    health: &mut Health,
-    lost: &mut Vec<String>,
-) -> Result<Vec<Frame>, Error> {
-    let given = args.empty.clone().or_else(|| input::empty_beside(first));
-    let Some(path) = given.filter(|_| !args.no_empty) else { return Ok(Vec::new()) };
-    let (frames, told) = input::empty_frames(&path, config, health)?;
-    lost.extend(told);
-    Ok(frames)
 }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use umbracast::{Config, Error, Mode};
 use umbracast_eval::run::chain::{CIRCLE_M, EMPTY_FRAMES, People, SceneSpec};
 use umbracast_eval::score::scene::SceneTruth;
+use umbracast_io::input;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables::TableWriter;
 use umbracast_sim::crowd::{Ground, Stroll};
@@ -17,7 +18,7 @@ use crate::ending::Ending;
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
 use crate::setup::{self, TEST_SEED};
-use crate::{crowds, input, say};
+use crate::{crowds, say};
 
 mod recorder;
 mod send;

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use umbracast::{Config, Error, Frame, Health, Pipeline};
+use umbracast_io::input::{self, Input, Inputs};
 use umbracast_io::reports::Reports;
 use umbracast_io::rows::{PeopleLinkRow, PeopleRow};
 use umbracast_io::tables;
@@ -20,23 +21,21 @@ use umbracast_live::{HostClock, Published, published};
 
 use crate::args::{Common, View};
 use crate::ending::Ending;
-use crate::input::{self, Input};
+use crate::inputs;
 use crate::page::{Page, Shown};
 use crate::{say, setup, signal};
 
 /// Computes every input, one after the other, while the page shows what there is already; then waits until the end is
 /// asked for.
 pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
-    let inputs = input::scenes(&args.inputs)?;
     let mut configs = vec![setup::config(args.mode, args.site.site.as_deref())?];
     configs.extend(args.beside.map(|mode| setup::config(mode, args.site.site.as_deref())).transpose()?);
-    if args.site.site.is_none()
-        && let Some(site) = input::recorded_site(&inputs)?
-    {
-        configs.iter_mut().for_each(|config| config.site = site.clone());
-    }
-    let site = configs[0].site.clone();
-    let inputs = input::of_site(inputs, &site)?;
+    let mut site = configs[0].site.clone();
+    let Inputs { scenes: inputs, empty } =
+        inputs::read(&args.inputs, &args.captures, args.site.site.as_deref(), &mut site, common)?;
+    configs.iter_mut().for_each(|config| config.site = site.clone());
+    let (empty, _) =
+        inputs::empty_frames(None, empty, &args.captures, &site, &mut Health::default(), common)?;
     let truth = Truth::beside(&inputs, args.truth.as_deref(), &published::access_points(&site))?;
     let asked = signal::asked_to_end()?;
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
@@ -50,7 +49,7 @@ pub fn run(args: &View, common: &Common) -> Result<Ending, Error> {
     for input in &inputs {
         let (scene, mut modes) = (input::scene_number(input).unwrap_or(0), Vec::new());
         for config in &configs {
-            modes.push(Shows::new(config, input)?);
+            modes.push(Shows::new(config, input, &empty)?);
         }
         let told = input.frames(&site, &mut Health::default(), |frame| {
             let of_modes: Vec<Published> = modes.iter_mut().map(|mode| mode.step(frame, clock)).collect();
@@ -95,12 +94,9 @@ struct Shows {
 }
 
 impl Shows {
-    fn new(config: &Config, input: &Input) -> Result<Self, Error> {
+    fn new(config: &Config, input: &Input, empty: &[Frame]) -> Result<Self, Error> {
         let mut pipeline = Pipeline::new(config, Some(&setup::weights(None)?))?;
-        if let Some(empty) = input::empty_beside(input) {
-            let (frames, _) = input::empty_frames(&empty, config, &mut Health::default())?;
-            frames.iter().for_each(|frame| pipeline.learn_empty(frame));
-        }
+        empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let (sensors, names) = (config.site.sensors.len(), published::access_points(&config.site));
         let heard = super::run::heard(0, input, None, &config.site)?;
         Ok(Self {

@@ -3,6 +3,7 @@
 pub mod published;
 pub mod tables;
 mod causes;
+mod verdict;
 pub mod compare;
 mod long_table;
 mod ladder_table;
@@ -24,6 +25,7 @@ use umbracast::{Config, Error, Mode, Site};
 use crate::run::pooled::{Group, Scores};
 pub use context::{Context, Kept};
 use tables::Table;
+pub use verdict::verdict;
 
 /// Writes into a directory, which is made where it is not there: `report.html`; its tables as text, `report.txt`;
 /// every score as `scores.json` and `scores.csv`; each figure as `NAME.svg` and `NAME.png`; and some seconds of the

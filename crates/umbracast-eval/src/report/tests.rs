@@ -167,6 +167,24 @@ fn the_text_shows_what_was_scored_beside_what_was_published() {
 }
 
 #[test]
+fn a_verdict_says_in_three_sentences_what_the_scores_come_to() {
+    let config = Config::for_mode(Mode::Default);
+    let told = verdict(&scores(&config, &["orca-03"])).unwrap();
+    assert!(
+        told.starts_with(
+            "Verdict: of the links to side that a body blocked within 300 ms, mode default warned of 100.0 %"
+        ),
+        "{told}"
+    );
+    assert!(
+        told.contains("\"as now\" of the true present") && told.contains("One scene shows how it works"),
+        "{told}"
+    );
+    assert_eq!(told.matches(". ").count(), 2, "{told}");
+    assert!(verdict(&scores(&config, &["orca-03", "mixed"])).unwrap().contains("2 simulated scenes"));
+}
+
+#[test]
 fn several_presets_get_a_row_each_and_a_pooled_one() {
     let scores = scores(&Config::for_mode(Mode::Default), &["orca-03", "orca-06", "orca-03"]);
     let named: Vec<_> = scores.groups.iter().map(|group| (group.name.as_str(), group.scenes)).collect();

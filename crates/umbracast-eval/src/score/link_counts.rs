@@ -234,7 +234,9 @@ impl LeadTimes {
         let mut sorted = self.lead_s.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let n = sorted.len();
-        (n > 0).then(|| (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0)
+        // Times are whole steps and their halves: no more digits than that are printed.
+        let rounded = |seconds: f64| (seconds * 1e9).round() / 1e9;
+        (n > 0).then(|| rounded((sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0))
     }
 }
 

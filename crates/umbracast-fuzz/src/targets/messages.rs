@@ -21,7 +21,8 @@ pub const NODES: Target = Target { name: "nodes", corpus: node_messages, check: 
 pub const ROWS: Target = Target { name: "rows", corpus: row_messages, check: row_message };
 /// A cloud of another program gives finite points that stand in its bytes, or nothing.
 pub const CLOUDS: Target = Target { name: "clouds", corpus: cloud_messages, check: cloud_message };
-/// A list of objects gives detections that a tracker can follow, or nothing. The first eight bytes are the frame's time.
+/// A list of objects gives detections that a tracker can follow and tracks that links can be cast of, or nothing. The first eight
+/// bytes are the frame's time.
 pub const OBJECTS: Target = Target { name: "objects", corpus: lists, check: list };
 /// JSON of reports gives reports that a binder can take, or a sentence; what is passed on is read again as it was.
 pub const REPORTS: Target = Target { name: "reports", corpus: reported, check: report };
@@ -183,7 +184,10 @@ fn lists() -> Vec<Vec<u8>> {
           "heading_rad": 1.5707963267948966, "sigma_m": 0.1 },
         { "id": "car", "position_m": [9.0, 4.0], "size_m": [4.2, 1.8, 1.5] },
         { "position_m": [5.0, 6.0], "size_m": [0.5, 0.5, 1.6] } ] }"#;
-    vec![[&STEP_NS.to_le_bytes()[..], list.as_bytes()].concat()]
+    let tracked = r#"{ "time_ns": 900, "tracked": true, "objects": [
+        { "id": 17, "position_m": [3.0, 4.0], "velocity_mps": [1.0, 0.0], "size_m": [0.4, 0.6, 1.7], "sigma_m": 0.1 },
+        { "id": 4, "position_m": [5.0, 6.0, 0.0], "velocity_mps": [0.0, 0.0, 0.0], "heading_rad": 0.5 } ] }"#;
+    [list, tracked].map(|list| [&STEP_NS.to_le_bytes()[..], list.as_bytes()].concat()).into()
 }
 
 fn list(input: &[u8]) -> bool {
@@ -198,6 +202,9 @@ fn list(input: &[u8]) -> bool {
         assert!(detection.covariance_m2.is_none_or(|c| c[0][0] > 0.0 && c[0][0].is_finite()));
     }
     let config = Config::default();
+    let (own, none) = objects::tracks(&list, time_ns, &config.site.hall);
+    assert_eq!(own.len() + none as usize, list.objects.len());
+    assert!(own.is_sorted_by(|a, b| a.id < b.id) && own.iter().all(step::is_finite), "{own:?}");
     let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
     for after_ns in [0, STEP_NS] {
         let views = Views { time_ns: time_ns.saturating_add(after_ns), of_scans: Vec::new() };

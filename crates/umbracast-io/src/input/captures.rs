@@ -3,7 +3,7 @@
 
 use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use umbracast::lidar::{Packet, udp_port};
 use umbracast::site::Sensor;
@@ -12,61 +12,45 @@ use umbracast::{Error, Site};
 use super::sink::PacketSink;
 use crate::pcap::{Datagram, PcapReader};
 
-/// A capture of several sensors shows more than one of them within so many nanoseconds.
-const LOOK_NS: i64 = 2_000_000_000;
+/// A capture that has found its sensors.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Capture {
+    /// The capture.
+    pub file: PathBuf,
+    /// The places in the site of the sensors whose packets it begins with.
+    pub sensors: Vec<usize>,
+    /// What told so, in words: `by` this.
+    pub by: String,
+    /// Whether packets of every sensor of the site are taken from it, or those of its one sensor alone.
+    pub(super) whole: bool,
+}
 
-/// Captures as scenes. Each is one where the site has one sensor, or where one of them holds packets of several sensors;
-/// else they are one for each sensor in the site's order, and one scene together.
-///
-/// # Errors
-/// Another number of captures of single sensors, or a file that is no capture.
-pub fn in_scenes(files: Vec<PathBuf>, site: &Site) -> Result<Vec<Vec<PathBuf>>, Error> {
-    let (expected, found) = (site.sensors.len(), files.len());
-    let apart = whole_site(site).is_ok();
-    let mut whole = expected == 1 || found == 1;
-    for file in files.iter().filter(|_| apart) {
-        whole = whole || shows_several(file, site)?;
-    }
-    match whole {
-        true => Ok(files.into_iter().map(|file| vec![file]).collect()),
-        false if found == expected => Ok(vec![files]),
-        false => Err(Error::new(format!(
-            "expected {expected} captures, one for each sensor of the site in its order, or captures that hold packets \
-             of all of them, found {found} of single sensors"
-        ))
-        .within(files[0].display())),
+impl Capture {
+    /// A line for the user: the file, its sensors, and by what they were found.
+    pub fn told(&self, site: &Site) -> String {
+        let names: Vec<&str> =
+            self.sensors.iter().filter_map(|&s| site.sensors.get(s)).map(|s| s.name.as_str()).collect();
+        format!("{} -> {} ({})", self.file.display(), names.join(", "), self.by)
     }
 }
 
-fn shows_several(file: &Path, site: &Site) -> Result<bool, Error> {
-    let mut capture = Capture::open(file, whole_site(site)?)?;
-    let Some((first, Packet { time_ns, .. })) = capture.next() else { return Ok(false) };
-    let others = std::iter::from_fn(|| capture.next());
-    Ok(others.take_while(|(_, packet)| packet.time_ns - time_ns < LOOK_NS).any(|(sensor, _)| sensor != first))
-}
-
-/// Gives the packets of one scene's captures, as [`in_scenes`] has them, in the order of their times; says which one is
-/// cut.
-pub fn packets(files: &[PathBuf], site: &Site, sink: PacketSink) -> Result<Option<String>, Error> {
-    let mut captures = match files {
-        [file] => vec![Capture::open(file, whole_site(site).map_err(|e| e.within(file.display()))?)?],
-        _ => (files.iter().zip(&site.sensors))
-            .enumerate()
-            .map(|(s, (file, sensor))| Capture::open(file, vec![Sender::of(s, sensor)]))
-            .collect::<Result<_, _>>()?,
-    };
-    let mut next: Vec<Option<(usize, Packet)>> = captures.iter_mut().map(Capture::next).collect();
+/// Gives the packets of one scene's captures, in the order of their times; says which one is cut.
+pub fn packets(captures: &[Capture], site: &Site, sink: PacketSink) -> Result<Option<String>, Error> {
+    let mut open = captures.iter().map(|capture| Open::of(capture, site)).collect::<Result<Vec<_>, _>>()?;
+    let mut next: Vec<Option<(usize, Packet)>> = open.iter_mut().map(Open::next).collect();
     let time_ns = |next: &Option<(usize, Packet)>| next.as_ref().map(|(_, packet)| packet.time_ns);
-    while let Some(capture) =
-        (0..next.len()).filter(|&c| next[c].is_some()).min_by_key(|&c| time_ns(&next[c]))
+    // Of packets of one time the first sensor's go first, in whatever order captures are given.
+    let place = |next: &Option<(usize, Packet)>| next.as_ref().map(|(sensor, _)| *sensor);
+    while let Some(of) =
+        (0..next.len()).filter(|&c| next[c].is_some()).min_by_key(|&c| (time_ns(&next[c]), place(&next[c])))
     {
-        if let Some((sensor, packet)) = next[capture].take() {
+        if let Some((sensor, packet)) = next[of].take() {
             sink(sensor, packet)?;
         }
-        next[capture] = captures[capture].next();
+        next[of] = open[of].next();
     }
-    let cut = files.iter().zip(&captures).find(|(_, capture)| capture.reader.truncated());
-    Ok(cut.map(|(file, _)| format!("{}: ends within a record", file.display())))
+    let cut = captures.iter().zip(&open).find(|(_, open)| open.reader.truncated());
+    Ok(cut.map(|(capture, _)| format!("{}: ends within a record", capture.file.display())))
 }
 
 /// A sensor as its datagrams show it.
@@ -81,7 +65,13 @@ impl Sender {
         Self { sensor: number, port: udp_port(sensor), address: sensor.address_bytes() }
     }
 
-    fn sent(&self, datagram: &Datagram) -> bool {
+    /// Of every sensor of a site, in its order.
+    pub fn all_of(site: &Site) -> Vec<Self> {
+        site.sensors.iter().enumerate().map(|(s, sensor)| Self::of(s, sensor)).collect()
+    }
+
+    /// Whether this sensor may have sent it.
+    pub fn sent(&self, datagram: &Datagram) -> bool {
         self.port == Some(datagram.port) && self.address.is_none_or(|address| address == datagram.from)
     }
 }
@@ -91,8 +81,7 @@ impl Sender {
 /// # Errors
 /// Two of them whose datagrams cannot be told apart.
 pub fn whole_site(site: &Site) -> Result<Vec<Sender>, Error> {
-    let senders: Vec<Sender> =
-        site.sensors.iter().enumerate().map(|(s, sensor)| Sender::of(s, sensor)).collect();
+    let senders = Sender::all_of(site);
     for (i, one) in senders.iter().enumerate() {
         let same = |other: &&Sender| {
             let apart = matches!((one.address, other.address), (Some(a), Some(b)) if a != b);
@@ -110,15 +99,22 @@ pub fn whole_site(site: &Site) -> Result<Vec<Sender>, Error> {
     Ok(senders)
 }
 
-struct Capture {
+struct Open {
     reader: PcapReader<BufReader<File>>,
     senders: Vec<Sender>,
 }
 
-impl Capture {
-    fn open(file: &Path, senders: Vec<Sender>) -> Result<Self, Error> {
-        let open = File::open(file).map_err(|e| Error::new(e.to_string()).within(file.display()))?;
-        Ok(Self { reader: PcapReader::new(BufReader::new(open), &file.display().to_string())?, senders })
+impl Open {
+    fn of(capture: &Capture, site: &Site) -> Result<Self, Error> {
+        let (file, name) = (File::open(&capture.file), capture.file.display());
+        let file = file.map_err(|e| Error::new(e.to_string()).within(&name))?;
+        let senders = match capture.whole {
+            true => whole_site(site).map_err(|e| e.within(&name))?,
+            false => {
+                Sender::all_of(site).into_iter().filter(|s| capture.sensors.contains(&s.sensor)).collect()
+            }
+        };
+        Ok(Self { reader: PcapReader::new(BufReader::new(file), &name.to_string())?, senders })
     }
 
     /// The next packet of a sensor of this capture.

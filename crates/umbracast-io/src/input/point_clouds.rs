@@ -5,7 +5,7 @@ use umbracast::{Error, Health, STEP_NS, Site};
 
 use super::sink::Sink;
 use crate::point_cloud::{self, PointCloud};
-use crate::recording::{Entry, RecordingReader};
+use crate::recording::{Entry, RecordingReader, topic_of};
 
 /// Whether a site's input is the clouds of one sensor.
 pub fn are_all_of(site: &Site) -> bool {
@@ -20,11 +20,12 @@ pub fn recording(
     sink: Sink,
 ) -> Result<(), Error> {
     let sensor = &site.sensors[0];
-    let mut frames = Numbers::default();
+    let (mut frames, own) = (Numbers::default(), topic_of(site, 0));
     while let Some(entry) = reader.next_entry()? {
         let Entry::Cloud(topic, message) = entry else { continue };
         let name = topic.trim_start_matches('/');
-        if name.strip_suffix("/points").unwrap_or(name) != sensor.name.trim_start_matches('/') {
+        let name = name.strip_suffix("/points").unwrap_or(name);
+        if ![&sensor.name, &own].iter().any(|own| own.trim_start_matches('/') == name) {
             continue;
         }
         let Some(cloud) = point_cloud::read(&message) else {

@@ -122,7 +122,7 @@ impl PcdKind {
         }
     }
 
-    pub(super) fn push(self, value: f64, bytes: &mut Vec<u8>) {
+    pub(crate) fn push(self, value: f64, bytes: &mut Vec<u8>) {
         match self {
             Self::I8 => bytes.extend_from_slice(&(value as i8).to_le_bytes()),
             Self::I16 => bytes.extend_from_slice(&(value as i16).to_le_bytes()),

@@ -16,8 +16,8 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
-use umbracast::Error;
 use umbracast::lidar::Packet;
+use umbracast::{Error, Site};
 
 use crate::messages;
 use crate::seam::guarded;
@@ -40,12 +40,30 @@ const UNPACKED_BYTES: u64 = 64 << 20;
 /// before it is read.
 const RECORD_MAX_BYTES: u64 = 1 << 30;
 
+/// A sensor's name as its topics have it: ROS 2 takes letters, digits, `_` and `/` alone, so anything else becomes `_`; as it is where
+/// two sensors would have one topic.
+pub fn topic_of(site: &Site, sensor: usize) -> String {
+    let plain = |name: &str| -> String {
+        name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '/' { c } else { '_' }).collect()
+    };
+    let name = &site.sensors[sensor].name;
+    let topic = plain(name);
+    let is_of_two = site.sensors.iter().filter(|other| plain(&other.name) == topic).count() > 1;
+    if is_of_two { name.clone() } else { topic }
+}
+
+/// The place of the sensor whose topics have this name, or whose own name it is.
+pub fn sensor_of(site: &Site, topic: &str) -> Option<usize> {
+    let by_name = site.sensors.iter().position(|sensor| sensor.name == topic);
+    by_name.or_else(|| (0..site.sensors.len()).find(|&sensor| topic_of(site, sensor) == topic))
+}
+
 /// What a reader finds in a recording, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
     /// The configuration that the recording was made with, as TOML.
     Config(String),
-    /// Packets of the sensor of this name.
+    /// Packets of the sensor whose topics have this name: [`sensor_of`].
     Packets(String, Vec<Packet>),
     /// A `sensor_msgs/PointCloud2` as it stands in the file: topic and message, for [`crate::point_cloud::read`].
     Cloud(String, Vec<u8>),

@@ -9,7 +9,7 @@ use mcap::records::MessageHeader;
 use umbracast::lidar::{Frame, Model, Packet};
 use umbracast::{Error, Site};
 
-use super::CONFIG_TOPIC;
+use super::{CONFIG_TOPIC, topic_of};
 use crate::messages::{self, Schema};
 use crate::results::{Message, Results};
 use crate::rows::{PeopleLinkRow, PeopleRow};
@@ -69,9 +69,9 @@ impl RecordingWriter {
             .library(concat!("umbracast ", env!("CARGO_PKG_VERSION")))
             .create(file)
             .map_err(|e| fail(&e))?;
-        let packets = site.sensors.iter().map(|sensor| {
+        let packets = site.sensors.iter().enumerate().map(|(number, sensor)| {
             let other = Model::of_sensor(sensor).is_ok_and(|m| m.packet_bytes() != messages::PACKET_BYTES);
-            (format!("/{}/packets", sensor.name), !other)
+            (format!("/{}/packets", topic_of(site, number)), !other)
         });
         let mut writer = Self {
             path: path.to_owned(),
@@ -121,7 +121,8 @@ impl RecordingWriter {
         for scan in frame.scans.iter().filter(|_| asked_for) {
             let start_ns = frame.time_ns - umbracast::STEP_NS;
             let name = &self.site.sensors[scan.sensor].name;
-            let (topic, message) = (format!("/{name}/points"), messages::cloud(start_ns, name, scan));
+            let topic = format!("/{}/points", topic_of(&self.site, scan.sensor));
+            let message = messages::cloud(start_ns, name, scan);
             self.put(&topic, || messages::CLOUD, frame.time_ns, &message)?;
         }
         Ok(())

@@ -10,6 +10,7 @@
 //! | `/api/plan/NAME` | what the page of `plan` asks |
 //! | `/api/live` | WebSocket: every frame, or the newest that a slow client can take |
 //! | `/api/reports` | takes what access points heard of devices (POST) |
+//! | `/api/objects/SOURCE` | of a node that takes them: WebSocket for lists of objects, which is answered like `/api/live` |
 //! | `/api/events` | server-sent events: warnings, blockages, clear links, decisions |
 //! | `/api/openapi.json` | this interface, with the JSON Schema of every row |
 //! | `/health` | 200 while frames come, 503 while they do not |
@@ -34,8 +35,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Duration;
 
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{Query, Request, State};
+use axum::extract::{Path, Query, Request, State};
 use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
@@ -54,7 +56,7 @@ use crate::published::Published;
 use doors::{Doors, Names};
 pub use planned::Planner;
 use tls::Tls;
-pub use watched::Watched;
+pub use watched::{Objects, Watched};
 
 /// The cookie that holds the page's token.
 const COOKIE: &str = "umbracast_token";
@@ -62,6 +64,8 @@ const COOKIE: &str = "umbracast_token";
 const EVENTS_WAITING: usize = 1024;
 /// What a client may say over a WebSocket at once.
 const SAID_BYTES: usize = 4096;
+/// A list of objects is no longer: a thousand people, each told at length.
+const LIST_BYTES: usize = 1 << 20;
 /// Without a frame for so long, something is wrong.
 const STALE: Duration = Duration::from_secs(1);
 
@@ -214,6 +218,7 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/api/site", get(site))
         .route("/api/frame", get(frame))
         .route("/api/live", get(live))
+        .route("/api/objects/{source}", get(objects))
         .route("/api/scan", get(looked_at::scan))
         .route("/api/recording", get(looked_at::about))
         .route("/api/recording/frames", get(looked_at::frames))
@@ -336,12 +341,38 @@ async fn live(
     let Some(place) = guest.stream() else { return full() };
     // Nothing is expected from a client but that it closes. Room is made for a frame before it comes.
     let upgrade = upgrade.max_message_size(SAID_BYTES).max_frame_size(SAID_BYTES);
-    upgrade.on_upgrade(move |socket| stream(socket, shared, place, query.with_points()))
+    upgrade.on_upgrade(move |socket| stream(socket, shared, place, query.with_points(), None))
+}
+
+/// Takes lists of objects, where somebody does, and answers with frames.
+async fn objects(
+    State(shared): State<Arc<Shared>>,
+    Extension(guest): Extension<Guest>,
+    Path(source): Path<String>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Response {
+    if shared.watched.objects.is_none() {
+        let told = "expected a node that takes lists of objects: umbracast node ... --objects\n";
+        return (StatusCode::NOT_FOUND, told).into_response();
+    }
+    let upgrade = match upgrade {
+        Ok(upgrade) => upgrade,
+        Err(rejection) => return rejection.into_response(),
+    };
+    let Some(place) = guest.stream() else { return full() };
+    let upgrade = upgrade.max_message_size(LIST_BYTES).max_frame_size(LIST_BYTES);
+    upgrade.on_upgrade(move |socket| stream(socket, shared, place, false, Some(source)))
 }
 
 /// Every frame that the client can take. A watch holds the newest only, so a slow one skips frames, and the others
 /// notice nothing.
-async fn stream(mut socket: WebSocket, shared: Arc<Shared>, _place: Stream, with_points: bool) {
+async fn stream(
+    mut socket: WebSocket,
+    shared: Arc<Shared>,
+    _place: Stream,
+    with_points: bool,
+    source: Option<String>,
+) {
     let mut newest = shared.newest.subscribe();
     newest.mark_changed();
     loop {
@@ -359,8 +390,11 @@ async fn stream(mut socket: WebSocket, shared: Arc<Shared>, _place: Stream, with
                 }
             }
             said = socket.recv() => {
-                if !matches!(said, Some(Ok(_))) {
-                    return;
+                let Some(Ok(said)) = said else { return };
+                if let (Some(source), Some(take), Message::Text(_) | Message::Binary(_)) =
+                    (&source, &shared.watched.objects, &said)
+                {
+                    take(source, &said.into_data());
                 }
             }
         }

@@ -338,6 +338,42 @@ fn a_websocket_gets_the_newest_frame_and_the_next() {
 }
 
 #[test]
+fn lists_of_objects_are_taken_by_websocket_where_somebody_takes_them() {
+    let heads = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
+                 Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+    let (deaf, _) = server(None);
+    assert_eq!(get(&deaf, "/api/objects/cameras", "").0, 404);
+    let (hear, heard) = std::sync::mpsc::channel();
+    let hear = std::sync::Mutex::new(hear);
+    let clock = HostClock::start();
+    let mut watched =
+        Watched::new(Config::default().site, Arc::new(Counters::default()), clock, String::new());
+    watched.objects = Some(Box::new(move |source, list| {
+        let _ = hear.lock().unwrap().send((source.to_owned(), list.to_vec()));
+    }));
+    let server = start(Door::at(SocketAddr::from(([127, 0, 0, 1], 0))), watched).unwrap();
+    let mut stream = ask(&server, "/api/objects/cameras", heads);
+    let mut line = String::new();
+    while line != "\r\n" {
+        line.clear();
+        stream.read_line(&mut line).unwrap();
+        assert!(!line.is_empty(), "closed");
+    }
+    // A client's text is masked: here with zeros, which leave it as it is. It is longer than what viewers may say.
+    let list = vec![b'x'; 8000];
+    let head = [&[0x81, 0x80 | 126][..], &(list.len() as u16).to_be_bytes(), &[0; 4]].concat();
+    stream.get_mut().write_all(&[head, list.clone()].concat()).unwrap();
+    let (source, taken) = heard.recv_timeout(Duration::from_secs(5)).unwrap();
+    assert_eq!((source.as_str(), taken), ("cameras", list));
+    // It is answered with frames.
+    server.publisher().publish(&published(clock));
+    let mut head = [0; 1];
+    stream.read_exact(&mut head).unwrap();
+    assert_eq!(head[0], 0x81);
+    server.stop();
+}
+
+#[test]
 fn events_are_sent_as_they_happen() {
     let (server, clock) = server(None);
     let mut stream = ask(&server, "/api/events", "Accept: text/event-stream\r\n");

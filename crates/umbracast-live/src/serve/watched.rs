@@ -29,12 +29,17 @@ pub struct Watched {
     pub planner: Option<Planner>,
     /// Who takes what access points heard of devices, where somebody does.
     pub ear: Option<Ear>,
+    /// Who takes lists of objects of another perception, as `umbracast_io::objects` reads them.
+    pub objects: Option<Objects>,
 }
+
+/// Takes a list of objects: its source's name, and the bytes. Waits for nobody.
+pub type Objects = Box<dyn Fn(&str, &[u8]) + Send + Sync>;
 
 impl Watched {
     /// A live run of that site, under that title.
     pub fn new(site: Site, counters: Arc<Counters>, clock: HostClock, title: impl Into<String>) -> Self {
         let (whole, title) = (Arc::default(), title.into());
-        Self { site, counters, clock, title, whole, recording: None, planner: None, ear: None }
+        Self { site, counters, clock, title, whole, recording: None, planner: None, ear: None, objects: None }
     }
 }

@@ -12,7 +12,7 @@ use umbracast_io::pcap::{Datagram, PcapWriter};
 use umbracast_io::recording::RecordingWriter;
 
 use crate::args::{Packets, Simulate};
-use crate::input;
+use umbracast_io::{input, recording};
 
 /// Files that appear under their names only when they are whole, so that a run that was stopped leaves none behind that
 /// looks finished.
@@ -89,7 +89,11 @@ impl Captures {
         for (number, sensor) in site.sensors.iter().enumerate() {
             if number == 0 || !together {
                 let stem = recording.file_stem().unwrap_or_default().to_string_lossy();
-                let own = if together { String::new() } else { format!("-{}", sensor.name) };
+                let own = if together {
+                    String::new()
+                } else {
+                    format!("-{}", recording::topic_of(site, number).replace(['/', ' '], "_"))
+                };
                 let path = recording.with_file_name(format!("{stem}{own}.pcap"));
                 let file = File::create(part(&path)).and_then(|file| PcapWriter::new(BufWriter::new(file)));
                 let file = file.map_err(|e| Error::new(e.to_string()).within(path.display()))?;
