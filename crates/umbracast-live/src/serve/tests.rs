@@ -73,7 +73,7 @@ fn reports_are_posted_by_who_may_and_what_is_none_is_told() {
     let mut watched = Watched::new(site, counters.clone(), clock, "a test");
     let heard = counters.clone();
     watched.ear = Some(Arc::new(move |reports| heard.heard.push(reports)));
-    let token = "sixteen characters";
+    let token = "sixteen-characters";
     let door = Door { token: Some(token.to_owned()), ..Door::at(SocketAddr::from(([127, 0, 0, 1], 0))) };
     let server = start(door, watched).unwrap();
     let one = format!("{{\"access_point\":\"{name}\",\"device\":7,\"power_dbm\":-61.5}}");
