@@ -82,11 +82,7 @@ impl Given {
                 sort(vec![path.clone()]);
                 continue;
             }
-            let found = folder(path)?;
-            if found.is_empty() {
-                let story = "expected .mcap, .db3, .pcd or .pcap files in the folder, found none";
-                return Err(Error::new(story).within(path.display()));
-            }
+            let found = filled(path)?;
             match found.iter().all(|file| file.extension().is_some_and(|e| e == "pcd")) {
                 true => given.clouds.push(found),
                 false => sort(found),
@@ -96,7 +92,7 @@ impl Given {
             files = std::mem::take(&mut empty);
             let folders = files.extract_if(.., |file| file.is_dir()).collect::<Vec<_>>();
             for path in folders {
-                files.extend(folder(&path)?);
+                files.extend(filled(&path)?);
             }
         }
         given.empty = empty;
@@ -152,7 +148,7 @@ impl Given {
     /// The scenes: captures have found their sensors. `told` says of some which sensor they are of.
     ///
     /// # Errors
-    /// Captures that find no sensor, or more than one ([`matching::in_scenes`]).
+    /// Captures that find no sensor, or more than one.
     pub fn of_site(&self, site: &Site, told: &[Told]) -> Result<Inputs, Error> {
         let mut scenes: Vec<Input> = self.recordings.iter().cloned().map(Input::Recording).collect();
         scenes.extend(self.clouds.iter().cloned().map(Input::Clouds));
@@ -191,6 +187,16 @@ pub fn empty_hall(paths: &[PathBuf], site: &Site, told: &[Told]) -> Result<Input
 /// Whether one capture of all of a site's sensors could be read.
 pub fn can_share_a_capture(site: &Site) -> bool {
     captures::whole_site(site).is_ok()
+}
+
+/// What [`folder`] finds; there has to be something.
+fn filled(path: &Path) -> Result<Vec<PathBuf>, Error> {
+    let found = folder(path)?;
+    if found.is_empty() {
+        let story = "expected .mcap, .db3, .pcd or .pcap files in the folder, found none";
+        return Err(Error::new(story).within(path.display()));
+    }
+    Ok(found)
 }
 
 /// A folder's recordings, or its clouds, or its captures.
