@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use umbracast::{Error, Frame, Health, Site};
 use umbracast_io::input::{self, Given, Input, Inputs};
+use umbracast_io::reports::Reports;
 
 use crate::args::{CaptureArgs, Common};
 use crate::say;
@@ -62,6 +63,15 @@ pub fn empty_frames(
     let Some(empty) = empty else { return Ok((Vec::new(), None)) };
     tell_captures(&empty, site, common);
     empty.all_frames(site, health)
+}
+
+/// What access points heard: as given, else as the recording holds it.
+pub fn heard(scene: u32, input: &Input, given: Option<&Path>, site: &Site) -> Result<Reports, Error> {
+    match (given, input) {
+        (Some(file), _) => Reports::read(file, scene, site),
+        (None, Input::Recording(file)) if site.has_radio() => Reports::recorded(file, site),
+        _ => Ok(Reports::default()),
+    }
 }
 
 fn tell_captures(input: &Input, site: &Site, common: &Common) {

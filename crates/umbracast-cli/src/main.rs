@@ -5,8 +5,8 @@
 mod args;
 mod ending;
 mod setup;
-mod inputs;
 mod say;
+mod inputs;
 mod run_json;
 mod progress;
 mod crowds;

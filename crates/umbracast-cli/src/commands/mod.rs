@@ -5,7 +5,6 @@ pub mod calibrate;
 pub mod cast;
 pub mod export;
 pub mod compare;
-pub mod config;
 pub mod coverage;
 pub mod evaluate;
 #[cfg(feature = "node")]
@@ -13,6 +12,7 @@ pub mod fleet;
 pub mod demo;
 pub mod inspect;
 pub mod live;
+pub mod config;
 pub mod network;
 #[cfg(feature = "node")]
 pub mod node;

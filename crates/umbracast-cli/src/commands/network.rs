@@ -114,7 +114,7 @@ fn measured(args: &Network, common: &Common) -> Result<Ending, Error> {
     let (mut measured, mut lost) = (Vec::new(), Vec::from_iter(told));
     for (place, input) in inputs.iter().enumerate() {
         let scene = input::scene_number(input).unwrap_or(place as u32);
-        let mut reports = super::run::heard(scene, input, args.reports.as_deref(), &config.site)?;
+        let mut reports = inputs::heard(scene, input, args.reports.as_deref(), &config.site)?;
         let mut pipeline = Pipeline::new(&config, None)?;
         empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let mut of_scene = Measured::default();

@@ -12,11 +12,11 @@ use umbracast::forecast::Weights;
 use umbracast::lidar::{Cloud, Scan};
 use umbracast::radio::Report;
 use umbracast::site::Sensor;
-use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline, Site};
+use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline};
 use umbracast_io::input::{self, Input, Inputs};
 use umbracast_io::outcome_tables::{OutcomeRows, OutcomeTables};
 use umbracast_io::recording::{RecordingWriter, Results};
-use umbracast_io::reports::{self, Reports};
+use umbracast_io::reports;
 use umbracast_live::latency::Latencies;
 
 use crate::args::{Common, Run};
@@ -230,15 +230,6 @@ fn refuse_twice(numbered: &[(u32, &Input)]) -> Result<(), Error> {
     Ok(())
 }
 
-/// What access points heard: as given, else as the recording holds it.
-pub fn heard(scene: u32, input: &Input, given: Option<&Path>, site: &Site) -> Result<Reports, Error> {
-    match (given, input) {
-        (Some(file), _) => Reports::read(file, scene, site),
-        (None, Input::Recording(file)) if site.has_radio() => Reports::recorded(file, site),
-        _ => Ok(Reports::default()),
-    }
-}
-
 /// Gives what was skipped, how many returns there were, and what was lost.
 fn run_scene(
     scene: u32,
@@ -247,7 +238,7 @@ fn run_scene(
     results: &SyncSender<Step>,
 ) -> Result<(Health, u64, Vec<String>), Error> {
     let Method { config, weights, empty, reports, recordings } = method;
-    let mut reports = heard(scene, input, *reports, &config.site)?;
+    let mut reports = inputs::heard(scene, input, *reports, &config.site)?;
     let mut pipeline = Pipeline::new(config, Some(weights))?;
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     let mut recording = recordings.map(|(folder, points)| Recording::new(folder, scene, config, points));

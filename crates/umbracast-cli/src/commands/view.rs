@@ -98,7 +98,7 @@ impl Shows {
         let mut pipeline = Pipeline::new(config, Some(&setup::weights(None)?))?;
         empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let (sensors, names) = (config.site.sensors.len(), published::access_points(&config.site));
-        let heard = super::run::heard(0, input, None, &config.site)?;
+        let heard = inputs::heard(0, input, None, &config.site)?;
         Ok(Self {
             pipeline,
             heard,
