@@ -4,24 +4,10 @@ use umbracast::lidar::{View, Views};
 use umbracast::{Health, STEP_NS, Site, site};
 use umbracast_io::objects::{self, ObjectList};
 
-use zenoh::{Session, Wait};
-
 use crate::join::Joined;
-use crate::keys::{Keys, chunk};
 
 /// When nothing that could be used has come for so long, another source and another time are taken as they come.
 const SILENCE_NS: i64 = 1_000_000_000;
-
-/// Puts lists that come otherwise than over Zenoh where the tracker of a hall hears them: takes the source's name, and the bytes.
-pub fn lists_into(session: Session, hall: &str) -> impl Fn(&str, &[u8]) + Send + Sync + 'static {
-    let keys = Keys::new(hall);
-    move |source, list| {
-        // A source that is no chunk of a key, or a session that was closed: nobody can be told.
-        if let Ok(source) = chunk(source) {
-            let _ = session.put(keys.of(&format!("objects/{source}")), list).wait();
-        }
-    }
-}
 
 /// Takes the lists of one source and gives frames in order of time.
 #[derive(Debug)]

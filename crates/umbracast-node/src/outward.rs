@@ -10,10 +10,10 @@ use umbracast_live::heard::Ear;
 use umbracast_live::log::Event;
 use umbracast_live::run::Listener;
 use umbracast_live::{HostClock, Published};
-use zenoh::Session;
+use zenoh::{Session, Wait};
 
+use crate::keys::{Keys, chunk};
 use crate::mqtt::{Hears, Mqtt, Sender};
-use crate::objects::lists_into;
 use crate::ros2::{Face, names};
 
 /// `[network.ros2]` of the site file.
@@ -100,5 +100,16 @@ impl Outward {
         let mut face = face.lock().unwrap_or_else(PoisonError::into_inner);
         // An error is a session that was closed: then nobody is there to be told.
         let _ = face.publish(&published.results());
+    }
+}
+
+/// Puts lists that come otherwise than over Zenoh where the tracker of a hall hears them: takes the source's name, and the bytes.
+pub fn lists_into(session: Session, hall: &str) -> impl Fn(&str, &[u8]) + Send + Sync + 'static {
+    let keys = Keys::new(hall);
+    move |source, list| {
+        // A source that is no chunk of a key, or a session that was closed: nobody can be told.
+        if let Ok(source) = chunk(source) {
+            let _ = session.put(keys.of(&format!("objects/{source}")), list).wait();
+        }
     }
 }

@@ -7,10 +7,10 @@ use umbracast::Mode;
 use umbracast_eval::run::experiment::Shard;
 use umbracast_sim::crowd::Preset;
 
+mod captures;
 mod crowd;
 mod live;
 mod calibrate;
-mod captures;
 mod cast;
 mod export;
 mod network;

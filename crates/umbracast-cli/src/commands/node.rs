@@ -21,7 +21,7 @@ use umbracast_node::hall::{Hall, Urgency};
 use umbracast_node::keys::Keys;
 use umbracast_node::meet::{self, Unanswered};
 use umbracast_node::network::{self, Mode, Network};
-use umbracast_node::objects::lists_into;
+use umbracast_node::outward::lists_into;
 use umbracast_node::role::Role;
 use umbracast_node::share::{self, Shared};
 use umbracast_node::summary::Summary;

@@ -2,11 +2,11 @@
 //!
 //! A new target is a `Target` beside the others of its kind and a line in [`TARGETS`].
 
+mod settings;
 mod step;
 mod packets;
 mod files;
 mod tables;
-mod settings;
 mod messages;
 mod requests;
 mod plans;
