@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use umbracast::{Error, Frame, Health, Site};
 use umbracast_io::input::{self, Given, Input, Inputs};
-use umbracast_io::reports::Reports;
+use umbracast_io::reports::{Reports, Tabled};
 
 use crate::args::{CaptureArgs, Common};
 use crate::say;
@@ -65,10 +65,10 @@ pub fn empty_frames(
     empty.all_frames(site, health)
 }
 
-/// What access points heard: as given, else as the recording holds it.
-pub fn heard(scene: u32, input: &Input, given: Option<&Path>, site: &Site) -> Result<Reports, Error> {
-    match (given, input) {
-        (Some(file), _) => Reports::read(file, scene, site),
+/// What access points heard in a scene: as a table has it, else as the recording holds it.
+pub fn heard(scene: u32, input: &Input, table: Option<&Tabled>, site: &Site) -> Result<Reports, Error> {
+    match (table, input) {
+        (Some(table), _) => Ok(table.of_scene(scene)),
         (None, Input::Recording(file)) if site.has_radio() => Reports::recorded(file, site),
         _ => Ok(Reports::default()),
     }

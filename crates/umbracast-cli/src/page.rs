@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use umbracast::{Error, Site};
-use umbracast_live::heard::Ear;
+use umbracast_live::heard::{Ear, Objects};
 use umbracast_live::recording::Recording;
 use umbracast_live::run::Counters;
 use umbracast_live::whole::Whole;
@@ -31,9 +31,6 @@ pub struct Shown<'a> {
     /// Who takes lists of objects of another perception, by source.
     pub objects: Option<Objects>,
 }
-
-/// Takes a list of objects: its source's name, and the bytes.
-pub type Objects = Box<dyn Fn(&str, &[u8]) + Send + Sync>;
 
 impl<'a> Shown<'a> {
     /// A hall that is watched as it is.

@@ -37,15 +37,6 @@ pub struct Reports {
 }
 
 impl Reports {
-    /// From a table: CSV with a header, or Parquet. Those of `scene` alone, where the table has such a column.
-    ///
-    /// # Errors
-    /// A column that is missing, a value of another kind, an access point without a radio, a power that no radio hears: with file,
-    /// line, column, expected and found.
-    pub fn read(path: &Path, scene: u32, site: &Site) -> Result<Self, Error> {
-        of_table(Loose::read(path)?, scene, site).map_err(|e| e.within(path.display()))
-    }
-
     /// Those that a recording holds.
     ///
     /// # Errors
@@ -75,6 +66,30 @@ impl Reports {
         let due = &rest[..rest.partition_point(|row| row.time_ns <= frame_ns)];
         self.taken += due.len();
         due.iter().map(of_row).collect()
+    }
+}
+
+/// Reports of all scenes, from a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tabled {
+    rows: Vec<ReportRow>,
+    /// The table has no column `scene`: what it holds is of each.
+    of_all: bool,
+}
+
+impl Tabled {
+    /// A file: CSV with a header, or Parquet.
+    ///
+    /// # Errors
+    /// A column that is missing, a value of another kind, an access point without a radio, a power that no radio hears: with file,
+    /// line, column, expected and found.
+    pub fn read(path: &Path, site: &Site) -> Result<Self, Error> {
+        of_table(Loose::read(path)?, site).map_err(|e| e.within(path.display()))
+    }
+
+    /// Those of a scene.
+    pub fn of_scene(&self, scene: u32) -> Reports {
+        Reports::new(self.rows.iter().filter(|row| self.of_all || row.scene == scene).copied().collect())
     }
 }
 
@@ -174,7 +189,7 @@ pub fn to_json(came: &[Came], site: &Site) -> String {
     serde_json::Value::from(came.iter().map(named).collect::<Vec<_>>()).to_string()
 }
 
-fn of_table(mut table: Loose, scene: u32, site: &Site) -> Result<Reports, Error> {
+fn of_table(mut table: Loose, site: &Site) -> Result<Tabled, Error> {
     from_seconds(&mut table)?;
     table.rename("rsrp_dbm", "power_dbm");
     if table.column("heard_ns").is_none() {
@@ -184,13 +199,12 @@ fn of_table(mut table: Loose, scene: u32, site: &Site) -> Result<Reports, Error>
     let of_all = table.column("scene").is_none();
     let may_miss = |name: &str| name == "scene" || name == "frame";
     let names = names(site);
-    let mut rows: Vec<ReportRow> = table.rows(&names, ReportRow::default(), may_miss)?;
+    let rows: Vec<ReportRow> = table.rows(&names, ReportRow::default(), may_miss)?;
     for (r, row) in rows.iter().enumerate() {
         let name = names.get(row.access_point as usize).map_or("", String::as_str);
         check(&of_row(row), name, site).map_err(|e| e.within(table.place(r)))?;
     }
-    rows.retain(|row| of_all || row.scene == scene);
-    Ok(Reports::new(rows))
+    Ok(Tabled { rows, of_all })
 }
 
 fn of_row(row: &ReportRow) -> Report {
@@ -247,7 +261,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("reports.csv");
         std::fs::write(&path, text).unwrap();
-        Reports::read(&path, 3, &site())
+        Ok(Tabled::read(&path, &site())?.of_scene(3))
     }
 
     #[test]

@@ -12,6 +12,10 @@ const WAITING: usize = 1 << 17;
 /// Takes reports from any thread, and waits for nobody.
 pub type Ear = Arc<dyn Fn(&[Came]) + Send + Sync>;
 
+/// Takes a list of objects of another perception, as `umbracast_io::objects` reads them: its source's name, and the bytes. Waits for
+/// nobody.
+pub type Objects = Box<dyn Fn(&str, &[u8]) + Send + Sync>;
+
 /// Reports that wait for the next frame. Whoever hears pushes from any thread and waits for nobody.
 #[derive(Debug, Default)]
 pub struct Inbox {

@@ -71,7 +71,7 @@ impl Measured {
                 continue;
             }
             let Some(track) = outcome.tracks.iter().find(|track| track.id == binding.track) else { continue };
-            let ue_m = site.ue.on_body(track.position_m, track.heading_rad, track.height_m);
+            let ue_m = site.ue_m(track.position_m, track.heading_rad, track.height_m);
             for loss in outcome.losses.iter().filter(|loss| loss.track == track.id) {
                 let ap = &site.access_points[loss.access_point];
                 let Some(radio) = ap.radio else { continue };

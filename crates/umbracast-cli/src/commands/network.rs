@@ -5,6 +5,7 @@ use std::path::Path;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error, Health, Mode, Pipeline};
 use umbracast_io::input::{self, Inputs};
+use umbracast_io::reports::Tabled;
 use umbracast_network::case::{Sweep, with_radios};
 use umbracast_network::dataset::DataSet;
 use umbracast_network::experiment::{self, Spec};
@@ -111,10 +112,11 @@ fn measured(args: &Network, common: &Common) -> Result<Ending, Error> {
     }
     let (mut health, given) = (Health::default(), args.empty.as_deref());
     let (empty, told) = inputs::empty_frames(given, empty, captures, &config.site, &mut health, common)?;
+    let table = args.reports.as_deref().map(|file| Tabled::read(file, &config.site)).transpose()?;
     let (mut measured, mut lost) = (Vec::new(), Vec::from_iter(told));
     for (place, input) in inputs.iter().enumerate() {
         let scene = input::scene_number(input).unwrap_or(place as u32);
-        let mut reports = inputs::heard(scene, input, args.reports.as_deref(), &config.site)?;
+        let mut reports = inputs::heard(scene, input, table.as_ref(), &config.site)?;
         let mut pipeline = Pipeline::new(&config, None)?;
         empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let mut of_scene = Measured::default();

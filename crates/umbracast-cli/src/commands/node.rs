@@ -12,7 +12,7 @@ use umbracast::lidar::Packet;
 use umbracast::{Config, Error, Frame, Health, Site};
 use umbracast_io::input::{self, Given, Input};
 use umbracast_io::reports;
-use umbracast_live::heard::Ear;
+use umbracast_live::heard::{Ear, Objects};
 use umbracast_live::log::Form;
 use umbracast_live::receive::{Arrived, Door};
 use umbracast_live::run::{Counters, Listener};
@@ -82,7 +82,7 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
     let page = match &ear {
         Some(ear) => {
             let mut shown = Shown::live(&config.site, &counters, clock, &config.site.name);
-            let take = || -> crate::page::Objects { Box::new(lists_into(hall.session().clone(), &name)) };
+            let take = || -> Objects { Box::new(lists_into(hall.session().clone(), &name)) };
             shown.objects = args.objects.then(take);
             shown.ear = Some(ear.clone());
             Page::open(&args.page, shown)?

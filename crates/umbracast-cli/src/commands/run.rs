@@ -16,7 +16,7 @@ use umbracast::{Config, Error, Frame, Health, Outcome, Pipeline};
 use umbracast_io::input::{self, Input, Inputs};
 use umbracast_io::outcome_tables::{OutcomeRows, OutcomeTables};
 use umbracast_io::recording::{RecordingWriter, Results};
-use umbracast_io::reports;
+use umbracast_io::reports::{self, Tabled};
 use umbracast_live::latency::Latencies;
 
 use crate::args::{Common, Run};
@@ -49,7 +49,7 @@ struct Method<'a> {
     weights: &'a Weights,
     empty: &'a [Frame],
     /// What access points heard, where it is not in the recordings.
-    reports: Option<&'a Path>,
+    reports: Option<&'a Tabled>,
     /// Where recordings of the results go, and whether with points.
     recordings: Option<(&'a Path, bool)>,
 }
@@ -78,13 +78,9 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     setup::make_dir(&args.out)?;
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let recordings = args.mcap.then_some((args.out.as_path(), args.points));
-    let method = Method {
-        config: &config,
-        weights: &weights,
-        empty: &empty,
-        reports: args.reports.as_deref(),
-        recordings,
-    };
+    let reports = args.reports.as_deref().map(|file| Tabled::read(file, &config.site)).transpose()?;
+    let method =
+        Method { config: &config, weights: &weights, empty: &empty, reports: reports.as_ref(), recordings };
     let watch = Stopwatch::start();
     let mut tables = OutcomeTables::create(&args.out, &config.site, args.csv, true)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);

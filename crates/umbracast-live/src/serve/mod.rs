@@ -19,6 +19,7 @@
 //! The server has a thread of its own with one worker. A slow or hostile client can take time from other clients
 //! only, never from the pipeline, which only leaves the newest frame here.
 
+mod body;
 mod planned;
 mod reported;
 mod watched;
@@ -56,7 +57,7 @@ use crate::published::Published;
 use doors::{Doors, Names};
 pub use planned::Planner;
 use tls::Tls;
-pub use watched::{Objects, Watched};
+pub use watched::Watched;
 
 /// The cookie that holds the page's token.
 const COOKIE: &str = "umbracast_token";

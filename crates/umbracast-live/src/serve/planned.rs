@@ -2,21 +2,15 @@
 //! other.
 
 use std::sync::Arc;
-use std::time::Duration;
 
-use axum::body::to_bytes;
 use axum::extract::{Path, Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use tokio::sync::Mutex;
 use umbracast::Error;
 
-use super::Shared;
+use super::{Shared, body};
 
-/// A question may be so long: a hall with thousands of corners.
-const QUESTION_BYTES: usize = 4 << 20;
-/// And comes within so long, as a request's head does.
-const COMES_WITHIN: Duration = Duration::from_secs(10);
 /// What answers a question: its name and its JSON to the answer's JSON.
 type Answers = dyn Fn(&str, &[u8]) -> Result<String, Error> + Send + Sync;
 
@@ -46,18 +40,11 @@ pub(super) async fn answer(
     let Some(planner) = shared.watched.planner.clone() else {
         return (StatusCode::NOT_FOUND, "nothing is planned here\n").into_response();
     };
-    let long = || (StatusCode::PAYLOAD_TOO_LARGE, "expected a question of 4 MiB at most\n").into_response();
-    let length = request.headers().get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok());
-    if length.and_then(|length| length.parse::<usize>().ok()).is_some_and(|length| length > QUESTION_BYTES) {
-        return long();
-    }
-    let body = match tokio::time::timeout(COMES_WITHIN, to_bytes(request.into_body(), QUESTION_BYTES)).await {
-        Ok(Ok(body)) => body,
-        Ok(Err(_)) => return long(),
-        Err(_) => {
-            return (StatusCode::REQUEST_TIMEOUT, "expected the whole question within 10 s\n")
-                .into_response();
-        }
+    let (long, late) =
+        ("expected a question of 4 MiB at most\n", "expected the whole question within 10 s\n");
+    let body = match body::of(request, long, late).await {
+        Ok(body) => body,
+        Err(refusal) => return *refusal,
     };
     let _one = planner.one.lock().await;
     let told = tokio::task::spawn_blocking(move || (planner.answers)(&name, &body)).await;

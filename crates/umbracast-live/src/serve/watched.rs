@@ -6,7 +6,7 @@ use umbracast::Site;
 
 use super::planned::Planner;
 use crate::clock::HostClock;
-use crate::heard::Ear;
+use crate::heard::{Ear, Objects};
 use crate::recording::Recording;
 use crate::run::Counters;
 use crate::whole::Whole;
@@ -32,9 +32,6 @@ pub struct Watched {
     /// Who takes lists of objects of another perception, as `umbracast_io::objects` reads them.
     pub objects: Option<Objects>,
 }
-
-/// Takes a list of objects: its source's name, and the bytes. Waits for nobody.
-pub type Objects = Box<dyn Fn(&str, &[u8]) + Send + Sync>;
 
 impl Watched {
     /// A live run of that site, under that title.
