@@ -22,7 +22,7 @@ fn setting(samples: usize) -> Setting {
     config.site.access_points.truncate(1);
     config.site.access_points[0].position_m = [0.0, 0.0, 1.0];
     let share = |half_m: f64| half_m / HEIGHT_M;
-    let slice = Slice { top: 1.0, half_depth: share(0.13), half_width: share(0.28), ahead: 0.0 };
+    let slice = Slice { top: 1.0, half_depth: share(0.13), half_width: share(0.28), ahead: 0.0, left: 0.0 };
     // Arms within the trunk.
     let arms = Arms {
         shoulder_out: 0.0,

@@ -39,6 +39,7 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         time_ns,
         points: 30,
         limbs: None,
+        reaches: Vec::new(),
         full_body: true,
         top_m: 1.7,
         top_diagonal_m: 0.2,

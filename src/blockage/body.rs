@@ -76,7 +76,7 @@ pub fn blocks(body: &BodyModel, posture: &Posture, start_m: DVec3, end_m: DVec3)
     for slice in &body.slices {
         let top_m = slice.top * h;
         let cylinder = EllipticCylinder {
-            center_m: DVec2::new(slice.ahead * h + ahead_m, left_m),
+            center_m: DVec2::new(slice.ahead * h + ahead_m, slice.left * h + left_m),
             ahead: DVec2::X,
             half_depth_m: slice.half_depth * h * posture.width_scale,
             half_width_m: slice.half_width * h * posture.width_scale,
@@ -113,6 +113,7 @@ pub fn reach_m(body: &BodyModel, height_m: f64, width_scale: f64, speed_mps: f64
 fn slice_reach(body: &BodyModel, slice: &Slice, width_scale: f64) -> f64 {
     slice.half_depth.max(slice.half_width) * width_scale
         + slice.ahead.abs()
+        + slice.left.abs()
         + body.sway_left
         + body.sway_ahead
 }

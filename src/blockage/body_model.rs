@@ -31,6 +31,9 @@ pub struct Slice {
     pub half_width: f64,
     /// Its middle ahead of the body axis.
     pub ahead: f64,
+    /// The same to the left; 0 of a usual body.
+    #[serde(default)]
+    pub left: f64,
 }
 
 /// An arm: rods from the shoulder to the elbow and on to the middle of the hand.

@@ -163,7 +163,7 @@ impl Crossing {
     /// nearest at `nearest` and is inside where `|s + t d|^2 <= 1`.
     #[inline(always)]
     fn cross_slice(&mut self, slice: &Slice, bottom: f32) {
-        let [top, ahead] = [slice.top as f32, slice.ahead as f32];
+        let [top, ahead, left] = [slice.top, slice.ahead, slice.left].map(|share| share as f32);
         let [depth, side] = [1.0 / slice.half_depth as f32, 1.0 / slice.half_width as f32];
         for i in 0..self.lanes() {
             // A level ray is taken to rise by next to nothing.
@@ -173,7 +173,7 @@ impl Crossing {
             let (enter, leave) = (larger(smaller(a, b), 0.0), smaller(larger(a, b), 1.0));
             let width = 1.0 / self.width[i];
             let (per_depth, per_width) = (width * depth, width * side);
-            let (sx, sy) = ((self.from[0][i] - ahead) * per_depth, self.from[1][i] * per_width);
+            let (sx, sy) = ((self.from[0][i] - ahead) * per_depth, (self.from[1][i] - left) * per_width);
             let (dx, dy) = (self.along[0][i] * per_depth, self.along[1][i] * per_width);
             let squared = larger(dx * dx + dy * dy, f32::MIN_POSITIVE);
             let nearest = larger(smaller(-(sx * dx + sy * dy) / squared, leave), enter);
@@ -189,8 +189,8 @@ impl Crossing {
     #[inline(always)]
     fn cross_rod(&mut self, rod: &Rod, side: f32) {
         let numbers = |joint: &Joint| {
-            [joint.ahead, joint.swing * f64::from(side), joint.out * f64::from(side), joint.up]
-                .map(|x| x as f32)
+            let out = joint.out[usize::from(side > 0.0)];
+            [joint.ahead, joint.swing * f64::from(side), out * f64::from(side), joint.up].map(|x| x as f32)
         };
         let (upper, lower, radius) = (numbers(&rod.upper), numbers(&rod.lower), rod.radius as f32);
         for i in 0..self.lanes() {

@@ -2,6 +2,8 @@
 
 use super::body_model::{Arms, BodyModel, Slice};
 use super::lanes::larger;
+use crate::detect::{LEVELS, outline::LEVEL_TOPS};
+use crate::track::outline::LevelOutline;
 
 /// Heights between which rays may meet a body, as shares of its height.
 #[derive(Debug, Clone, Copy)]
@@ -27,8 +29,12 @@ pub(super) struct Plan {
     /// The slices' middles are so far ahead of the axis, and by so much more or less.
     pub(super) ahead: f32,
     pub(super) ahead_by: f32,
-    /// Ends of the arms' rods from above down, those of rods outside the band left out: ahead, ahead for each swing, out.
-    pub(super) joints: [[f32; 3]; 3],
+    /// The same to the left.
+    pub(super) left: f32,
+    pub(super) left_by: f32,
+    /// Ends of the arms' rods from above down, those of rods outside the band left out: ahead, ahead for each swing, out on the right, out on
+    /// the left.
+    pub(super) joints: [[f32; 4]; 3],
     /// Of the thicker rod; without arms in the band so negative that nothing is near.
     pub(super) radius: f32,
     /// How far the trunk sways, ahead and aside together.
@@ -40,13 +46,15 @@ impl Plan {
     #[inline(always)]
     pub(super) fn reach(&self, width_max: f64, arms: f64) -> f64 {
         let half = f64::from(larger(self.around[0], self.around[1]));
-        let trunk = half * width_max + f64::from(self.ahead.abs() + self.ahead_by);
+        let off = self.ahead.abs() + self.ahead_by + self.left.abs() + self.left_by;
+        let trunk = half * width_max + f64::from(off);
         trunk.max(arms) + f64::from(self.sway)
     }
 
     /// The same of the arms, which are one of [`RODS`] choices in every stretch of slices.
     pub(super) fn arms_reach(&self, width_max: f64, fastest_hz: f64) -> f64 {
-        let joint = |[fixed, swings, out]: [f32; 3]| {
+        let joint = |[fixed, swings, right, left]: [f32; 4]| {
+            let out = larger(right, left);
             let ahead = fastest_hz * f64::from(fixed.abs() + swings.abs());
             (ahead * ahead + f64::from(out * out)).sqrt()
         };
@@ -65,7 +73,17 @@ pub(super) struct Figure {
     pub(super) sway_ahead: f64,
     /// Share of people who walk without swinging their arms.
     pub(super) still_share: f64,
+    /// What of `slices` is somebody's own: for whom it was worked out.
+    outline_m: [LevelOutline; LEVELS],
+    of_height_m: f64,
 }
+
+/// What reaches aside at these levels of a usual body is the arm: hand and elbow. Where somebody reaches less far, it is an arm that
+/// is elsewhere, and the trunk is narrower by this share only.
+const ARMS_AT: [usize; 2] = [1, 2];
+const OF_TRUNK: f64 = 0.4;
+/// No part of a body is thinner than this share of the usual one.
+const THINNEST: f64 = 0.6;
 
 impl Figure {
     pub(super) fn new(body: &BodyModel) -> Self {
@@ -76,12 +94,54 @@ impl Figure {
             sway_left: body.sway_left,
             sway_ahead: body.sway_ahead,
             still_share: body.arms.still_share,
+            outline_m: Default::default(),
+            of_height_m: 0.0,
         };
-        let n = figure.slices.len();
-        let stretches = (0..n).flat_map(|low| (0..n).map(move |high| (low, high)));
-        let plans = stretches.flat_map(|(low, high)| (0..RODS).map(move |rods| (low, high, rods)));
-        figure.plans = plans.map(|(low, high, rods)| figure.plan(low, high, rods)).collect();
+        figure.look_from_above();
         figure
+    }
+
+    /// Takes the outline of somebody `height_m` tall in place of that of a `usual` body.
+    pub(super) fn take_outline(&mut self, usual: &Self, outline_m: &[LevelOutline; LEVELS], height_m: f64) {
+        if self.outline_m == *outline_m && self.of_height_m == height_m && !self.plans.is_empty() {
+            return;
+        }
+        (self.outline_m, self.of_height_m) = (*outline_m, height_m);
+        self.slices.clone_from(&usual.slices);
+        for slice in &mut self.slices {
+            let level = LEVEL_TOPS.iter().position(|top| slice.top <= *top).unwrap_or(LEVELS - 1);
+            let [ahead, _, round, oblong] = outline_m[level].map(|m| m / height_m);
+            slice.ahead += ahead;
+            slice.half_depth = (slice.half_depth + round + oblong).max(THINNEST * slice.half_depth);
+            let [right, left] =
+                aside(&outline_m[level], height_m).map(|out| match out < 0.0 && ARMS_AT.contains(&level) {
+                    true => OF_TRUNK * out,
+                    false => out,
+                });
+            slice.left += 0.5 * (left - right);
+            slice.half_width = (slice.half_width + 0.5 * (left + right)).max(THINNEST * slice.half_width);
+        }
+        self.rods = usual.rods;
+        let [hand, elbow] = ARMS_AT.map(|level| aside(&outline_m[level], height_m));
+        let [upper, fore] = &mut self.rods;
+        for side in 0..2 {
+            for (joint, moves) in
+                [(&mut upper.lower, elbow), (&mut fore.upper, elbow), (&mut fore.lower, hand)]
+            {
+                joint.out[side] = (joint.out[side] + moves[side]).max(0.0);
+            }
+        }
+        self.look_from_above();
+    }
+
+    fn look_from_above(&mut self) {
+        let n = self.slices.len();
+        let stretches = (0..n).flat_map(|low| (0..n).map(move |high| (low, high)));
+        let of_stretch = stretches.flat_map(|(low, high)| (0..RODS).map(move |rods| (low, high, rods)));
+        let mut plans = std::mem::take(&mut self.plans);
+        plans.clear();
+        plans.extend(of_stretch.map(|(low, high, rods)| self.plan(low, high, rods)));
+        self.plans = plans;
     }
 
     /// What of the body is within a band: one of [`Figure::plans`].
@@ -109,6 +169,7 @@ impl Figure {
         let most = |of: fn(&Slice) -> f64| slices.iter().map(of).fold(f64::MIN, f64::max);
         let least = |of: fn(&Slice) -> f64| slices.iter().map(of).fold(f64::MAX, f64::min);
         let [foremost, hindmost] = [most(|slice| slice.ahead), least(|slice| slice.ahead)];
+        let [leftmost, rightmost] = [most(|slice| slice.left), least(|slice| slice.left)];
         let [upper, fore] = &self.rods;
         let ends = match rods {
             0b11 => [upper.upper, upper.lower, fore.lower],
@@ -121,11 +182,19 @@ impl Figure {
             within: [least(|slice| slice.half_depth) as f32, least(|slice| slice.half_width) as f32],
             ahead: (0.5 * (foremost + hindmost)) as f32,
             ahead_by: (0.5 * (foremost - hindmost)) as f32,
-            joints: ends.map(|joint| [joint.ahead, joint.swing, joint.out].map(|x| x as f32)),
+            left: (0.5 * (leftmost + rightmost)) as f32,
+            left_by: (0.5 * (leftmost - rightmost)) as f32,
+            joints: ends
+                .map(|joint| [joint.ahead, joint.swing, joint.out[0], joint.out[1]].map(|x| x as f32)),
             radius,
             sway: (self.sway_ahead + self.sway_left) as f32,
         }
     }
+}
+
+/// How much farther than usual a level reaches to the right and to the left, as shares of the height.
+fn aside([_, left, round, oblong]: &LevelOutline, height_m: f64) -> [f64; 2] {
+    [(round - oblong - left) / height_m, (round - oblong + left) / height_m]
 }
 
 /// Which of the two rods: two bits.
@@ -155,17 +224,23 @@ impl Rod {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Joint {
     pub(super) up: f64,
-    pub(super) out: f64,
+    /// Of the right one, of the left one.
+    pub(super) out: [f64; 2],
     pub(super) ahead: f64,
     pub(super) swing: f64,
 }
 
 impl Arms {
     pub(super) fn rods(&self) -> [Rod; 2] {
-        let shoulder = Joint { up: self.shoulder_up, out: self.shoulder_out, ahead: 0.0, swing: 0.0 };
-        let elbow = Joint { up: self.elbow_up, out: self.elbow_out, ahead: 0.0, swing: self.elbow_swing };
-        let hand =
-            Joint { up: self.hand_up, out: self.hand_out, ahead: self.hand_ahead, swing: self.hand_swing };
+        let shoulder = Joint { up: self.shoulder_up, out: [self.shoulder_out; 2], ahead: 0.0, swing: 0.0 };
+        let elbow =
+            Joint { up: self.elbow_up, out: [self.elbow_out; 2], ahead: 0.0, swing: self.elbow_swing };
+        let hand = Joint {
+            up: self.hand_up,
+            out: [self.hand_out; 2],
+            ahead: self.hand_ahead,
+            swing: self.hand_swing,
+        };
         [
             Rod { upper: shoulder, lower: elbow, radius: self.upper_radius },
             Rod { upper: elbow, lower: hand, radius: self.fore_radius },

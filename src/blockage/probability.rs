@@ -302,7 +302,7 @@ impl Sampler {
             let open = link.open(word, step, blocked_now);
             let near = match open {
                 0 => Near::default(),
-                _ => self.rays.near(&self.figure, meeting, other, word),
+                _ => self.rays.near(other.own_figure(&self.figure), meeting, other, word),
             };
             link.blocked[word] |= open & near.surely;
             link.trunk[word] = open & near.trunk & !near.surely;
@@ -311,7 +311,7 @@ impl Sampler {
             arms |= link.arms[word];
         }
         let Link { blocked, .. } = link;
-        let (figure, rays, crossing) = (&self.figure, &self.rays, &mut self.crossing);
+        let (figure, rays, crossing) = (other.own_figure(&self.figure), &self.rays, &mut self.crossing);
         if trunk != 0 {
             crossing.ask(figure, Part::Trunk, rays, meeting, other, words.clone(), &link.trunk, blocked);
         }

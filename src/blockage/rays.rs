@@ -174,17 +174,19 @@ impl FromAbove<'_> {
         };
         for k in 0..WORD {
             let height_m = self.height_m[k];
-            off[k] = (axis[k] + height_m * ahead[k] * plan.ahead).abs();
-            let around = self.width[k] * reach(plan.around, k) + plan.ahead_by * ahead[k].abs();
+            off[k] = (axis[k] + height_m * (ahead[k] * plan.ahead + aside[k] * plan.left)).abs();
+            let apart = plan.ahead_by * ahead[k].abs() + plan.left_by * aside[k].abs();
+            let around = self.width[k] * reach(plan.around, k) + apart;
             near[k] = smaller(height_m * around - off[k] + ROOM_M, self.reach_m - beyond[k]);
         }
         let near = bits_of(&near);
         if near == 0 || !self.holds {
             return (near, 0);
         }
-        let (mut sure, per_depth) = ([0.0; WORD], plan.ahead_by / plan.within[0]);
+        let mut sure = [0.0; WORD];
+        let smaller_by = plan.ahead_by / plan.within[0] + plan.left_by / plan.within[1];
         for k in 0..WORD {
-            let within = (self.width[k] - per_depth) * reach(plan.within, k);
+            let within = (self.width[k] - smaller_by) * reach(plan.within, k);
             sure[k] = smaller(self.height_m[k] * within - off[k] - ROOM_M, -self.reach_m - beyond[k]);
         }
         (near, bits_of(&sure))
@@ -203,7 +205,8 @@ impl FromAbove<'_> {
         for k in 0..WORD {
             let height_m = self.height_m[k];
             let arm = |side: f32| {
-                let end = |[fixed, swings, out]: [f32; 3]| {
+                let end = |[fixed, swings, right, left]: [f32; 4]| {
+                    let out = if side > 0.0 { left } else { right };
                     let forward = fixed * self.swing_hz[k] + swings * side * self.wave_hz[k];
                     ahead[k] * forward + aside[k] * side * out
                 };

@@ -71,6 +71,8 @@ pub(crate) struct Trajectories {
     /// Of another frame until the body is in somebody's way.
     pub(super) gait: Gait,
     walks: bool,
+    /// Of this person's outline.
+    figure: Option<Figure>,
     /// Offset and drift of each sample at the step that is drawn.
     state: [Vec<f32>; 4],
 }
@@ -125,7 +127,14 @@ impl Trajectories {
             }
             self.place(s, numbers.joint);
         }
-        self.bound(figure);
+        let own = self.figure.get_or_insert_with(|| figure.clone());
+        own.take_outline(figure, &track.outline_m, track.height_m);
+        self.bound();
+    }
+
+    /// The body that stands in the way of others.
+    pub(super) fn own_figure<'a>(&'a self, usual: &'a Figure) -> &'a Figure {
+        self.figure.as_ref().unwrap_or(usual)
     }
 
     /// Where each sample has the device.
@@ -238,7 +247,8 @@ impl Trajectories {
 
     /// How far the samples and their bodies reach.
     #[inline(always)]
-    fn bound(&mut self, figure: &Figure) {
+    fn bound(&mut self) {
+        let Some(figure) = &self.figure else { return };
         let largest = |values: &[f32]| values.iter().fold(0.0_f32, |a, b| larger(a, *b));
         let least_m = self.height_m.iter().fold(f32::MAX, |a, b| smaller(a, *b));
         self.heights_m = [least_m, largest(&self.height_m)].map(f64::from);

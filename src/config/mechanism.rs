@@ -35,6 +35,8 @@ pub enum Mechanism {
     Height,
     /// Stage 1: how wide a body is; plainest: as wide as usual.
     BodyWidth,
+    /// The outline of each body, learned by watching.
+    Outline,
     /// Stage 1: children and people who sit.
     ChildrenAndSeated,
     /// Stage 2: the residual network; plainest: constant velocity.
@@ -55,7 +57,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All, in the order of the data.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::RangeModel,
         Self::CountTest,
         Self::GuidedAssignment,
@@ -67,6 +69,7 @@ impl Mechanism {
         Self::LimbPhase,
         Self::Height,
         Self::BodyWidth,
+        Self::Outline,
         Self::ChildrenAndSeated,
         Self::Residual,
         Self::ResidualDeparture,
@@ -97,7 +100,8 @@ impl Mechanism {
             | Self::Sway
             | Self::LimbPhase
             | Self::Height
-            | Self::BodyWidth => &["track"],
+            | Self::BodyWidth
+            | Self::Outline => &["track"],
             Self::ResidualDeparture | Self::ResidualNeighbours => &["forecast"],
             Self::Arms | Self::ArmSwing | Self::TrunkSway | Self::JointSampling => &["blockage"],
         }
@@ -121,6 +125,7 @@ impl Mechanism {
             Self::LimbPhase => "limb-phase",
             Self::Height => "height",
             Self::BodyWidth => "body-width",
+            Self::Outline => "outline",
             Self::ChildrenAndSeated => "children-and-seated",
             Self::Residual => "residual",
             Self::ResidualDeparture => "residual-departure",

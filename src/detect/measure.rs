@@ -5,6 +5,7 @@ use super::axis::{AxisModel, Network};
 use super::evidence::FULL_BODY_TOP_M;
 use super::features::{AxisFeatures, Seen};
 use super::limbs::LimbCovariance;
+use super::outline::reaches;
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
 use crate::config::{DetectConfig, Mechanism, PositionMethod};
@@ -233,12 +234,18 @@ impl Measurer {
             PositionMethod::BoxCenter => ObbAxes::Eigenvectors,
             PositionMethod::ShiftedMean | PositionMethod::Fitted => ObbAxes::Yaw,
         };
+        let time_ns = first_ns + late_ns / cluster.len() as i64;
+        let feet_m = position_m.extend(floor_m);
+        let reaches = who.map_or_else(Vec::new, |who| {
+            reaches(of(), &self.sensors_m, feet_m, time_ns, who.height_m, who.velocity_mps)
+        });
         Detection {
             position_m,
             covariance_m2,
             limbs,
+            reaches,
             z_m,
-            time_ns: first_ns + late_ns / cluster.len() as i64,
+            time_ns,
             points: cluster.len() as u32,
             full_body: true,
             top_m: aabb.max_m.z,

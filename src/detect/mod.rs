@@ -22,6 +22,8 @@ mod split_merge;
 #[doc(hidden)] // The model of the body axis, for its fit and for the command that shows it.
 pub mod axis;
 mod limbs;
+#[doc(hidden)] // What the fit of the usual outline reads.
+pub mod outline;
 mod measure;
 mod clocks;
 mod doubled;
@@ -37,6 +39,7 @@ pub use measure::Measurer;
 pub(crate) use measure::SEATED_HEIGHT_M;
 #[doc(hidden)] // For the card of the model of the body axis.
 pub use measure::SHIFT_M;
+pub use outline::{LEVELS, Reach};
 pub use split_merge::Clusterer;
 
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
@@ -119,6 +122,8 @@ pub struct Detection {
     pub top_diagonal_m: f64,
     /// How arms and legs of a known walker lie.
     pub limbs: Option<LimbCovariance>,
+    /// How far the body of somebody known reaches, by sensor and level.
+    pub reaches: Vec<Reach>,
     /// Box along the site's axes, in the site frame.
     pub aabb: Aabb,
     /// Box along the cluster's axes, the same.

@@ -33,6 +33,10 @@ const SIGMA_PER_DEVIATION: f32 = 1.2533;
 /// Returns of a pixel that tell its deviation, and the revolutions after which those of all pixels are looked at.
 const TELLING_RETURNS: f32 = 10.0;
 const TELLING_REVOLUTIONS: [f32; 3] = [12.0, 20.0, 50.0];
+/// Edges of a body jitter by a bin from revolution to revolution: as many pixels beside those that see somebody now saw the same body
+/// before, where their range differs by no more than surfaces of one body do.
+const EDGE_BINS: usize = 2;
+const EDGE_M: f32 = 0.3;
 /// What is behind somebody is taken to be as near as the nearest of so many bins beside: leaves have no even face.
 const BESIDE_BINS: usize = 5;
 
@@ -321,6 +325,7 @@ impl RangeModel {
     /// Forgets what is nearest in these pixels, which are sorted: it was somebody. What is beside each row of them is taken to
     /// go on behind.
     pub fn forget(&mut self, pixels: &[usize]) {
+        let pixels = &*self.with_edges(pixels);
         let is_theirs = |bin: usize, row: usize| pixels.binary_search(&(bin * self.rows + row)).is_ok();
         let beside_m = |pixel: usize, step: usize| {
             let (mut bin, row) = (pixel / self.rows, pixel % self.rows);
@@ -346,6 +351,28 @@ impl RangeModel {
             }
         }
         self.find_limits();
+    }
+
+    /// These pixels, which are sorted, and those beside them that saw the same body: as long as one of them keeps its range, the body
+    /// seems to go on behind itself.
+    fn with_edges(&self, pixels: &[usize]) -> Vec<usize> {
+        let mut all = pixels.to_vec();
+        for &pixel in pixels {
+            for step in [1, self.bins - 1] {
+                let mut at = pixel;
+                for _ in 0..EDGE_BINS {
+                    let beside = (at / self.rows + step) % self.bins * self.rows + at % self.rows;
+                    if (self.nearest_m[beside] - self.nearest_m[at]).abs() > EDGE_M {
+                        break;
+                    }
+                    all.push(beside);
+                    at = beside;
+                }
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        all
     }
 
     /// Leaves a revolution out of a pixel's account: somebody who is expected there was seen. Otherwise what stands behind

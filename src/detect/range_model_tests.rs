@@ -186,3 +186,24 @@ fn a_wall_that_the_first_revolution_did_not_look_at_is_no_person() {
     );
     assert!(open_m.is_infinite(), "whatever appears there is new");
 }
+
+/// Somebody stood in a hall without an empty scan and was taken for it, from the head down: a bin beside him had seen his edge in the
+/// revolution before, kept its range, and so he was taken to go on behind himself.
+#[test]
+fn who_stands_there_first_is_forgotten_with_the_edges_that_he_showed_before() {
+    let mut model = RangeModel::of_rays(1.0);
+    model.grow(ROWS);
+    let somebody = 100..106;
+    for bins in [99..105, 100..106] {
+        for pixel in 0..360 * ROWS {
+            model.look(pixel);
+            model.observe(pixel, if bins.contains(&(pixel / ROWS)) { 8.0 } else { 14.0 });
+        }
+        model.close_revolution(false);
+    }
+    let theirs: Vec<usize> = somebody.flat_map(|bin| bin * ROWS..(bin + 1) * ROWS).collect();
+    model.forget(&theirs);
+    for bin in 99..106 {
+        assert!((0..ROWS).all(|row| model.limit_m(bin * ROWS + row) > 13.0), "bin {bin}");
+    }
+}

@@ -217,6 +217,7 @@ pub(super) mod tests {
             height_sigma_m: 0.0,
             width_scale: 1.0,
             width_scale_sigma: 0.0,
+            outline_m: Default::default(),
             gait: crate::gait::GaitPhase::UNKNOWN,
             points: 30,
             confirmed: true,

@@ -51,6 +51,7 @@ impl Track {
             height_sigma_m: HEIGHT_SIGMA_M,
             width_scale: 1.0,
             width_scale_sigma: width::PRIOR_SIGMA,
+            outline_m: Default::default(),
             gait: GaitPhase::UNKNOWN,
             points: 0,
             confirmed: true,

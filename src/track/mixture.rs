@@ -197,7 +197,7 @@ impl MixtureTracker {
     }
 
     fn correct(&mut self, time_ns: i64, last_ns: i64, detections: &[Detection]) {
-        let Self { numbers, people, memory, .. } = self;
+        let Self { numbers, people, memory, visibility, .. } = self;
         let Memory { order, expected, assignment, .. } = memory;
         let step_s = seconds(last_ns, time_ns);
         for ((person, given), expected) in people.iter_mut().zip(&assignment.column_of).zip(expected) {
@@ -205,7 +205,9 @@ impl MixtureTracker {
             let at_ns = detection.map_or(time_ns, |detection| measured_ns(detection, last_ns, time_ns));
             person.predict(numbers, seconds(last_ns, at_ns));
             match detection {
-                Some(detection) => person.matched(numbers, detection, &expected.view, time_ns, step_s),
+                Some(detection) => {
+                    person.matched(numbers, detection, &expected.view, visibility, time_ns, step_s);
+                }
                 None => person.missed(expected.detection_probability, step_s),
             }
             person.predict(numbers, seconds(at_ns, time_ns));
@@ -321,7 +323,7 @@ fn pair_cost(
     detection: &Detection,
 ) -> f64 {
     let state = person.filter.state_after(numbers, after_s);
-    let apart = detection.position_m - state.position_m();
+    let apart = person.axis_m(detection) - state.position_m();
     let noise = plus(noise(numbers, detection, &expected.view), sway(numbers));
     let spread = plus(state.position_covariance(), plus(noise, round(GATE_SLACK_M.powi(2))));
     let (inverse, det) = inverted(spread);

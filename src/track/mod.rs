@@ -16,6 +16,8 @@ pub mod visibility;
 mod height;
 #[doc(hidden)] // Extents, for the fit of its numbers.
 pub mod width;
+#[doc(hidden)] // Measurements, for the fit of its numbers.
+pub mod outline;
 mod heading;
 mod followed;
 mod origin;

@@ -1,6 +1,7 @@
 //! Numbers of the mixture tracker that a left-out mechanism or a test may change. All others are constants beside the
 //! code that uses them.
 
+use super::outline::UsualOutline;
 use crate::config::{Mechanism, TrackConfig};
 
 /// A model of motion, and how much of the time it holds.
@@ -46,6 +47,10 @@ pub struct Numbers {
     pub limb_phase: bool,
     /// Whether extents of detections tell how wide a body is.
     pub body_width: bool,
+    /// What outlines of usual bodies look like.
+    pub usual: UsualOutline,
+    /// Whether outlines are learned.
+    pub outline: bool,
     /// One standard deviation of adults' heights.
     pub height_sigma_m: f64,
     /// Chance that somebody new is a child, or sits: of any height up to 1.5 m. Below 1. How often they come does not
@@ -77,6 +82,8 @@ impl Numbers {
             visibility: !without(Mechanism::Visibility),
             limb_phase: !without(Mechanism::LimbPhase),
             body_width: !without(Mechanism::BodyWidth),
+            usual: UsualOutline::shipped(),
+            outline: !without(Mechanism::Outline),
             height_sigma_m: if without(Mechanism::Height) { 1e-3 } else { 0.09 },
             children_share: 0.1,
             clutter_per_m2: config.clutter_per_m2,

@@ -97,6 +97,7 @@ mod tests {
                 top_m,
                 top_diagonal_m,
                 limbs: None,
+                reaches: Vec::new(),
                 aabb,
                 obb: Obb::from_aabb(&aabb),
             };

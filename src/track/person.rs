@@ -10,10 +10,12 @@ use super::kalman::Filter;
 use super::limb_phase::LimbPhase;
 use super::numbers::Numbers;
 use super::origin::Origin;
+use super::outline::{Axis, Outline};
 use super::remembered::{Remembered, Words};
-use super::visibility::{Body, BodyView};
+use super::visibility::{Body, BodyView, Visibility};
 use super::width::BodyWidth;
 use crate::detect::{ARM_SHARE, Detection, Prior, SEATED_HEIGHT_M};
+use crate::gait::relative_speed_hz;
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use crate::site::Hall;
 
@@ -52,6 +54,11 @@ const SEATED_LENGTH_M: f64 = 0.75;
 const LAP_SHARE: f64 = 0.85;
 const LAP_M: f64 = 0.65;
 const LAP_MPS: f64 = 0.5;
+/// An outline is learned of who walks at least so fast, or is known so well to face some way, and of whom others hide no more.
+const OUTLINE_FROM_MPS: f64 = 0.5;
+const FACING_SIGMA_RAD: f64 = 0.35;
+const FACING_BEHIND: f64 = 0.05;
+const FREE_SHARE: f64 = 0.9;
 /// Mean standing height of adults in shoes.
 pub(super) const HEIGHT_MEAN_M: f64 = 1.72;
 /// Time over which the width of a box is averaged.
@@ -79,6 +86,7 @@ pub(super) struct Person {
     heading: Heading,
     height: Height,
     width: BodyWidth,
+    outline: Outline,
     /// Averaged extent along x and y.
     extent_m: DVec2,
     /// How high it shows itself, averaged.
@@ -102,6 +110,7 @@ impl Remembered for Person {
         self.heading.visit(words);
         self.height.visit(words);
         self.width.visit(words);
+        self.outline.visit(words);
         words.vec2(&mut self.extent_m);
         words.f64(&mut self.top_m);
         self.observed.visit(words);
@@ -123,7 +132,7 @@ impl Person {
         let mut person = Self::new(numbers, id, detection.position_m, variance, time_ns);
         person.origin = Origin::new(detection.position_m, time_ns, beside_furniture);
         person.on_trial = on_trial;
-        person.see(numbers, detection, &BodyView::default(), 0.0);
+        person.see(numbers, detection, &BodyView::default(), None, 0.0);
         person
     }
 
@@ -148,6 +157,7 @@ impl Person {
             heading: Heading::ANY,
             height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
             width: BodyWidth::default(),
+            outline: Outline::new(&numbers.usual),
             extent_m: DVec2::splat(WIDTH_M),
             top_m: HEIGHT_MEAN_M,
             observed: Observations::default(),
@@ -170,17 +180,18 @@ impl Person {
         numbers: &Numbers,
         detection: &Detection,
         view: &BodyView,
+        visibility: &Visibility,
         time_ns: i64,
         step_s: f64,
     ) {
-        self.filter.correct(detection.position_m, noise(numbers, detection, view));
+        self.filter.correct(self.axis_m(detection), noise(numbers, detection, view));
         let there = self.existence * LIKELIHOOD_RATIO;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.matches += 1;
         self.last_match_ns = time_ns;
         let enough = if self.on_trial { CONFIRMING_MATCHES_ON_TRIAL } else { CONFIRMING_MATCHES };
         self.confirmed |= self.matches >= enough;
-        self.see(numbers, detection, view, step_s);
+        self.see(numbers, detection, view, Some(visibility), step_s);
     }
 
     /// No detection in this frame, although there was one with chance `detection_probability` a step.
@@ -278,6 +289,7 @@ impl Person {
             height_sigma_m: self.height.sigma_m(),
             width_scale,
             width_scale_sigma,
+            outline_m: self.outline.levels_m(),
             gait: self.limb_phase.phase(velocity_mps.length()),
             points: self.points,
             confirmed: self.confirmed
@@ -289,8 +301,25 @@ impl Person {
         }
     }
 
+    /// Where a detection of this body says that the axis stands.
+    pub(super) fn axis_m(&self, detection: &Detection) -> DVec2 {
+        let velocity_mps = self.filter.velocity_mps();
+        let ahead = match velocity_mps.length() > OUTLINE_FROM_MPS {
+            true => velocity_mps.normalize(),
+            false => DVec2::from_angle(self.heading.mean_rad),
+        };
+        detection.position_m + ahead.rotate(self.outline.offset_m())
+    }
+
     /// Learns what a detection says of the body's shape and gait.
-    fn see(&mut self, numbers: &Numbers, detection: &Detection, view: &BodyView, step_s: f64) {
+    fn see(
+        &mut self,
+        numbers: &Numbers,
+        detection: &Detection,
+        view: &BodyView,
+        visibility: Option<&Visibility>,
+        step_s: f64,
+    ) {
         self.points = detection.points;
         let state = self.filter.state();
         let speed_mps = state.velocity_mps().length();
@@ -305,9 +334,45 @@ impl Person {
         if numbers.body_width {
             self.width.see(detection, view, self.height.mean_m(), speed_mps);
         }
+        if let Some(visibility) = visibility.filter(|_| numbers.outline) {
+            self.see_outline(numbers, detection, view, visibility, step_s);
+        }
         let new = 1.0 - (-step_s / BOX_AVERAGE_S).exp();
         self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
         self.top_m += (detection.top_m - self.top_m) * new;
+    }
+
+    /// Learns the outline from a detection in free sight, where it is known which way the body faces.
+    fn see_outline(
+        &mut self,
+        numbers: &Numbers,
+        detection: &Detection,
+        view: &BodyView,
+        visibility: &Visibility,
+        step_s: f64,
+    ) {
+        let state = self.filter.state();
+        let speed_mps = state.velocity_mps().length();
+        self.outline.age(&numbers.usual, step_s);
+        let ahead = if speed_mps > OUTLINE_FROM_MPS {
+            state.velocity_mps() / speed_mps
+        } else if self.heading.sigma_rad() < FACING_SIGMA_RAD && self.heading.behind < FACING_BEHIND {
+            DVec2::from_angle(self.heading.mean_rad)
+        } else {
+            return;
+        };
+        if !detection.full_body || view.returns < FREE_SHARE * view.returns_alone {
+            return;
+        }
+        let axis = Axis { from_detection_m: state.position_m() - detection.position_m, ahead };
+        let height_m = self.height.mean_m();
+        let body = (height_m, relative_speed_hz(speed_mps, height_m));
+        for reach in &detection.reaches {
+            let gap_m = visibility.gap_m(reach.sensor, detection.position_m);
+            self.outline.see(&numbers.usual, reach, &axis, gap_m, body);
+        }
+        let moved_m = self.outline.centre(&numbers.usual, step_s);
+        self.filter.shift(ahead.rotate(moved_m));
     }
 
     /// As wide as seen on the mean, standing on the floor; the oriented one turned with the heading.
@@ -371,6 +436,7 @@ mod tests {
             time_ns: 0,
             points,
             limbs: None,
+            reaches: Vec::new(),
             full_body: true,
             top_m: HEIGHT_MEAN_M,
             top_diagonal_m: 0.2,

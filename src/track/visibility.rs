@@ -50,6 +50,7 @@ pub struct Visibility {
 /// One scan's view.
 #[derive(Debug, Clone)]
 struct Eye {
+    sensor: usize,
     origin_m: DVec3,
     sensor_from_site: Pose,
     range_m: (f64, f64),
@@ -119,6 +120,7 @@ impl Visibility {
         self.eyes.truncate(views.of_scans.len());
         for (i, view) in views.of_scans.iter().enumerate() {
             let eye = Eye {
+                sensor: view.sensor,
                 origin_m: view.site_from_sensor.translation_m,
                 sensor_from_site: view.site_from_sensor.inverse(),
                 range_m: self.ranges_m.get(view.sensor).copied().unwrap_or((0.0, f64::INFINITY)),
@@ -132,6 +134,12 @@ impl Visibility {
             }
             self.eyes[i].take(view.fan.as_ref());
         }
+    }
+
+    /// How far apart the columns of a sensor of the site lie at a place, metres; 0 where they are not known.
+    pub fn gap_m(&self, sensor: u16, at_m: DVec2) -> f64 {
+        let of_sensor = |eye: &&Eye| eye.sensor == usize::from(sensor);
+        self.eyes.iter().find(of_sensor).map_or(0.0, |eye| eye.gap_m(at_m))
     }
 
     /// What `body` gives to all sensors while `others` stand round it.
@@ -166,6 +174,16 @@ impl Visibility {
 }
 
 impl Eye {
+    fn gap_m(&self, at_m: DVec2) -> f64 {
+        let Some(fan) = &self.fan else { return 0.0 };
+        let from_eye_m = self.sensor_from_site.point(at_m.extend(self.origin_m.z));
+        let columns = fan.columns[sector((-from_eye_m.y).atan2(from_eye_m.x))];
+        match columns {
+            0 => 0.0,
+            columns => TAU / (SECTORS as f64 * f64::from(columns)) * from_eye_m.truncate().length(),
+        }
+    }
+
     /// Sees by a scan's beams.
     fn take(&mut self, fan: Option<&Fan>) {
         let [own, new] = [self.fan.as_ref(), fan].map(|fan| fan.map_or(&[][..], |fan| &fan.elevations_rad));

@@ -84,6 +84,7 @@ mod tests {
             time_ns: 0,
             points: 30,
             limbs: None,
+            reaches: Vec::new(),
             full_body: true,
             top_m: 1.8,
             top_diagonal_m: 0.2,

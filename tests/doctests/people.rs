@@ -38,6 +38,7 @@ pub fn detection(x_m: f64, time_ns: i64) -> umbracast::detect::Detection {
         top_m: 1.7,
         top_diagonal_m: 0.2,
         limbs: None,
+            reaches: Vec::new(),
         aabb,
         obb: Obb::from_aabb(&aabb),
     }

@@ -399,6 +399,7 @@ impl Message for Track {
             height_sigma_m: 0.0,
             width_scale: 0.0,
             width_scale_sigma: 0.0,
+            outline_m: Default::default(),
             gait: GaitPhase::UNKNOWN,
             points: 0,
             confirmed: false,
@@ -420,6 +421,7 @@ impl Message for Track {
         f.f64("height_sigma_m", &mut self.height_sigma_m);
         f.f64("width_scale", &mut self.width_scale);
         f.f64("width_scale_sigma", &mut self.width_scale_sigma);
+        f.f64_array("outline_m", self.outline_m.as_flattened_mut());
         f.f64("gait_phase_rad", &mut self.gait.phase_rad);
         f.f64("gait_concentration", &mut self.gait.concentration);
         f.u32("points", &mut self.points);

@@ -230,6 +230,8 @@ fn track(row: &TrackRow, site: &Site) -> Track {
     put(&mut track.height_sigma_m, row.height_sigma_m);
     put(&mut track.width_scale, row.width_scale);
     put(&mut track.width_scale_sigma, row.width_scale_sigma);
+    let outline_m = track.outline_m.as_flattened_mut().iter_mut().zip(row.outline_m.as_flattened());
+    outline_m.for_each(|(to, given)| put(to, *given));
     put(&mut track.gait.phase_rad, row.gait_phase_rad);
     put(&mut track.gait.concentration, row.gait_concentration);
     (track.points, track.confirmed) = (row.points, row.confirmed);

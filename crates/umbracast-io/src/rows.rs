@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use umbracast::blockage::Chance;
 use umbracast::decide::Action;
 use umbracast::detect::Detection;
+use umbracast::detect::LEVELS;
 use umbracast::geometry::{Aabb, Obb};
 use umbracast::radio::Binding;
 use umbracast::track::Track;
@@ -94,6 +95,8 @@ pub struct TrackRow {
     pub height_sigma_m: f64,
     pub width_scale: f64,
     pub width_scale_sigma: f64,
+    /// By level: ahead, left, round, oblong.
+    pub outline_m: [[f64; 4]; LEVELS],
     pub gait_phase_rad: f64,
     pub gait_concentration: f64,
     pub points: u32,
@@ -371,6 +374,7 @@ pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
         height_sigma_m: track.height_sigma_m,
         width_scale: track.width_scale,
         width_scale_sigma: track.width_scale_sigma,
+        outline_m: track.outline_m,
         gait_phase_rad: track.gait.phase_rad,
         gait_concentration: track.gait.concentration,
         points: track.points,

@@ -12,6 +12,7 @@ pub mod samples;
 pub mod residual;
 pub mod departures;
 pub mod width;
+pub mod outline;
 pub mod body;
 pub mod thresholds;
 pub mod windows;

@@ -392,6 +392,8 @@ pub enum Train {
     Axis(TrainAxis),
     /// Fit the default forecast's residual network on tracks of simulated and replayed people.
     Residual(TrainResidual),
+    /// Fit what outlines of usual bodies look like, on tuning scenes; prints `models/outline.toml`.
+    Outline(TrainScenes),
     /// Fit how a body's width follows from the extents of detections, on tuning scenes; prints constants for the
     /// source.
     Width(TrainScenes),

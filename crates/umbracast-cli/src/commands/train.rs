@@ -7,6 +7,7 @@ use umbracast::{Config, Error};
 use umbracast_train::axis::train_axis;
 use umbracast_train::body::fit_body;
 use umbracast_train::departures::{ResidualOptions, train_residual};
+use umbracast_train::outline::fit_outline;
 use umbracast_train::residual::FitOptions;
 use umbracast_train::thresholds::tune_thresholds;
 use umbracast_train::width::fit_width;
@@ -23,6 +24,9 @@ pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {
         Train::Axis(args) => with_card(&args.fitted, common, "axis", || axis(&args.fitted, common)),
         Train::Residual(args) => with_card(&args.fitted, common, "residual", || residual(args, common)),
         Train::Body(args) => body(args, common),
+        Train::Outline(args) => {
+            printed(args, "scenes seen", common, |scenes, done| fit_outline(scenes, done))
+        }
         Train::Width(args) => printed(args, "scenes seen", common, |scenes, done| fit_width(scenes, done)),
         Train::Thresholds(args) => {
             printed(args, "scenes run", common, |scenes, done| tune_thresholds(scenes, done))

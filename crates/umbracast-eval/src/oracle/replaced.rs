@@ -144,7 +144,8 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, hall: &H
     let walks = track.velocity_mps.length() > WALKS_FROM_MPS;
     let (heading_rad, heading_sigma_rad) =
         if walks { (track.velocity_mps.to_angle(), 0.0) } else { (own.heading_rad, own.heading_sigma_rad) };
-    let Track { height_m, height_sigma_m, width_scale, width_scale_sigma, gait, .. } = track_of(own);
+    let Track { height_m, height_sigma_m, width_scale, width_scale_sigma, outline_m, gait, .. } =
+        track_of(own);
     Track {
         heading_rad,
         heading_sigma_rad,
@@ -152,6 +153,7 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, hall: &H
         height_sigma_m,
         width_scale,
         width_scale_sigma,
+        outline_m,
         gait,
         ..track
     }
@@ -205,6 +207,7 @@ pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb))
         height_sigma_m: 0.0,
         width_scale: 1.0,
         width_scale_sigma: WIDTH_SCALE_SIGMA,
+        outline_m: Default::default(),
         gait: GaitPhase::UNKNOWN,
         points: row.returns,
         confirmed: true,
@@ -264,6 +267,7 @@ fn track_of(row: &TrackRow) -> Track {
         height_sigma_m: row.height_sigma_m,
         width_scale: row.width_scale,
         width_scale_sigma: row.width_scale_sigma,
+        outline_m: row.outline_m,
         gait: GaitPhase { phase_rad: row.gait_phase_rad, concentration: row.gait_concentration },
         points: row.points,
         confirmed: row.confirmed,

@@ -134,6 +134,7 @@ const OBB: [&str; 15] = [
     "obb_axis_3_y",
     "obb_axis_3_z",
 ];
+const OUTLINE: [&str; 4] = ["outline_ahead_", "outline_left_", "outline_round_", "outline_oblong_"];
 const STEP: [(&str, &str); 5] =
     [("x_s", "_m"), ("y_s", "_m"), ("cov_xx_s", "_m2"), ("cov_xy_s", "_m2"), ("cov_yy_s", "_m2")];
 
@@ -198,6 +199,11 @@ impl Row for TrackRow {
         see(plain("height_sigma_m"), Cell::F64(&mut self.height_sigma_m));
         see(plain("width_scale"), Cell::F64(&mut self.width_scale));
         see(plain("width_scale_sigma"), Cell::F64(&mut self.width_scale_sigma));
+        for (level, outline_m) in self.outline_m.iter_mut().enumerate() {
+            for (name, value) in OUTLINE.into_iter().zip(outline_m) {
+                see(Name(name, Some(level), "_m"), Cell::F64(value));
+            }
+        }
         see(plain("gait_phase_rad"), Cell::F64(&mut self.gait_phase_rad));
         see(plain("gait_concentration"), Cell::F64(&mut self.gait_concentration));
         see(plain("points"), Cell::U32(&mut self.points));

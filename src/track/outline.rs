@@ -1,0 +1,241 @@
+//! The outline of one body, learned by watching: how much farther than a usual body it reaches ahead, behind and to both sides,
+//! level by level.
+//!
+//! A sensor shows, in one frame, how far the body reaches toward it and to either side of its line of sight. As the person
+//! walks and turns, all sides come into sight. What is carried before, behind or beside a body, a bag, a raised arm, a wheelchair,
+//! becomes a part of the outline; limbs that swing are in it as they are on the mean.
+//!
+//! At each level, the outline reaches `r0 + r2 cos 2 psi + ahead cos psi + left sin psi` farther than usual in the direction
+//! `psi` from the heading: the first terms of a Fourier series, of which those of an ellipse are nearly all.
+//!
+//! Numbers: `models/outline.toml`, by `umbracast train outline`.
+
+use serde::{Deserialize, Serialize};
+
+use super::remembered::{Remembered, Words};
+use crate::Error;
+use crate::detect::{LEVELS, Reach};
+use crate::geometry::DVec2;
+
+/// Ahead, left, round, oblong: how the outline of a level differs from the usual one, metres.
+pub type LevelOutline = [f64; 4];
+
+/// What reaches of usual bodies are, as shares of the height, how they vary from frame to frame, and from person to person.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UsualOutline {
+    /// By level: how far the axis stands ahead of where detections say, for each metre that the level reaches farther ahead than
+    /// usual; trunks carry things, feet and heads tell.
+    pub centre_ahead: [f64; LEVELS],
+    /// The same to the left.
+    pub centre_left: [f64; LEVELS],
+    /// From the floor up.
+    pub levels: Vec<UsualLevel>,
+}
+
+/// One level.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UsualLevel {
+    /// Factors of [`terms`] for the reach toward a sensor, as shares of the height.
+    pub near: [f64; TERMS],
+    /// The same to either side of the line of sight.
+    pub aside: [f64; TERMS],
+    /// One standard deviation of both from frame to frame, metres.
+    pub near_sigma_m: f64,
+    /// See `near_sigma_m`.
+    pub aside_sigma_m: f64,
+    /// One standard deviation of [`LevelOutline`] from person to person, metres.
+    pub person_sigma_m: LevelOutline,
+}
+
+/// How many numbers the usual reach in a direction has.
+pub const TERMS: usize = 6;
+
+/// What the usual reach in a direction `cos` from the heading is made of, at a speed over hip height.
+pub fn terms(cos: f64, relative_speed_hz: f64) -> [f64; TERMS] {
+    let cos2 = 2.0 * cos * cos - 1.0;
+    [1.0, cos, cos2, relative_speed_hz, relative_speed_hz * cos, relative_speed_hz * cos2]
+}
+
+/// The outline's share in the reach in a direction from the heading.
+pub fn shares(cos: f64, sin: f64) -> LevelOutline {
+    [cos, sin, 1.0, 2.0 * cos * cos - 1.0]
+}
+
+/// The axis of a body when it was seen.
+#[derive(Debug, Clone, Copy)]
+pub struct Axis {
+    /// Where it stood less where the detection says.
+    pub from_detection_m: DVec2,
+    /// Unit vector of the heading.
+    pub ahead: DVec2,
+}
+
+/// Directions in which one level was seen, each as cosine and sine from the heading, with the reach from the axis, metres:
+/// toward the sensor, to the left, to the right. Between two columns lies the edge, half a gap farther than the last return.
+pub fn measured(reach: &Reach, axis: &Axis, gap_m: f64) -> [(f64, f64, f64); 3] {
+    let of = |toward: DVec2, reach_m: f64| {
+        let from_axis_m = reach_m - axis.from_detection_m.dot(toward);
+        (axis.ahead.dot(toward), axis.ahead.perp_dot(toward), from_axis_m)
+    };
+    let left = reach.away.perp();
+    [
+        of(-reach.away, reach.near_m),
+        of(left, reach.left_m + 0.5 * gap_m),
+        of(-left, reach.right_m + 0.5 * gap_m),
+    ]
+}
+
+impl UsualOutline {
+    /// The one that is embedded in the program.
+    pub fn shipped() -> Self {
+        Self::parse(include_str!("../../models/outline.toml")).expect("the embedded file is proven by a test")
+    }
+
+    fn parse(text: &str) -> Result<Self, Error> {
+        let usual: Self = toml::from_str(text).map_err(|e| Error::new(format!("usual outline: {e}")))?;
+        match usual.levels.len() {
+            LEVELS => Ok(usual),
+            found => Err(Error::new(format!("usual outline: expected {LEVELS} levels, found {found}"))),
+        }
+    }
+}
+
+/// Frames follow each other faster than limbs swing: as many in a row count as one.
+const FRAMES_ALIKE: f64 = 4.0;
+/// People who carry nothing are most, so what is carried lies so many deviations off.
+const PERSON_SIGMAS: f64 = 2.0;
+/// What somebody carries is put down or taken up within about this time.
+const LASTS_S: f64 = 30.0;
+/// A reach so many deviations off is believed no more than one at this limit: it may be somebody else's.
+const DEVIATIONS_MAX: f64 = 3.0;
+
+/// Within this time the axis moves to where the outline says.
+const CENTRED_S: f64 = 2.0;
+/// What was learned of one body.
+#[derive(Debug, Clone)]
+pub(super) struct Outline {
+    levels: [Level; LEVELS],
+    /// How far ahead of where detections say, and left of it, the axis stands.
+    offset_m: DVec2,
+}
+
+/// Mean and covariance of a [`LevelOutline`].
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    mean_m: LevelOutline,
+    covariance_m2: [[f64; 4]; 4],
+}
+
+impl Remembered for Outline {
+    fn visit(&mut self, words: &mut impl Words) {
+        for level in &mut self.levels {
+            words.f64s(&mut level.mean_m);
+            level.covariance_m2.iter_mut().for_each(|row| words.f64s(row));
+        }
+        words.vec2(&mut self.offset_m);
+    }
+}
+
+impl Outline {
+    /// Of somebody of whom nothing was seen.
+    pub(super) fn new(usual: &UsualOutline) -> Self {
+        let levels = std::array::from_fn(|level| Level::new(&usual.levels[level]));
+        Self { levels, offset_m: DVec2::ZERO }
+    }
+
+    /// How it differs from the usual one.
+    pub(super) fn levels_m(&self) -> [LevelOutline; LEVELS] {
+        self.levels.map(|level| level.mean_m)
+    }
+
+    /// How far ahead of where detections say, and left of it, the axis stands.
+    pub(super) fn offset_m(&self) -> DVec2 {
+        self.offset_m
+    }
+
+    /// Moves the axis toward where the levels tell that it is; what is left over is what somebody carries. Returns how far it moved,
+    /// ahead and left.
+    pub(super) fn centre(&mut self, usual: &UsualOutline, step_s: f64) -> DVec2 {
+        // The weights are those of an outline about where detections say that the axis is.
+        let offset_m = self.offset_m.to_array();
+        let told = |i: usize, weights: &[f64; LEVELS]| {
+            let from_detections_m = |level: &Level| level.mean_m[i] + offset_m[i];
+            self.levels
+                .iter()
+                .zip(weights)
+                .map(|(level, weight)| from_detections_m(level) * weight)
+                .sum::<f64>()
+        };
+        let told_m = DVec2::new(told(0, &usual.centre_ahead), told(1, &usual.centre_left));
+        let moved_m = (told_m - self.offset_m) * (step_s / CENTRED_S).min(1.0);
+        self.offset_m += moved_m;
+        for level in &mut self.levels {
+            level.mean_m[0] -= moved_m.x;
+            level.mean_m[1] -= moved_m.y;
+        }
+        moved_m
+    }
+
+    /// Time passes.
+    pub(super) fn age(&mut self, usual: &UsualOutline, step_s: f64) {
+        for (level, usual) in self.levels.iter_mut().zip(&usual.levels) {
+            for (i, sigma_m) in usual.person_sigma_m.iter().enumerate() {
+                level.covariance_m2[i][i] += (PERSON_SIGMAS * sigma_m).powi(2) * step_s / LASTS_S;
+            }
+        }
+    }
+
+    /// Takes one level in one frame, of a body `height_m` tall at a speed over hip height.
+    pub(super) fn see(
+        &mut self,
+        usual: &UsualOutline,
+        reach: &Reach,
+        axis: &Axis,
+        gap_m: f64,
+        (height_m, relative_speed_hz): (f64, f64),
+    ) {
+        let (level, usual) = (&mut self.levels[reach.level], &usual.levels[reach.level]);
+        for (i, (cos, sin, reach_m)) in measured(reach, axis, gap_m).into_iter().enumerate() {
+            let (factors, sigma_m) =
+                if i == 0 { (&usual.near, usual.near_sigma_m) } else { (&usual.aside, usual.aside_sigma_m) };
+            let shares_of_height: f64 =
+                terms(cos, relative_speed_hz).iter().zip(factors).map(|(a, b)| a * b).sum();
+            level.correct(
+                shares(cos, sin),
+                reach_m - height_m * shares_of_height,
+                FRAMES_ALIKE * sigma_m * sigma_m,
+            );
+        }
+    }
+}
+
+impl Level {
+    fn new(usual: &UsualLevel) -> Self {
+        let mut covariance_m2 = [[0.0; 4]; 4];
+        for (i, sigma_m) in usual.person_sigma_m.iter().enumerate() {
+            covariance_m2[i][i] = (PERSON_SIGMAS * sigma_m).powi(2);
+        }
+        Self { mean_m: [0.0; 4], covariance_m2 }
+    }
+
+    /// A Kalman filter's correction by one number that is the sum of the mean's parts by `shares`.
+    fn correct(&mut self, shares: LevelOutline, off_m: f64, variance_m2: f64) {
+        let covariance = self.covariance_m2;
+        let along: [f64; 4] = std::array::from_fn(|i| dot(&covariance[i], &shares));
+        let spread_m2 = dot(&along, &shares) + variance_m2;
+        let limit_m = DEVIATIONS_MAX * spread_m2.sqrt();
+        let innovation_m = (off_m - dot(&self.mean_m, &shares)).clamp(-limit_m, limit_m);
+        for i in 0..4 {
+            self.mean_m[i] += along[i] / spread_m2 * innovation_m;
+            for j in 0..4 {
+                self.covariance_m2[i][j] -= along[i] * along[j] / spread_m2;
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
