@@ -6,6 +6,7 @@ use umbracast::geometry::{DVec2, DVec3};
 
 use super::build::{ANKLE_SHARE, BALL_SHARE, Build};
 use super::gait;
+use super::individual::Individual;
 use super::skeleton::FootPose;
 
 /// Where a foot stands flat, from contact to toe-off.
@@ -23,6 +24,8 @@ pub struct Footprint {
 
 /// Toes point outward by this angle.
 const TOE_OUT_RAD: f64 = 0.1;
+/// Heels come no nearer to the middle than this, else shanks would touch.
+const LEGS_APART_M: f64 = 0.025;
 /// Lowest point of a swinging sole above the floor, mid-swing.
 const CLEARANCE_M: f64 = 0.015;
 
@@ -30,6 +33,7 @@ const CLEARANCE_M: f64 = 0.015;
 /// Walking, feet come closer together and the heel lies under the body axis; standing, the ankle does.
 pub fn print(
     build: &Build,
+    own: &Individual,
     contact: usize,
     position_m: DVec2,
     heading_rad: f64,
@@ -39,20 +43,24 @@ pub fn print(
     let walking = smoothstep(speed_mps / 0.5);
     // Step widths of 8 to 13.5 cm (men) and 6 to 12 cm (women); standing, feet are under the hips.
     let apart_m = if build.male { 0.053 } else { 0.046 };
+    let apart_m = (apart_m + own.step_width_m).max(LEGS_APART_M);
     let left_m = build.hip_offset_m() + walking * (apart_m - build.hip_offset_m());
-    let forward_m = (walking - 1.0) * (ANKLE_SHARE * build.sole_m() + 0.02);
+    // Half of what steps differ by is on each side of the middle; a stride has two steps.
+    let longer_m = side * own.step_asymmetry * 0.25 * gait::stride_m(speed_mps, build.stature_m, own);
+    let forward_m = (walking - 1.0) * (ANKLE_SHARE * build.sole_m() + 0.02) + walking * longer_m;
+    let toe_out_rad = TOE_OUT_RAD + own.toe_out_rad[usize::from(side < 0.0)];
     let offset = DVec2::from_angle(heading_rad).rotate(DVec2::new(forward_m, side * left_m));
     Footprint {
         heel_m: position_m + offset,
-        yaw_rad: heading_rad + side * TOE_OUT_RAD,
+        yaw_rad: heading_rad + side * toe_out_rad,
         contact: contact as f64 / 2.0,
         stance_share: gait::stance_share(speed_mps / (0.53 * build.stature_m)),
     }
 }
 
 /// Both feet of a body that stands at rest at the origin, looking along x.
-pub fn at_rest(build: &Build) -> [FootPose; 2] {
-    [1, 0].map(|contact| standing_on(&print(build, contact, DVec2::ZERO, 0.0, 0.0), 0.2, 0.0, build))
+pub fn at_rest(build: &Build, own: &Individual) -> [FootPose; 2] {
+    [1, 0].map(|contact| standing_on(&print(build, own, contact, DVec2::ZERO, 0.0, 0.0), 0.2, 0.0, build))
 }
 
 /// A foot on its print: it lands on the heel, lies flat, then rises about the ball with the toes on the floor.
@@ -71,7 +79,13 @@ pub fn standing_on(print: &Footprint, progress: f64, amount: f64, build: &Build)
 }
 
 /// A foot in the air between two prints, its lowest point always above the floor.
-pub fn swinging(from: &Footprint, to: &Footprint, progress: f64, amount: f64, build: &Build) -> FootPose {
+pub fn swinging(
+    [from, to]: [&Footprint; 2],
+    progress: f64,
+    amount: f64,
+    build: &Build,
+    own: &Individual,
+) -> FootPose {
     let (start, end) = (standing_on(from, 1.0, amount, build), standing_on(to, 0.0, amount, build));
     let u = progress;
     let way = swing_way(u, amount);
@@ -80,7 +94,7 @@ pub fn swinging(from: &Footprint, to: &Footprint, progress: f64, amount: f64, bu
     let pitch_rad = amount * gait::swing_pitch_rad(u);
     // Toes leave the floor flat and straighten in the first part of the swing.
     let toe_pitch_rad = if pitch_rad > 0.0 { pitch_rad } else { pitch_rad * smoothstep(u / 0.4) };
-    let rise = (PI * u).sin().powi(2) * (CLEARANCE_M + 0.01 * amount);
+    let rise = (PI * u).sin().powi(2) * own.lift * (CLEARANCE_M + 0.01 * amount);
     FootPose {
         ankle_m: DVec3::new(ground.x, ground.y, rise - lowest_m(build, pitch_rad, toe_pitch_rad)),
         yaw_rad: from.yaw_rad + way * turn,

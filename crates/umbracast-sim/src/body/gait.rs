@@ -7,8 +7,15 @@
 
 use std::f64::consts::TAU;
 
+use super::individual::Individual;
+
 /// Stride length over sqrt(speed x stature), sqrt(s): follows from BT's cycle of 1.346 / sqrt(relative speed).
-pub const STRIDE: f64 = 0.98;
+const STRIDE: f64 = 0.98;
+
+/// How far somebody gets in a stride at a speed.
+pub fn stride_m(speed_mps: f64, stature_m: f64, own: &Individual) -> f64 {
+    own.stride * STRIDE * (speed_mps * stature_m).sqrt()
+}
 
 /// Where pelvis, trunk and arms are in the stride.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +36,8 @@ pub struct UpperBody {
     pub shoulder_rad: [f64; 2],
     /// Bend of the elbows, left and right.
     pub elbow_rad: [f64; 2],
+    /// Arms spread more than they must be, left and right.
+    pub arm_spread_rad: [f64; 2],
 }
 
 /// Share of the stride that a foot is on the floor.
@@ -37,8 +46,8 @@ pub fn stance_share(relative_speed: f64) -> f64 {
     (0.752 - 0.143 / cycle_s).clamp(0.52, 0.73)
 }
 
-/// Pelvis, trunk and arms. At relative speed 0 everything hangs still.
-pub fn upper_body(phase: f64, relative_speed: f64) -> UpperBody {
+/// Pelvis, trunk and arms of somebody. At relative speed 0 everything hangs still.
+pub fn upper_body(phase: f64, relative_speed: f64, own: &Individual) -> UpperBody {
     let rv = relative_speed;
     let wave = |turns: f64| (TAU * turns).sin();
     // BT's sizes below a relative speed of .5 rise to a constant; its public codes jump there, this does not.
@@ -56,17 +65,35 @@ pub fn upper_body(phase: f64, relative_speed: f64) -> UpperBody {
     let thorax = periodic(&[(0.1, 1.33 * rv), (0.4, -1.5 * rv), (0.6, -1.33 * rv), (0.9, 1.5 * rv)], phase);
     let other = (phase + 0.5) % 1.0;
     let swing = 9.88 * rv;
-    let shoulder = |t: f64| (3.0 * up_to_half(1.0) - swing / 2.0 - swing * (TAU * t).cos()).to_radians();
+    let shoulder = |t: f64, arm: usize| {
+        (3.0 * up_to_half(1.0) - swing / 2.0 - own.arm_swing[arm] * swing * (TAU * t).cos()).to_radians()
+    };
+    // Where an arm swings little, the elbow does.
+    let elbow = |t: f64, arm: usize| {
+        let still_rad = elbow_rad(0.9, rv);
+        above_zero(
+            still_rad + own.arm_swing[arm].min(1.0) * (elbow_rad(t, rv) - still_rad) + own.elbow_rad[arm],
+        )
+    };
     UpperBody {
-        pelvis_left_m: -up_to_half(0.032) * wave(phase - 0.1),
-        pelvis_forward_m: -up_to_half(0.021) * wave(2.0 * phase + 2.0 * (0.625 - stance_share(rv))),
-        pelvis_yaw_rad: (4.0 * rv * (TAU * phase).cos()).to_radians(),
-        pelvis_list_rad: if phase < 0.5 { list(phase) } else { -list(phase - 0.5) }.to_radians(),
-        tilt_rad: (tilt - tilt * wave(2.0 * phase - 0.1)).to_radians(),
-        thorax_yaw_rad: (-thorax).to_radians(),
-        shoulder_rad: [shoulder(other), shoulder(phase)],
-        elbow_rad: [elbow_rad(other, rv), elbow_rad(phase, rv)],
+        pelvis_left_m: -own.sway * up_to_half(0.032) * wave(phase - 0.1),
+        pelvis_forward_m: -own.sway
+            * up_to_half(0.021)
+            * wave(2.0 * phase + 2.0 * (0.625 - stance_share(rv))),
+        pelvis_yaw_rad: own.pelvis_turn * (4.0 * rv * (TAU * phase).cos()).to_radians(),
+        pelvis_list_rad: own.pelvis_list
+            * if phase < 0.5 { list(phase) } else { -list(phase - 0.5) }.to_radians(),
+        tilt_rad: (tilt - own.nod * tilt * wave(2.0 * phase - 0.1)).to_radians() + own.lean_rad,
+        thorax_yaw_rad: own.thorax_turn * (-thorax).to_radians(),
+        shoulder_rad: [shoulder(other, 0), shoulder(phase, 1)],
+        elbow_rad: [elbow(other, 0), elbow(phase, 1)],
+        arm_spread_rad: own.arm_spread_rad,
     }
+}
+
+/// An elbow does not bend back, nor does it hit its end hard.
+fn above_zero(bend_rad: f64) -> f64 {
+    0.5 * (bend_rad + bend_rad.hypot(0.1))
 }
 
 /// The limb's elbow; most bent when the arm is ahead.
@@ -153,7 +180,7 @@ mod tests {
     fn arms_swing_against_the_legs_through_the_published_arc() {
         // 1.34 m/s at 1.75 m: the arm's arc is 25 to 31 degrees; at right heel contact the left arm is ahead.
         let rv = 1.34 / (0.53 * 1.75);
-        let at = |phase: f64| upper_body(phase, rv);
+        let at = |phase: f64| upper_body(phase, rv, &Individual::MEAN);
         assert!(at(0.0).shoulder_rad[0] > 0.0 && at(0.0).shoulder_rad[1] < 0.0);
         let arc = (at(0.5).shoulder_rad[1] - at(0.0).shoulder_rad[1]).to_degrees();
         assert!((25.0..=31.0).contains(&arc), "{arc}");
@@ -163,7 +190,7 @@ mod tests {
 
     #[test]
     fn a_body_at_rest_hangs_still() {
-        let rest = upper_body(0.3, 0.0);
+        let rest = upper_body(0.3, 0.0, &Individual::MEAN);
         assert_eq!((rest.pelvis_left_m, rest.pelvis_yaw_rad, rest.shoulder_rad), (0.0, 0.0, [0.0, 0.0]));
     }
 
@@ -172,7 +199,7 @@ mod tests {
         for rv in [0.5, 1.3] {
             for k in 0..50 {
                 let phase = f64::from(k) / 50.0;
-                let (a, b) = (upper_body(phase, rv - 1e-9), upper_body(phase, rv + 1e-9));
+                let (a, b) = [rv - 1e-9, rv + 1e-9].map(|rv| upper_body(phase, rv, &Individual::MEAN)).into();
                 assert!((a.pelvis_left_m - b.pelvis_left_m).abs() < 1e-6);
                 assert!((a.pelvis_forward_m - b.pelvis_forward_m).abs() < 1e-6);
                 assert!((a.elbow_rad[0] - b.elbow_rad[0]).abs() < 1e-6);

@@ -2,12 +2,14 @@
 
 pub mod build;
 mod loft;
+mod individual;
 pub mod gait;
 mod skeleton;
 mod shape;
 mod feet;
 mod device;
 mod facing;
+mod fidget;
 mod walk;
 pub mod kind;
 mod things;

@@ -12,6 +12,7 @@ use umbracast::geometry::{DMat3, DVec2, DVec3};
 use super::build::Build;
 use super::feet;
 use super::gait::UpperBody;
+use super::individual::Individual;
 use super::skeleton::{FootPose, Holds, PelvisPose, Pose};
 
 /// Joints by their names in two common skeletons: left, then right where there is a `{}`.
@@ -110,10 +111,11 @@ impl Gait {
             thorax_yaw_rad: fade * now[5],
             shoulder_rad: [fade * now[6], fade * now[7]],
             elbow_rad: [fade * now[8], fade * now[9]],
+            arm_spread_rad: [0.0; 2],
         };
         let level = PelvisPose::new(position_m, heading_rad, &upper, 0.0);
         let facing = DMat3::from_rotation_z(heading_rad);
-        let rest = feet::at_rest(build);
+        let rest = feet::at_rest(build, &Individual::MEAN);
         let mut lowest_m = f64::INFINITY;
         let feet: [FootPose; 2] = std::array::from_fn(|i| {
             let side = if i == 0 { 1.0 } else { -1.0 };

@@ -142,7 +142,7 @@ impl Pose {
         for (i, side) in [1.0, -1.0].into_iter().enumerate() {
             let arm = match &holds[i] {
                 Some(hold) => holding(build, side, &thorax, hold, &bones[hold.bone as usize]),
-                None => arm(build, side, &thorax, upper.shoulder_rad[i], upper.elbow_rad[i]),
+                None => arm(build, side, &thorax, upper, i),
             };
             bones[Bone::UpperArmLeft as usize + i] = arm[0];
             bones[Bone::ForearmLeft as usize + i] = arm[1];
@@ -171,12 +171,14 @@ impl Pose {
 
 /// Upper arm and forearm, swung forward in the thorax's frame. The upper arm is spread just enough for the
 /// forearm to hang clear of the hips.
-fn arm(build: &Build, side: f64, thorax: &Motion, shoulder_rad: f64, elbow_rad: f64) -> [Motion; 2] {
+fn arm(build: &Build, side: f64, thorax: &Motion, upper: &UpperBody, i: usize) -> [Motion; 2] {
+    let (shoulder_rad, elbow_rad) = (upper.shoulder_rad[i], upper.elbow_rad[i]);
     let (offset, level) = build.shoulder_m();
     let shoulder_rest = DVec3::new(0.0, side * offset, level);
     let elbow_rest = DVec3::new(0.0, side * offset, build.elbow_height_m());
     let clear = (build.hip_m[0] / 2.0 + 0.02).max(build.waist_m[0] / 2.0 + build.forearm_radius_m) - offset;
-    let spread = (clear / (level - build.elbow_height_m())).clamp(0.07, 0.30).asin();
+    let spread =
+        (clear / (level - build.elbow_height_m())).clamp(0.07, 0.30).asin() + upper.arm_spread_rad[i];
     let upper_turn =
         thorax.rotation * DMat3::from_rotation_x(side * spread) * DMat3::from_rotation_y(-shoulder_rad);
     let upper = Motion::about(upper_turn, shoulder_rest, thorax.point(shoulder_rest));

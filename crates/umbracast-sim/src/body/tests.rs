@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use umbracast::geometry::{Aabb, DVec2, DVec3};
 
+use super::individual::Individual;
 use super::*;
 use crate::crowd::Trajectory;
 
@@ -122,7 +123,7 @@ fn stride_follows_the_speed() {
     way.height_m = Some(1.655);
     let walker = Walker::new(way, 15);
     let strides = walker.walk.at(9_000_000_000).phase - walker.walk.at(1_000_000_000).phase;
-    let stride_m = 8.0 * 1.42 / strides;
+    let stride_m = 8.0 * 1.42 / strides / Individual::draw(15, walker.build.male).stride;
     assert!((1.42..1.52).contains(&stride_m), "{stride_m}");
 }
 

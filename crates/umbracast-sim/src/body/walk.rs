@@ -11,7 +11,9 @@ use umbracast::geometry::DVec2;
 use super::build::Build;
 use super::facing;
 use super::feet::{self, Footprint};
-use super::gait::{self, STRIDE};
+use super::fidget::Fidget;
+use super::gait;
+use super::individual::Individual;
 use super::skeleton::{FootPose, PelvisPose};
 use crate::crowd::Trajectory;
 
@@ -21,6 +23,8 @@ const STEP_S: f64 = 0.01;
 const PAD: usize = 300;
 /// Slower than this a person stands: the heading is held and the feet come to rest.
 const STANDING_MPS: f64 = 0.1;
+/// From this speed on nobody fidgets.
+const WALKING_MPS: f64 = 0.4;
 /// Velocity is smoothed by a Gaussian of this width: a crowd model may turn at once, a body may not.
 const SMOOTHING_S: f64 = 0.15;
 /// Feet that are not under a standing body step there at this many strides a second.
@@ -29,6 +33,10 @@ const SETTLE_HZ: f64 = 0.9;
 const HOME_M: f64 = 0.05;
 /// Pelvis over the heel this much of a stride after contact.
 const HEEL_UNDER_PELVIS: f64 = 0.18;
+/// Roll of the pelvis of who stands on one leg, for each metre of its shift (from memory), and share of the trunk's turn
+/// in which it takes part.
+const LIST_RADPM: f64 = 1.5;
+const PELVIS_TURNS: f64 = 0.3;
 /// Share of a leg's length that a step may use, so that knees never lock.
 const REACH: f64 = 0.995;
 
@@ -43,6 +51,10 @@ pub struct Instant {
     pub phase: f64,
     /// The hip joints above the floor.
     pub hip_height_m: f64,
+    /// Of who stands: how far the pelvis has shifted to the left, and how far the trunk has turned there.
+    pub shift_m: f64,
+    /// See `shift_m`.
+    pub twist_rad: f64,
 }
 
 /// The whole plan.
@@ -52,28 +64,45 @@ pub struct Walk {
     instants: Vec<Instant>,
     /// Print `i` belongs to the contact at phase i / 2: even ones to the right foot.
     prints: Vec<Footprint>,
+    own: Individual,
 }
 
 impl Walk {
     /// Plans the walk of a body; `first_phase` in [0, 1) tells people apart who start together, and `seed` draws where they
-    /// face. Without one they face along their way, and hold that while they stand.
-    pub fn plan(trajectory: &Trajectory, build: &Build, first_phase: f64, seed: Option<u64>) -> Self {
+    /// face and how they fidget while they stand. Without one they face along their way, and hold that while they stand.
+    pub fn plan(
+        trajectory: &Trajectory,
+        build: &Build,
+        own: &Individual,
+        first_phase: f64,
+        seed: Option<u64>,
+    ) -> Self {
         let positions = padded(trajectory);
         let velocities = smoothed(&positions);
         let headings = facing::headings(&velocities, STEP_S, STANDING_MPS, seed);
+        let mut fidget = seed.map(Fidget::draw);
         let mut walk = Self {
             start_ns: trajectory.start_ns - PAD as i64 * STEP_NS,
             instants: velocities
                 .iter()
                 .zip(&headings)
-                .map(|(velocity, &heading_rad)| Instant {
-                    heading_rad,
-                    speed_mps: velocity.length(),
-                    phase: 0.0,
-                    hip_height_m: build.hip_height_m(),
+                .map(|(velocity, &heading_rad)| {
+                    let speed_mps = velocity.length();
+                    let rest =
+                        1.0 - feet::smoothstep((speed_mps - STANDING_MPS) / (WALKING_MPS - STANDING_MPS));
+                    let [shift_m, twist_rad] = fidget.as_mut().map_or([0.0; 2], |f| f.after(STEP_S));
+                    Instant {
+                        heading_rad,
+                        speed_mps,
+                        phase: 0.0,
+                        hip_height_m: build.hip_height_m(),
+                        shift_m: rest * shift_m,
+                        twist_rad: rest * twist_rad,
+                    }
                 })
                 .collect(),
             prints: Vec::new(),
+            own: *own,
         };
         walk.step(&positions, build, first_phase);
         walk.carry_hips(&positions, build);
@@ -91,6 +120,8 @@ impl Walk {
             speed_mps: a.speed_mps + u * (b.speed_mps - a.speed_mps),
             phase: a.phase + u * (b.phase - a.phase),
             hip_height_m: a.hip_height_m + u * (b.hip_height_m - a.hip_height_m),
+            shift_m: a.shift_m + u * (b.shift_m - a.shift_m),
+            twist_rad: a.twist_rad + u * (b.twist_rad - a.twist_rad),
         }
     }
 
@@ -128,9 +159,10 @@ impl Walk {
     /// Runs the phase along the way and leaves the footprints.
     fn step(&mut self, positions: &[DVec2], build: &Build, first_phase: f64) {
         let last = positions.len() - 1;
+        let own = self.own;
         let print_at = |i: usize, at: usize, contact: usize, instants: &[Instant]| {
             let (here, there) = (&instants[i], &instants[at]);
-            feet::print(build, contact, positions[at], there.heading_rad, here.speed_mps)
+            feet::print(build, &own, contact, positions[at], there.heading_rad, here.speed_mps)
         };
         let mut phase = 1.0 + 0.5 * (2.0 * first_phase).floor();
         let mut contact = (2.0 * phase) as usize;
@@ -143,7 +175,7 @@ impl Walk {
         for i in 0..=last {
             let here = self.instants[i];
             let home = (contact - 1..=contact).all(|c| {
-                let home = feet::print(build, c, positions[i], here.heading_rad, 0.0);
+                let home = feet::print(build, &own, c, positions[i], here.heading_rad, 0.0);
                 home.heel_m.distance(self.prints[c].heel_m) < HOME_M
             });
             let rate_hz = match (here.speed_mps < STANDING_MPS, home) {
@@ -190,7 +222,7 @@ impl Walk {
     }
 
     fn stride_m(&self, i: usize, build: &Build) -> f64 {
-        STRIDE * (self.instants[i].speed_mps * build.stature_m).sqrt()
+        gait::stride_m(self.instants[i].speed_mps, build.stature_m, &self.own)
     }
 
     /// Lets the hips ride as high as the legs reach, smoothed: an inverted pendulum over each stance leg.
@@ -200,7 +232,7 @@ impl Walk {
         let limits: Vec<f64> = (0..positions.len())
             .map(|i| {
                 let here = self.instants[i];
-                let upper = upper_body(&here, build);
+                let upper = upper_body(&here, build, &self.own);
                 let pelvis = PelvisPose::new(positions[i], here.heading_rad, &upper, 0.0);
                 let feet = foot_poses(self, &here, build);
                 let limit = |side: f64, ankle: umbracast::geometry::DVec3| {
@@ -226,10 +258,16 @@ impl Walk {
 }
 
 /// Pelvis, trunk and arms at an instant; below walking speed the swing fades out.
-pub fn upper_body(instant: &Instant, build: &Build) -> gait::UpperBody {
+pub fn upper_body(instant: &Instant, build: &Build, own: &Individual) -> gait::UpperBody {
     let fade = (instant.speed_mps / STANDING_MPS).min(1.0);
     let relative_speed = instant.speed_mps * fade / (0.53 * build.stature_m);
-    gait::upper_body(instant.phase.rem_euclid(1.0), relative_speed)
+    let mut upper = gait::upper_body(instant.phase.rem_euclid(1.0), relative_speed, own);
+    upper.pelvis_left_m += instant.shift_m;
+    // The hip without weight hangs lower.
+    upper.pelvis_list_rad += LIST_RADPM * instant.shift_m;
+    upper.pelvis_yaw_rad += PELVIS_TURNS * instant.twist_rad;
+    upper.thorax_yaw_rad += instant.twist_rad;
+    upper
 }
 
 /// Both feet at an instant, left and right.
@@ -237,20 +275,20 @@ pub fn foot_poses(walk: &Walk, instant: &Instant, build: &Build) -> [FootPose; 2
     [true, false].map(|left| {
         let [current, next] = walk.prints_of(left, instant.phase);
         let stood = instant.phase - current.contact;
-        let amount = roll(instant, build);
+        let amount = roll(instant, build, &walk.own);
         if stood <= current.stance_share {
             feet::standing_on(&current, stood / current.stance_share, amount, build)
         } else {
             let air = (next.contact - current.contact - current.stance_share).max(1e-6);
             let progress = ((stood - current.stance_share) / air).min(1.0);
-            feet::swinging(&current, &next, progress, amount, build)
+            feet::swinging([&current, &next], progress, amount, build, &walk.own)
         }
     })
 }
 
 /// How much of the foot's roll is there: all of it in strides of 1.4 m, none while standing.
-fn roll(instant: &Instant, build: &Build) -> f64 {
-    let stride_m = STRIDE * (instant.speed_mps * build.stature_m).sqrt();
+fn roll(instant: &Instant, build: &Build, own: &Individual) -> f64 {
+    let stride_m = gait::stride_m(instant.speed_mps, build.stature_m, own);
     (stride_m / 1.4).min(1.0) * (instant.speed_mps / STANDING_MPS).min(1.0)
 }
 

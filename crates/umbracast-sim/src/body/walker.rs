@@ -9,6 +9,7 @@ use umbracast::site::{Hall, Ue};
 
 use super::build::Build;
 use super::gestures::Gestures;
+use super::individual::Individual;
 use super::kind::Kind;
 use super::recorded::Gait;
 use super::shape::{Shape, Surface};
@@ -44,6 +45,8 @@ pub struct Walker {
     pub trajectory: Trajectory,
     /// Its measures.
     pub build: Build,
+    /// How it walks.
+    own: Individual,
     shape: Shape,
     pub(super) walk: Walk,
     first_phase: f64,
@@ -79,11 +82,12 @@ impl Walker {
         let first_phase: f64 = stream(seed, "phase", 0).random();
         // Feet of who sits stay where they are.
         let faces = (kind != Kind::Sitting).then_some(seed);
-        let walk = Walk::plan(&trajectory, &build, first_phase, faces);
-        let still = gait::upper_body(0.0, 0.0);
+        let own = Individual::draw(seed, build.male);
+        let walk = Walk::plan(&trajectory, &build, &own, first_phase, faces);
+        let still = gait::upper_body(0.0, 0.0, &Individual::MEAN);
         let (hips_m, feet) = match things.seat_m {
             Some(seat_m) => (seat_m, things::feet_on_rests(&build, DVec2::ZERO, 0.0)),
-            None => (build.hip_height_m() - 0.006, feet::at_rest(&build)),
+            None => (build.hip_height_m() - 0.006, feet::at_rest(&build, &Individual::MEAN)),
         };
         let pelvis = PelvisPose::new(DVec2::ZERO, 0.0, &still, hips_m);
         let upright = Pose::new(&build, 0.0, &still, &pelvis, &feet, &things.holds);
@@ -92,6 +96,7 @@ impl Walker {
             shape,
             trajectory,
             build,
+            own,
             holds: things.holds,
             gestures: (kind == Kind::Gesturing).then(|| Gestures::draw(seed)),
             sitting: (kind == Kind::Sitting).then(|| Sitting::plan(&walk)),
@@ -116,7 +121,7 @@ impl Walker {
     /// The same body, facing along its way and holding that while it stands.
     #[must_use]
     pub fn looking_ahead(mut self) -> Self {
-        self.walk = Walk::plan(&self.trajectory, &self.build, self.first_phase, None);
+        self.walk = Walk::plan(&self.trajectory, &self.build, &self.own, self.first_phase, None);
         self
     }
 
@@ -199,7 +204,7 @@ impl Walker {
             let Instant { heading_rad, speed_mps, phase, .. } = instant;
             return Some((gait.pose(&self.build, state.position_m, heading_rad, phase, speed_mps), state));
         }
-        let upper = walk::upper_body(&instant, &self.build);
+        let upper = walk::upper_body(&instant, &self.build, &self.own);
         let mut hips_m = instant.hip_height_m;
         let mut feet = walk::foot_poses(&self.walk, &instant, &self.build);
         let mut holds = match &self.gestures {
@@ -217,7 +222,7 @@ impl Walker {
 
     /// Who sits rolls along, still.
     fn seated(&self, seat_m: f64, instant: &Instant, state: &PersonState) -> Pose {
-        let (heading_rad, still) = (instant.heading_rad, gait::upper_body(0.0, 0.0));
+        let (heading_rad, still) = (instant.heading_rad, gait::upper_body(0.0, 0.0, &Individual::MEAN));
         let pelvis = PelvisPose::new(state.position_m, heading_rad, &still, seat_m);
         let feet = things::feet_on_rests(&self.build, state.position_m, heading_rad);
         Pose::new(&self.build, heading_rad, &still, &pelvis, &feet, &self.holds)
