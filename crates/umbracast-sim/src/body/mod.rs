@@ -16,10 +16,12 @@ mod things;
 mod gestures;
 mod sitting;
 mod recorded;
+pub mod people;
 mod walker;
 mod bodies;
 
 pub use bodies::Bodies;
+pub use people::People;
 pub use recorded::Gait;
 pub use shape::Surface;
 pub use walker::{PersonState, Walker};

@@ -26,6 +26,27 @@ pub enum Bone {
     ToesRight,
 }
 
+impl Bone {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; BONES] = [
+        Self::Pelvis,
+        Self::Thorax,
+        Self::Head,
+        Self::UpperArmLeft,
+        Self::UpperArmRight,
+        Self::ForearmLeft,
+        Self::ForearmRight,
+        Self::ThighLeft,
+        Self::ThighRight,
+        Self::ShankLeft,
+        Self::ShankRight,
+        Self::FootLeft,
+        Self::FootRight,
+        Self::ToesLeft,
+        Self::ToesRight,
+    ];
+}
+
 /// How many bones.
 pub const BONES: usize = 15;
 
@@ -130,9 +151,9 @@ impl Pose {
         let facing = DMat3::from_rotation_z(heading_rad);
         let thorax_turn =
             facing * DMat3::from_rotation_z(upper.thorax_yaw_rad) * DMat3::from_rotation_y(upper.tilt_rad);
-        let waist_rest = DVec3::new(0.0, 0.0, build.level_m(0.60));
+        let waist_rest = DVec3::new(0.0, 0.0, build.waist_height_m());
         let thorax = Motion::about(thorax_turn, waist_rest, pelvis_motion.point(waist_rest));
-        let neck_rest = DVec3::new(-0.01, 0.0, build.level_m(0.85));
+        let neck_rest = DVec3::new(-0.01, 0.0, build.neck_height_m());
         // The head looks ahead and stays upright.
         let head = Motion::about(facing, neck_rest, thorax.point(neck_rest));
 

@@ -11,6 +11,7 @@ use super::build::Build;
 use super::gestures::Gestures;
 use super::individual::Individual;
 use super::kind::Kind;
+use super::people::People;
 use super::recorded::Gait;
 use super::shape::{Shape, Surface};
 use super::sitting::Sitting;
@@ -74,9 +75,18 @@ impl Walker {
 
     /// The same for a kind of body. Children have heights of their own.
     pub fn of_kind(trajectory: Trajectory, seed: u64, kind: Kind) -> Self {
-        let build = match kind {
-            Kind::Child => Build::draw_child(seed),
-            _ => Build::draw(seed, trajectory.height_m),
+        Self::of_people(trajectory, seed, kind, None)
+    }
+
+    /// The same with the body of one of these people. Children have bodies of our own.
+    pub fn of_people(trajectory: Trajectory, seed: u64, kind: Kind, people: Option<&People>) -> Self {
+        let (build, skin) = match (kind, people) {
+            (Kind::Child, _) => (Build::draw_child(seed), None),
+            (_, None) => (Build::draw(seed, trajectory.height_m), None),
+            (_, Some(people)) => {
+                let (build, skin) = people.draw(seed, trajectory.height_m);
+                (build, Some(skin))
+            }
         };
         let things = things::of(kind, &build, seed);
         let first_phase: f64 = stream(seed, "phase", 0).random();
@@ -91,7 +101,10 @@ impl Walker {
         };
         let pelvis = PelvisPose::new(DVec2::ZERO, 0.0, &still, hips_m);
         let upright = Pose::new(&build, 0.0, &still, &pelvis, &feet, &things.holds);
-        let shape = Shape::new(&build, things.parts);
+        let shape = match skin {
+            None => Shape::new(&build, things.parts),
+            Some(skin) => Shape::of_skin(skin, things.parts),
+        };
         Self {
             shape,
             trajectory,
