@@ -6,7 +6,7 @@ use rand::RngExt;
 use umbracast::Error;
 
 use super::kind::Kind;
-use super::people::People;
+use super::meshes::Meshes;
 use super::recorded::Gait;
 use super::walker::Walker;
 use crate::crowd::Trajectory;
@@ -17,7 +17,7 @@ use crate::random::stream;
 pub struct Bodies {
     shares: Vec<(Kind, f64)>,
     gait: Option<Arc<Gait>>,
-    people: Option<Arc<People>>,
+    meshes: Option<Arc<Meshes>>,
 }
 
 impl Bodies {
@@ -38,24 +38,24 @@ impl Bodies {
         if gait.is_none() && shares.iter().any(|(kind, _)| *kind == Kind::CmuWalk) {
             return Err(Error::new("cmu-walk: expected a motion capture (--gait FILE), found none"));
         }
-        Ok(Self { shares, gait, people: None })
+        Ok(Self { shares, gait, meshes: None })
     }
 
     /// The same kinds, with the bodies of these people.
     #[must_use]
-    pub fn of(self, people: Arc<People>) -> Self {
-        Self { people: Some(people), ..self }
+    pub fn of(self, meshes: Arc<Meshes>) -> Self {
+        Self { meshes: Some(meshes), ..self }
     }
 
     /// Nobody is special.
     pub fn is_plain(&self) -> bool {
-        self.shares.is_empty() && self.people.is_none()
+        self.shares.is_empty() && self.meshes.is_none()
     }
 
     /// The body of a person, drawn from the person's own seed.
     pub fn walker(&self, trajectory: Trajectory, seed: u64) -> Walker {
         let kind = self.kind_of(seed);
-        let walker = Walker::of_people(trajectory, seed, kind, self.people.as_deref());
+        let walker = Walker::of_meshes(trajectory, seed, kind, self.meshes.as_deref());
         match &self.gait {
             Some(gait) if kind == Kind::CmuWalk => walker.with_gait(Arc::clone(gait)),
             _ => walker,

@@ -8,7 +8,7 @@ use umbracast::geometry::DVec3;
 
 use super::build::{ANKLE_SHARE, BALL_SHARE, Build};
 use super::loft::{self, Along, Ring, rounded, smooth};
-use super::people::Skin;
+use super::meshes::Skin;
 use super::skeleton::Bone;
 
 /// One closed surface, carried by one bone or bent between two.
@@ -27,7 +27,12 @@ pub enum Form {
     Loft(Along, Vec<Ring>, usize),
     /// A wheel's rim and tyre about an axle along y: middle, radius to the middle of the tyre, half its width.
     Hoop(DVec3, f64, f64),
+    /// Vertices and triangles as they are.
+    Ready(Vec<DVec3>, Vec<[u32; 3]>),
 }
+
+/// By so much what is carried may go farther from the axis than at rest.
+const SWAYS_M: f64 = 0.15;
 
 /// What every mesh of a body has in common.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -84,6 +89,12 @@ impl Shape {
         }
     }
 
+    /// How far from the body axis anything may be that follows trunk or ground: more than what is carried is at rest.
+    pub fn reach_m(&self) -> f64 {
+        let far = self.vertices.iter().map(|(at, _)| at.truncate().length()).fold(0.0, f64::max);
+        far + SWAYS_M
+    }
+
     /// How the vertices hang together.
     pub fn surface(&self) -> &Surface {
         &self.surface
@@ -110,6 +121,10 @@ impl Shape {
                     &mut self.vertices,
                     &mut self.surface.triangles,
                 );
+            }
+            Form::Ready(vertices, triangles) => {
+                self.vertices.extend(vertices.into_iter().map(|at| (at, 0.0)));
+                self.surface.triangles.extend(triangles.iter().map(|t| t.map(|corner| from as u32 + corner)));
             }
         }
         self.bones.push(part.bones);

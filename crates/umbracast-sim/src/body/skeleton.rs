@@ -24,10 +24,12 @@ pub enum Bone {
     FootRight,
     ToesLeft,
     ToesRight,
+    /// No bone: the ground below the body axis, turned as the body looks. What rolls follows it.
+    Ground,
 }
 
 impl Bone {
-    /// All of them, in the order of their numbers.
+    /// Those of the body, in the order of their numbers.
     pub const ALL: [Self; BONES] = [
         Self::Pelvis,
         Self::Thorax,
@@ -47,7 +49,7 @@ impl Bone {
     ];
 }
 
-/// How many bones.
+/// How many bones a body has.
 pub const BONES: usize = 15;
 
 /// The motion of one bone: takes its points at rest to the site.
@@ -132,7 +134,8 @@ pub type Holds = [Option<Hold>; 2];
 /// Every bone's motion at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    bones: [Motion; BONES],
+    /// The ground comes last.
+    bones: [Motion; BONES + 1],
 }
 
 impl Pose {
@@ -157,7 +160,11 @@ impl Pose {
         // The head looks ahead and stays upright.
         let head = Motion::about(facing, neck_rest, thorax.point(neck_rest));
 
-        let mut bones = [pelvis_motion; BONES];
+        let mut bones = [pelvis_motion; BONES + 1];
+        let sway =
+            DVec2::from_angle(heading_rad).rotate(DVec2::new(upper.pelvis_forward_m, upper.pelvis_left_m));
+        let axis_m = (pelvis.hips_m.truncate() - sway).extend(0.0);
+        bones[Bone::Ground as usize] = Motion::about(facing, DVec3::ZERO, axis_m);
         bones[Bone::Thorax as usize] = thorax;
         bones[Bone::Head as usize] = head;
         for (i, side) in [1.0, -1.0].into_iter().enumerate() {

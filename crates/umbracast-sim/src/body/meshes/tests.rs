@@ -21,16 +21,16 @@ fn ahead() -> Trajectory {
     way(|i| if i < 400 { DVec2::new(1.3, 0.0) } else { DVec2::ZERO })
 }
 
-fn families() -> [People; 2] {
-    ["a", "b"].map(|name| People::family(name).unwrap())
+fn families() -> [Meshes; 2] {
+    ["a", "b"].map(|name| Meshes::family(name).unwrap())
 }
 
 /// Everybody of a family, each as they are.
-fn everybody(people: &People) -> Vec<Walker> {
+fn everybody(people: &Meshes) -> Vec<Walker> {
     (0..people.len())
         .map(|i| {
-            let alone = People { name: String::new(), people: vec![people.people[i].clone()] };
-            Walker::of_people(ahead(), i as u64, Kind::Plain, Some(&alone))
+            let alone = Meshes { name: String::new(), people: vec![people.people[i].clone()] };
+            Walker::of_meshes(ahead(), i as u64, Kind::Plain, Some(&alone))
         })
         .collect()
 }
@@ -116,7 +116,7 @@ fn who_walks_stays_on_the_floor_and_together_and_no_sole_slides() {
 
 #[test]
 fn a_known_height_is_kept_and_another_seed_is_another_person() {
-    let family = People::family("a").unwrap();
+    let family = Meshes::family("a").unwrap();
     for seed in 0..20 {
         let (build, _) = family.draw(seed, Some(1.83));
         assert!((build.height_m() - 1.83).abs() < 1e-9, "{}", build.height_m());
@@ -128,11 +128,11 @@ fn a_known_height_is_kept_and_another_seed_is_another_person() {
 
 #[test]
 fn files_that_are_none_are_refused() {
-    let refused = |bytes: &[u8]| People::read("x", bytes).unwrap_err().to_string();
+    let refused = |bytes: &[u8]| Meshes::read("x", bytes).unwrap_err().to_string();
     assert!(refused(b"solid cube").starts_with("glTF: "));
     let whole = include_bytes!("../../../bodies/family-a.glb");
     assert!(!refused(&whole[..whole.len() / 2]).is_empty());
-    assert!(People::family("c").unwrap_err().to_string().contains("expected a or b"));
+    assert!(Meshes::family("c").unwrap_err().to_string().contains("expected a or b"));
     let renamed: Vec<u8> = {
         let mut bytes = whole.to_vec();
         let at = bytes.windows(17).position(|w| w == b"\"name\":\"ToesLeft\"").unwrap();

@@ -26,7 +26,7 @@ const NEAREST: usize = 4;
 
 /// Everybody of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct People {
+pub struct Meshes {
     /// What tells these people from others.
     pub name: String,
     people: Vec<Person>,
@@ -57,7 +57,7 @@ struct Vertex {
     bones: Vec<(Bone, f64)>,
 }
 
-impl People {
+impl Meshes {
     /// The families that come with the crate, `a` or `b`: 16 people each, clothed, aged 18 to 60 and 30 to 80.
     ///
     /// # Errors
