@@ -50,9 +50,10 @@ pub struct BodyArgs {
     /// plain. Separate several with commas.
     #[arg(long, value_name = "KIND[=SHARE]", value_delimiter = ',', value_parser = body_share)]
     pub bodies: Vec<(Kind, f64)>,
-    /// BVH motion capture of a walk, for people of the kind cmu-walk.
-    #[arg(long, value_name = "FILE", requires = "bodies")]
-    pub gait: Option<PathBuf>,
+    /// Motion captures of walks, for people of the kind cmu-walk: BVH, or text of joints' turns. Each person walks as one of
+    /// them. Separate several with commas.
+    #[arg(long, value_name = "FILE", requires = "bodies", value_delimiter = ',')]
+    pub gait: Vec<PathBuf>,
 }
 
 pub(super) fn one_or_more(text: &str) -> Result<usize, Error> {
