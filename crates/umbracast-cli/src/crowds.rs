@@ -6,7 +6,7 @@ use std::sync::Arc;
 use umbracast::geometry::DVec2;
 use umbracast::{Error, Site};
 use umbracast_eval::run::chain::{self, People, SceneSpec};
-use umbracast_io::bvh;
+use umbracast_io::motion;
 use umbracast_io::trajectories::{self, Options};
 use umbracast_sim::body::Bodies;
 use umbracast_sim::body::Gait;
@@ -129,21 +129,24 @@ pub fn through_walls(scenes: &[SceneSpec], site: &Site) -> Vec<String> {
 
 /// Gives everybody in every scene a body of these kinds, and tells it.
 pub fn dressed((mut scenes, mut told): Told, args: &BodyArgs) -> Result<Told, Error> {
-    let gait = match &args.gait {
-        None => None,
-        Some(file) => {
-            let motion = bvh::read(file)?;
-            let gait = Gait::new(motion.frame_s, &motion.joints, &motion.positions);
-            Some(Arc::new(gait.map_err(|e| e.within(file.display()))?))
-        }
+    let gait = |file: &PathBuf| {
+        let motion = motion::read(file)?;
+        let gait = Gait::new(motion.frame_s, &motion.joints, &motion.positions);
+        Ok(Arc::new(gait.map_err(|e| e.within(file.display()))?))
     };
-    let bodies = Bodies::new(args.bodies.clone(), gait).map_err(|e| e.within("--bodies"))?;
+    let gaits = args.gait.iter().map(gait).collect::<Result<Vec<_>, Error>>()?;
+    let bodies = Bodies::new(args.bodies.clone(), gaits).map_err(|e| e.within("--bodies"))?;
     let meshes = meshes(&args.meshes)?;
     if !bodies.is_plain() {
         let shares = args.bodies.iter().map(|(kind, share)| format!("{}={share}", kind.name()));
         let mut shares = shares.collect::<Vec<_>>().join(",");
-        if let Some(file) = args.gait.as_ref().and_then(|file| file.file_stem()) {
-            shares += &format!(" of {}", file.to_string_lossy());
+        let stem = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        match args.gait.as_slice() {
+            [] => {}
+            [file] => shares += &format!(" of {}", stem(file)),
+            [first, .., last] => {
+                shares += &format!(" of {} from {} to {}", args.gait.len(), stem(first), stem(last));
+            }
         }
         for scene in &mut scenes {
             scene.group += &format!(" {shares}");
@@ -186,7 +189,7 @@ mod tests {
         let site = Config::default().site;
         let dressed = |meshes: &str| {
             let drawn = drawn_scenes(&site, &[Preset::Orca03], 1, 3, 200_000).unwrap();
-            dressed(drawn, &BodyArgs { bodies: Vec::new(), gait: None, meshes: meshes.to_owned() })
+            dressed(drawn, &BodyArgs { bodies: Vec::new(), gait: Vec::new(), meshes: meshes.to_owned() })
         };
         let (own, told) = dressed("own").unwrap();
         assert!(

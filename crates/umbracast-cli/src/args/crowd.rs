@@ -51,9 +51,10 @@ pub struct BodyArgs {
     /// behind), frame (a rollator), pushed (a wheelchair, by the person). All others are plain. Separate several with commas.
     #[arg(long, value_name = "KIND[=SHARE]", value_delimiter = ',', value_parser = body_share)]
     pub bodies: Vec<(Kind, f64)>,
-    /// BVH motion capture of a walk, for people of the kind cmu-walk.
-    #[arg(long, value_name = "FILE", requires = "bodies")]
-    pub gait: Option<PathBuf>,
+    /// Motion captures of walks, for people of the kind cmu-walk: BVH, or text of joints' turns. Each person walks as one of
+    /// them. Separate several with commas.
+    #[arg(long, value_name = "FILE", requires = "bodies", value_delimiter = ',')]
+    pub gait: Vec<PathBuf>,
     /// Whose bodies they have: own (drawn measures), a or b (families of 16 third-party meshes each), or a binary glTF file of
     /// people with a skin. Children keep bodies of our own.
     #[arg(long, value_name = "own|a|b|FILE", default_value = "own")]

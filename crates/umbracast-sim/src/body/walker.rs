@@ -132,7 +132,7 @@ impl Walker {
     /// The same body, moving as somebody who was recorded.
     #[must_use]
     pub fn with_gait(mut self, gait: Arc<Gait>) -> Self {
-        self.walk.keep_pace(gait.stride_m(&self.build));
+        self.walk.keep_pace(self.own.stride * gait.stride_m(&self.build));
         self.gait = Some(gait);
         self
     }
@@ -225,8 +225,10 @@ impl Walker {
             return Some((self.seated(seat_m, &instant, &state), state));
         }
         if let Some(gait) = &self.gait {
-            let Instant { heading_rad, speed_mps, phase, .. } = instant;
-            return Some((gait.pose(&self.build, state.position_m, heading_rad, phase, speed_mps), state));
+            let Instant { heading_rad, speed_mps, phase, twist_rad, .. } = instant;
+            let (build, own, at_m) = (&self.build, &self.own, state.position_m);
+            let pose = gait.pose(build, own, at_m, heading_rad, phase, speed_mps, twist_rad);
+            return Some((pose, state));
         }
         let upper = walk::upper_body(&instant, &self.build, &self.own);
         let mut hips_m = instant.hip_height_m;
