@@ -75,10 +75,9 @@ fn things_have_their_sizes_and_places() {
         assert!(child.max_m.z < height_m && child.min_m.z > 0.5 && child.size_m().z > 0.5, "{child:?}");
         let (chair, _, height_m) = of(Kind::Pushed);
         assert!((1.1..1.5).contains(&chair.max_m.z) && chair.max_m.z < height_m, "{chair:?}");
-        assert!(
-            chair.min_m.x > 0.15 && chair.max_m.x > 1.1 && near(chair.size_m().y, 0.66, 0.08),
-            "{chair:?}"
-        );
+        // The chair is .66 m wide; elbows may be farther out.
+        assert!(chair.min_m.x > 0.15 && chair.max_m.x > 1.1, "{chair:?}");
+        assert!((0.62..0.90).contains(&chair.size_m().y), "{chair:?}");
     }
 }
 
