@@ -11,7 +11,7 @@ use umbracast_sim::crowd::Preset;
 /// Who walks.
 #[derive(Debug, Clone, Args)]
 pub struct CrowdArgs {
-    /// The crowd: orca-03, orca-06, mixed or pairs.
+    /// The crowd: orca-03, orca-06, mixed, natural (as mixed, and people wander and stop) or pairs.
     #[arg(long, default_value = "orca-03")]
     pub preset: Preset,
     /// People in each scene.
