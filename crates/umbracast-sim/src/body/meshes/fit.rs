@@ -15,6 +15,9 @@ const BENDS_M: f64 = 0.03;
 /// Soles go this far up; they follow foot and toes alone.
 const SOLE_M: f64 = 0.055;
 const SIDES: [f64; 2] = [1.0, -1.0];
+/// Hips and chest: levels as shares of the height, and how far ahead of the axis the middle of our own trunks is there (`shape`).
+const TRUNK: [(f64, f64, f64); 2] = [(0.50, 0.54, -0.01), (0.70, 0.76, 0.004)];
+const TRUNK_BONES: [Bone; 4] = [Bone::Pelvis, Bone::Thorax, Bone::ThighLeft, Bone::ThighRight];
 
 /// Head's top over the floor once the legs are upright, shoes included.
 pub(super) fn height_m(person: &Person) -> f64 {
@@ -84,14 +87,16 @@ impl<'a> Placed<'a> {
         let legs = Legs::of(person);
         let joint = |bone: Bone, side: usize| person.joints_m[bone as usize + side];
         let middle = |bone: Bone| 0.5 * (joint(bone, 0) + joint(bone, 1));
-        let (hips, shoulders) = (middle(Bone::ThighLeft), middle(Bone::UpperArmLeft));
+        let shoulders = middle(Bone::UpperArmLeft);
+        let [hips_ahead_m, chest_ahead_m] = TRUNK.map(|level| trunk_ahead_m(person, &legs, level));
         let hip_m = legs.thigh_m + legs.shank_m + legs.ankle_m;
         let mut ours = [(DMat3::IDENTITY, DVec3::ZERO); BONES];
         let up = DVec3::Z * legs.rise_m;
-        ours[Bone::Pelvis as usize].1 = up - DVec3::X * hips.x;
-        // Our shoulders are straight over our hips; spines bend for it by a few degrees.
-        ours[Bone::Thorax as usize].1 = up - DVec3::X * shoulders.x;
-        ours[Bone::Head as usize].1 = up - DVec3::X * shoulders.x;
+        // The body axis runs through the middle of the trunk, as it does in our own bodies, not through the joints, which lie
+        // behind it.
+        ours[Bone::Pelvis as usize].1 = up - DVec3::X * hips_ahead_m;
+        ours[Bone::Thorax as usize].1 = up - DVec3::X * chest_ahead_m;
+        ours[Bone::Head as usize].1 = up - DVec3::X * chest_ahead_m;
         let shoulder = (
             0.5 * (joint(Bone::UpperArmLeft, 0).y - joint(Bone::UpperArmLeft, 1).y),
             shoulders.z + legs.rise_m,
@@ -255,6 +260,17 @@ impl<'a> Placed<'a> {
             joints: Some(self.joints.scaled(scale)),
         }
     }
+}
+
+/// How far ahead of x = 0 the trunk's middle is at a level (`TRUNK`) more than in our own bodies.
+fn trunk_ahead_m(person: &Person, legs: &Legs, (from, to, own_m): (f64, f64, f64)) -> f64 {
+    let height_m = height_m(person);
+    let level = |share: f64| share * height_m - legs.rise_m;
+    let near = person.vertices.iter().filter(|vertex| TRUNK_BONES.contains(&vertex.bones[0].0));
+    let near = near.map(|vertex| vertex.at_m).filter(|at| (level(from)..level(to)).contains(&at.z));
+    let (least_m, most_m) =
+        near.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| (least.min(at.x), most.max(at.x)));
+    if least_m <= most_m { 0.5 * (least_m + most_m) - own_m } else { 0.0 }
 }
 
 /// A foot in the file's rest: turned so that it points ahead, where its sole lies from the ankle.

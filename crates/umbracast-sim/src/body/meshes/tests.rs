@@ -114,6 +114,22 @@ fn who_walks_stays_on_the_floor_and_together_and_no_sole_slides() {
     }
 }
 
+/// A truth whose axis were another one in other bodies would be scored as an error of the tracker.
+#[test]
+fn the_axis_runs_through_the_trunk() {
+    for family in families() {
+        for walker in everybody(&family) {
+            let mut mesh = Vec::new();
+            walker.upright_mesh(DVec2::ZERO, 0.0, &mut mesh);
+            let height_m = walker.build.height_m();
+            let chest =
+                mesh.iter().copied().filter(|v| (0.70..0.76).contains(&(v.z / height_m)) && v.y.abs() < 0.13);
+            let ahead_m = Aabb::around(chest).center_m().x;
+            assert!(ahead_m.abs() < 0.015, "{ahead_m}");
+        }
+    }
+}
+
 #[test]
 fn a_known_height_is_kept_and_another_seed_is_another_person() {
     let family = Meshes::family("a").unwrap();
