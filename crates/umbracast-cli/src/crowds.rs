@@ -1,15 +1,16 @@
 //! From arguments to scenes: drawn crowds or recorded people.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use umbracast::geometry::DVec2;
 use umbracast::{Error, Site};
 use umbracast_eval::run::chain::{self, People, SceneSpec};
-use umbracast_io::bvh;
+use umbracast_io::motion;
 use umbracast_io::trajectories::{self, Options};
 use umbracast_sim::body::Bodies;
 use umbracast_sim::body::Gait;
+use umbracast_sim::body::Meshes;
 use umbracast_sim::crowd::Preset;
 use umbracast_sim::crowd::floor::from_piece_m;
 use umbracast_sim::crowd::{Recorded, move_apart, replay};
@@ -128,20 +129,24 @@ pub fn through_walls(scenes: &[SceneSpec], site: &Site) -> Vec<String> {
 
 /// Gives everybody in every scene a body of these kinds, and tells it.
 pub fn dressed((mut scenes, mut told): Told, args: &BodyArgs) -> Result<Told, Error> {
-    let gait = match &args.gait {
-        None => None,
-        Some(file) => {
-            let motion = bvh::read(file)?;
-            let gait = Gait::new(motion.frame_s, &motion.joints, &motion.positions);
-            Some(Arc::new(gait.map_err(|e| e.within(file.display()))?))
-        }
+    let gait = |file: &PathBuf| {
+        let motion = motion::read(file)?;
+        let gait = Gait::new(motion.frame_s, &motion.joints, &motion.positions);
+        Ok(Arc::new(gait.map_err(|e| e.within(file.display()))?))
     };
-    let bodies = Bodies::new(args.bodies.clone(), gait).map_err(|e| e.within("--bodies"))?;
+    let gaits = args.gait.iter().map(gait).collect::<Result<Vec<_>, Error>>()?;
+    let bodies = Bodies::new(args.bodies.clone(), gaits).map_err(|e| e.within("--bodies"))?;
+    let meshes = meshes(&args.meshes)?;
     if !bodies.is_plain() {
         let shares = args.bodies.iter().map(|(kind, share)| format!("{}={share}", kind.name()));
         let mut shares = shares.collect::<Vec<_>>().join(",");
-        if let Some(file) = args.gait.as_ref().and_then(|file| file.file_stem()) {
-            shares += &format!(" of {}", file.to_string_lossy());
+        let stem = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        match args.gait.as_slice() {
+            [] => {}
+            [file] => shares += &format!(" of {}", stem(file)),
+            [first, .., last] => {
+                shares += &format!(" of {} from {} to {}", args.gait.len(), stem(first), stem(last));
+            }
         }
         for scene in &mut scenes {
             scene.group += &format!(" {shares}");
@@ -149,13 +154,57 @@ pub fn dressed((mut scenes, mut told): Told, args: &BodyArgs) -> Result<Told, Er
         }
         told.push(format!("bodies by share: {shares}"));
     }
+    if let Some(meshes) = meshes.map(Arc::new) {
+        for scene in &mut scenes {
+            scene.group += &format!(" meshes {}", meshes.name);
+            scene.bodies = scene.bodies.clone().of(Arc::clone(&meshes));
+        }
+        told.push(format!("bodies by mesh: {} people of {}", meshes.len(), meshes.name));
+    }
     Ok((scenes, told))
+}
+
+/// Whose bodies people have; `None` where measures are drawn.
+fn meshes(name: &str) -> Result<Option<Meshes>, Error> {
+    match name {
+        "own" => Ok(None),
+        "a" | "b" => Ok(Some(Meshes::family(name)?)),
+        file => {
+            let bytes = std::fs::read(file).map_err(|e| {
+                Error::new(format!("--meshes: expected own, a, b or a file, found {file:?}: {e}"))
+            })?;
+            let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
+            Ok(Some(Meshes::read(&stem, &bytes).map_err(|e| e.within(file))?))
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use umbracast::Config;
+
+    #[test]
+    fn meshes_are_own_a_family_or_a_file_and_change_nobody_else() {
+        let site = Config::default().site;
+        let dressed = |meshes: &str| {
+            let drawn = drawn_scenes(&site, &[Preset::Orca03], 1, 3, 200_000).unwrap();
+            dressed(drawn, &BodyArgs { bodies: Vec::new(), gait: Vec::new(), meshes: meshes.to_owned() })
+        };
+        let (own, told) = dressed("own").unwrap();
+        assert!(
+            own[0].bodies == Bodies::default() && own[0].group == "orca-03" && told.is_empty(),
+            "{told:?}"
+        );
+        let (b, told) = dressed("b").unwrap();
+        assert_eq!(
+            (b[0].group.as_str(), told),
+            ("orca-03 meshes b", vec!["bodies by mesh: 16 people of b".to_owned()])
+        );
+        assert_ne!(b[0].bodies, own[0].bodies);
+        let refused = dressed("no/such.glb").unwrap_err().to_string();
+        assert!(refused.contains("expected own, a, b or a file, found \"no/such.glb\""), "{refused}");
+    }
 
     #[test]
     fn who_walks_through_walls_is_counted() {

@@ -27,7 +27,7 @@ pub fn without_effect(name: &str, command: &ArgMatches) -> Vec<String> {
     const REPLAY: [&str; 5] = ["fps", "unit", "smooth", "seconds", "centre"];
     if given("dir") {
         let done = "on a run that is done: nothing is simulated";
-        idle(&["preset", "people", "seed", "bodies", "gait"], done);
+        idle(&["preset", "people", "seed", "bodies", "gait", "meshes"], done);
         idle(&REPLAY, done);
         if command.get_one::<PathBuf>("dir").is_some_and(|dir| dir.join("config.toml").is_file()) {
             idle(&["mode", "site"], "where config.toml beside the tables says what the run was of");

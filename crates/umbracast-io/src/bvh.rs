@@ -38,7 +38,7 @@ enum Channel {
 }
 
 /// A rotation, row by row.
-type Matrix = [[f64; 3]; 3];
+pub(crate) type Matrix = [[f64; 3]; 3];
 
 /// Reads a file.
 ///
@@ -174,7 +174,7 @@ fn pose(joints: &[Joint], words: &mut Words) -> Result<Vec<[f64; 3]>, Error> {
     Ok(placed.into_iter().map(|(position, _)| position).collect())
 }
 
-const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+pub(crate) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 fn about(axis: usize, angle_rad: f64) -> Matrix {
     let (sin, cos) = angle_rad.sin_cos();
@@ -185,11 +185,11 @@ fn about(axis: usize, angle_rad: f64) -> Matrix {
     matrix
 }
 
-fn times(m: &Matrix, v: [f64; 3]) -> [f64; 3] {
+pub(crate) fn times(m: &Matrix, v: [f64; 3]) -> [f64; 3] {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
+pub(crate) fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 

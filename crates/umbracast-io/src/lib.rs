@@ -29,3 +29,5 @@ pub mod own_tracks;
 pub mod reports;
 pub mod trajectories;
 pub mod bvh;
+pub mod turns;
+pub mod motion;

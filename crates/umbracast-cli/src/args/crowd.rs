@@ -11,7 +11,7 @@ use umbracast_sim::crowd::Preset;
 /// Who walks.
 #[derive(Debug, Clone, Args)]
 pub struct CrowdArgs {
-    /// The crowd: orca-03, orca-06, mixed or pairs.
+    /// The crowd: orca-03, orca-06, mixed, natural (as mixed, and people wander and stop) or pairs.
     #[arg(long, default_value = "orca-03")]
     pub preset: Preset,
     /// People in each scene.
@@ -46,13 +46,19 @@ pub struct Replay {
 #[derive(Debug, Clone, Args)]
 pub struct BodyArgs {
     /// Kinds of bodies with their shares of the people: bag, phone (at the ear), pockets (hands in them), child,
-    /// wheelchair, cmu-walk (needs --gait), gesturing (with both hands), sitting (where they stay). All others are
-    /// plain. Separate several with commas.
+    /// wheelchair, cmu-walk (needs --gait), gesturing (with both hands), sitting (where they stay), rucksack, bags (one in each
+    /// hand), umbrella (open), screen (a telephone before the face), carrying (a small child), pram, trolley (a suitcase
+    /// behind), frame (a rollator), pushed (a wheelchair, by the person). All others are plain. Separate several with commas.
     #[arg(long, value_name = "KIND[=SHARE]", value_delimiter = ',', value_parser = body_share)]
     pub bodies: Vec<(Kind, f64)>,
-    /// BVH motion capture of a walk, for people of the kind cmu-walk.
-    #[arg(long, value_name = "FILE", requires = "bodies")]
-    pub gait: Option<PathBuf>,
+    /// Motion captures of walks, for people of the kind cmu-walk: BVH, or text of joints' turns. Each person walks as one of
+    /// them. Separate several with commas.
+    #[arg(long, value_name = "FILE", requires = "bodies", value_delimiter = ',')]
+    pub gait: Vec<PathBuf>,
+    /// Whose bodies they have: own (drawn measures), a or b (families of 16 third-party meshes each), or a binary glTF file of
+    /// people with a skin. Children keep bodies of our own.
+    #[arg(long, value_name = "own|a|b|FILE", default_value = "own")]
+    pub meshes: String,
 }
 
 pub(super) fn one_or_more(text: &str) -> Result<usize, Error> {

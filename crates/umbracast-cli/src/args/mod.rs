@@ -255,7 +255,7 @@ pub struct Evaluate {
     /// Simulate and run this many scenes of each preset in memory, and score them.
     #[arg(long, value_name = "N", conflicts_with = "dir", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: Option<u32>,
-    /// The crowds of --scenes: orca-03, orca-06, mixed, pairs. Separate several with commas.
+    /// The crowds of --scenes: orca-03, orca-06, mixed, natural, pairs. Separate several with commas.
     #[arg(long, value_delimiter = ',', default_value = "orca-03,orca-06")]
     pub preset: Vec<Preset>,
     /// Replay recorded walkers in place of a crowd. Each file is a scene.

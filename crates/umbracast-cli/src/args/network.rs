@@ -17,7 +17,7 @@ use super::{CaptureArgs, SiteArgs};
 pub struct Network {
     #[command(flatten)]
     pub site: SiteArgs,
-    /// The crowd: orca-03, orca-06, mixed or pairs. Everybody walks to and fro, and nobody arrives.
+    /// The crowd: orca-03, orca-06, mixed, natural or pairs. Everybody walks to and fro, and nobody arrives.
     #[arg(long, default_value = "orca-03")]
     pub preset: Preset,
     /// Number of scenes. Fewer than five give no intervals.

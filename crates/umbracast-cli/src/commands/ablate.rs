@@ -125,7 +125,8 @@ fn recorded(args: &Ablate, folder: &Path) -> Result<Vec<DataSet>, Error> {
 }
 
 fn dressed(scenes: Vec<SceneSpec>, kind: Kind, gait: Option<PathBuf>) -> Result<Vec<SceneSpec>, Error> {
-    let bodies = BodyArgs { bodies: vec![(kind, 1.0)], gait };
+    let gait = gait.into_iter().collect();
+    let bodies = BodyArgs { bodies: vec![(kind, 1.0)], gait, meshes: "own".to_owned() };
     Ok(crowds::dressed((scenes, Vec::new()), &bodies)?.0)
 }
 

@@ -5,7 +5,7 @@ use std::fs;
 use tempfile::TempDir;
 use umbracast::Config;
 use umbracast::lidar::{Model, Packet};
-use umbracast_io::bvh;
+use umbracast_io::motion as motion_text;
 use umbracast_io::pcap::{DATA_PORT, Datagram, PcapReader, PcapWriter};
 use umbracast_io::pcd::{PcdCloud, PcdEncoding, PcdField, PcdKind, read_pcd, write_pcd};
 use umbracast_io::recording::{Entry, RecordingReader, RecordingWriter};
@@ -137,11 +137,14 @@ fn motions() -> Vec<Vec<u8>> {
     let arm = "HIERARCHY\nROOT Hips\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n \
                JOINT Elbow\n {\n OFFSET 0 2 0\n CHANNELS 3 Zrotation Xrotation Yrotation\n End Site\n {\n OFFSET 0 1 0\n }\n }\n}\n\
                MOTION\nFrames: 2\nFrame Time: 0.01\n0 1 0 0 0 0 0 0 0\n5 0 0 90 0 90 0 0 90\n";
-    vec![arm.as_bytes().to_vec()]
+    // A T-pose and two frames of joints' turns.
+    let row = |turn: &str| format!("0,17,0{}\n", format!(",{turn},0,0").repeat(38));
+    let rows = [row("0"), row("0.1"), row("-0.2")].concat();
+    vec![arm.as_bytes().to_vec(), rows.into_bytes()]
 }
 
 fn motion(bytes: &[u8]) -> bool {
-    let Some(motion) = std::str::from_utf8(bytes).ok().and_then(|text| bvh::parse(text).ok()) else {
+    let Some(motion) = std::str::from_utf8(bytes).ok().and_then(|text| motion_text::parse(text).ok()) else {
         return false;
     };
     assert!(motion.frame_s > 0.0 && motion.frame_s.is_finite());

@@ -55,6 +55,55 @@ pub struct Build {
     pub legs: f64,
     /// See `legs`.
     pub chin: f64,
+    /// Of who has joints of their own, in place of those that follow from the stature.
+    pub joints: Option<Joints>,
+}
+
+/// Where the joints of a body are that hangs at rest, and how long its bones are; heights above the floor, with shoes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joints {
+    /// The ankle.
+    pub ankle_m: f64,
+    /// From the middle to a hip joint.
+    pub hip_offset_m: f64,
+    /// The hip joints.
+    pub hip_height_m: f64,
+    /// Hip to knee.
+    pub thigh_m: f64,
+    /// Knee to ankle.
+    pub shank_m: f64,
+    /// From the middle to a shoulder joint, and its height.
+    pub shoulder_m: (f64, f64),
+    /// The elbow.
+    pub elbow_height_m: f64,
+    /// Elbow to wrist.
+    pub forearm_m: f64,
+    /// Where the trunk bends.
+    pub waist_m: f64,
+    /// Where the neck begins.
+    pub neck_m: f64,
+    /// Heel to toe.
+    pub sole_m: f64,
+}
+
+impl Joints {
+    /// Of the same body, larger or smaller.
+    #[must_use]
+    pub fn scaled(&self, scale: f64) -> Self {
+        Self {
+            ankle_m: scale * self.ankle_m,
+            hip_offset_m: scale * self.hip_offset_m,
+            hip_height_m: scale * self.hip_height_m,
+            thigh_m: scale * self.thigh_m,
+            shank_m: scale * self.shank_m,
+            shoulder_m: (scale * self.shoulder_m.0, scale * self.shoulder_m.1),
+            elbow_height_m: scale * self.elbow_height_m,
+            forearm_m: scale * self.forearm_m,
+            waist_m: scale * self.waist_m,
+            neck_m: scale * self.neck_m,
+            sole_m: scale * self.sole_m,
+        }
+    }
 }
 
 /// X25 of men and women, then the exponents p and q and the spread r.
@@ -81,7 +130,7 @@ const BMI_WOMEN: (f64, f64) = (25.5, 3.5);
 /// Height of the hip joints of adults, as a share of the stature (BT).
 const HIP: f64 = 0.53;
 /// Height of the chin of adults, as a share of the stature (BT).
-const CHIN: f64 = 0.870;
+pub const CHIN: f64 = 0.870;
 /// Children: age and median height, sexes alike.
 const CHILDREN_M: [(f64, f64); 6] =
     [(3.0, 0.95), (4.0, 1.02), (5.0, 1.09), (6.0, 1.15), (10.0, 1.38), (12.0, 1.50)];
@@ -166,6 +215,7 @@ impl Build {
             foot_m: [sex(0.154, 0.151) * h, sex(0.058, 0.057) * h],
             legs: 1.0,
             chin: CHIN,
+            joints: None,
         };
         if let Some(age) = age {
             let grown = along(&[(3.0, 0.94), (6.0, 1.0)], age);
@@ -197,42 +247,55 @@ impl Build {
 
     /// Ankle joint above the floor (BT).
     pub fn ankle_m(&self) -> f64 {
-        self.level_m(0.039)
+        self.joints.map_or_else(|| self.level_m(0.039), |joints| joints.ankle_m)
     }
 
     /// Hip joint above the floor, standing (BT).
     pub fn hip_height_m(&self) -> f64 {
-        self.level_m(HIP)
+        self.joints.map_or_else(|| self.level_m(HIP), |joints| joints.hip_height_m)
     }
 
     /// From the middle to a hip joint.
     pub fn hip_offset_m(&self) -> f64 {
-        0.05 * self.stature_m
+        self.joints.map_or_else(|| 0.05 * self.stature_m, |joints| joints.hip_offset_m)
     }
 
     /// Hip to knee (BT).
     pub fn thigh_m(&self) -> f64 {
-        0.245 * self.legs * self.stature_m
+        self.joints.map_or_else(|| 0.245 * self.legs * self.stature_m, |joints| joints.thigh_m)
     }
 
     /// Knee to ankle (BT).
     pub fn shank_m(&self) -> f64 {
-        0.246 * self.legs * self.stature_m
+        self.joints.map_or_else(|| 0.246 * self.legs * self.stature_m, |joints| joints.shank_m)
     }
 
     /// The shoulder joint: 2 cm inside and 3.5 cm below the acromion (.82 H).
     pub fn shoulder_m(&self) -> (f64, f64) {
-        (self.biacromial_m / 2.0 - 0.02, self.level_m(0.82) - 0.035)
+        self.joints.map_or_else(
+            || (self.biacromial_m / 2.0 - 0.02, self.level_m(0.82) - 0.035),
+            |joints| joints.shoulder_m,
+        )
     }
 
     /// Elbow above the floor with the arm hanging: the upper arm is .191 H from the acromion.
     pub fn elbow_height_m(&self) -> f64 {
-        self.level_m(0.629)
+        self.joints.map_or_else(|| self.level_m(0.629), |joints| joints.elbow_height_m)
+    }
+
+    /// Where the trunk bends between pelvis and thorax.
+    pub fn waist_height_m(&self) -> f64 {
+        self.joints.map_or_else(|| self.level_m(0.60), |joints| joints.waist_m)
+    }
+
+    /// Where neck and head turn.
+    pub fn neck_height_m(&self) -> f64 {
+        self.joints.map_or_else(|| self.level_m(0.85), |joints| joints.neck_m)
     }
 
     /// The shoe, heel to toe: the sole is longer than the foot.
     pub fn sole_m(&self) -> f64 {
-        self.foot_m[0] + 0.02
+        self.joints.map_or_else(|| self.foot_m[0] + 0.02, |joints| joints.sole_m)
     }
 }
 

@@ -26,11 +26,29 @@ pub enum Kind {
     Gesturing,
     /// An adult who sits down where he stays for long.
     Sitting,
+    /// A rucksack on both shoulders; the arms swing.
+    Rucksack,
+    /// A bag in each hand.
+    Bags,
+    /// An open umbrella over the head.
+    Umbrella,
+    /// A telephone before the face, in both hands.
+    Screen,
+    /// A small child on one arm.
+    Carrying,
+    /// Pushes a pram.
+    Pram,
+    /// Pulls a suitcase behind.
+    Trolley,
+    /// Walks with a frame on wheels (rollator).
+    Frame,
+    /// Pushes somebody in a wheelchair: both are one body, which is as tall as who walks.
+    Pushed,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 18] = [
         Self::Plain,
         Self::Bag,
         Self::Phone,
@@ -40,6 +58,15 @@ impl Kind {
         Self::CmuWalk,
         Self::Gesturing,
         Self::Sitting,
+        Self::Rucksack,
+        Self::Bags,
+        Self::Umbrella,
+        Self::Screen,
+        Self::Carrying,
+        Self::Pram,
+        Self::Trolley,
+        Self::Frame,
+        Self::Pushed,
     ];
 
     /// As it is written on the command line.
@@ -54,6 +81,15 @@ impl Kind {
             Self::CmuWalk => "cmu-walk",
             Self::Gesturing => "gesturing",
             Self::Sitting => "sitting",
+            Self::Rucksack => "rucksack",
+            Self::Bags => "bags",
+            Self::Umbrella => "umbrella",
+            Self::Screen => "screen",
+            Self::Carrying => "carrying",
+            Self::Pram => "pram",
+            Self::Trolley => "trolley",
+            Self::Frame => "frame",
+            Self::Pushed => "pushed",
         }
     }
 }

@@ -68,16 +68,17 @@ pub fn triangles(rings: usize, points: usize, first: usize, out: &mut Vec<[u32; 
 /// Points around a hoop, and around its tube.
 const HOOP: [usize; 2] = [32, 8];
 
-/// A ring-shaped tube about an axle along y, with its triangles.
+/// A ring-shaped tube about an axle along y, with its triangles; so many vertices are `before` all of `vertices`.
 pub fn hoop(
     middle_m: DVec3,
     radius_m: f64,
     half_m: f64,
+    before: usize,
     vertices: &mut Vec<(DVec3, f64)>,
     triangles: &mut Vec<[u32; 3]>,
 ) {
     let [around, tube] = HOOP;
-    let first = vertices.len();
+    let first = before + vertices.len();
     for i in 0..around {
         let (up, ahead) = (TAU * i as f64 / around as f64).sin_cos();
         for k in 0..tube {
@@ -163,7 +164,7 @@ mod tests {
     #[test]
     fn a_hoop_is_closed_and_faces_outward() {
         let (mut points, mut faces) = (Vec::new(), Vec::new());
-        hoop(DVec3::new(0.1, 0.3, 0.3), 0.3, 0.02, &mut points, &mut faces);
+        hoop(DVec3::new(0.1, 0.3, 0.3), 0.3, 0.02, 0, &mut points, &mut faces);
         // Pappus: the tube's section along the circle of its middle; an octagon holds 0.90 of its circle.
         let expected = 0.90 * std::f64::consts::PI * 0.02 * 0.02 * TAU * 0.3;
         let volume = volume(&points, &faces);

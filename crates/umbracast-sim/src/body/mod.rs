@@ -13,13 +13,16 @@ mod fidget;
 mod walk;
 pub mod kind;
 mod things;
+mod carried;
 mod gestures;
 mod sitting;
 mod recorded;
+pub mod meshes;
 mod walker;
 mod bodies;
 
 pub use bodies::Bodies;
+pub use meshes::Meshes;
 pub use recorded::Gait;
 pub use shape::Surface;
 pub use walker::{PersonState, Walker};
@@ -28,3 +31,5 @@ pub use walker::{PersonState, Walker};
 mod tests;
 #[cfg(test)]
 mod kind_tests;
+#[cfg(test)]
+mod carried_tests;

@@ -11,7 +11,7 @@ use umbracast::geometry::{DMat3, DVec2, DVec3};
 
 use super::build::Build;
 use super::feet;
-use super::gait::UpperBody;
+use super::gait::{UpperBody, above_zero};
 use super::individual::Individual;
 use super::skeleton::{FootPose, Holds, PelvisPose, Pose};
 
@@ -29,6 +29,12 @@ const JOINTS: [[&str; 2]; 9] = [
 ];
 /// Strides last so long, seconds.
 const STRIDE_S: [f64; 2] = [0.8, 1.6];
+/// And no longer than this where somebody dawdles.
+const SLOW_STRIDE_S: f64 = 2.6;
+/// A stride closes whose ends are apart by less than this, squares of all joints together, in squares of the leg.
+const CLOSED: f64 = 0.25;
+/// Cosine of the widest angle between where somebody faces and walks.
+const AHEAD: f64 = 0.7;
 /// The looped stride is at least this fast, as a share of the fastest one.
 const BRISK: f64 = 0.6;
 /// Slower than this the recorded gait fades out; at 0 the body stands.
@@ -39,11 +45,13 @@ const FADE_MPS: f64 = 0.3;
 struct Instant([f64; 18]);
 
 /// One stride.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gait {
     instants: Vec<Instant>,
     /// Way of a stride in units of the leg.
     stride: f64,
+    /// About what the arms swing.
+    shoulders_rad: [f64; 2],
 }
 
 /// The joints of one frame: root and neck, then pairs (left, right) of hip, knee, ankle, toe, shoulder, elbow, wrist.
@@ -84,43 +92,49 @@ impl Gait {
         Ok(looped(&figures[first..=last]))
     }
 
-    /// How far a body with these legs gets in a stride.
+    /// How far a body with these legs gets in a stride that is as long for them as the recorded one.
     pub fn stride_m(&self, build: &Build) -> f64 {
         self.stride * (build.thigh_m() + build.shank_m())
     }
 
-    /// The body over `position_m`, `phase` strides after the loop's first frame.
-    pub fn pose(
+    /// The body over `position_m`, `phase` strides after the loop's first frame, as far as `own` makes the motion somebody
+    /// else's; who stands has turned the trunk by `twist_rad`.
+    pub(super) fn pose(
         &self,
         build: &Build,
+        own: &Individual,
         position_m: DVec2,
         heading_rad: f64,
         phase: f64,
         speed_mps: f64,
+        twist_rad: f64,
     ) -> Pose {
         let share = (speed_mps / FADE_MPS).min(1.0);
         let fade = share * share * (3.0 - 2.0 * share);
         let Instant(now) = self.at(phase);
         let leg_m = build.thigh_m() + build.shank_m();
         let upper = UpperBody {
-            pelvis_forward_m: fade * leg_m * now[0],
-            pelvis_left_m: fade * leg_m * now[1],
-            pelvis_yaw_rad: fade * now[2],
-            pelvis_list_rad: fade * now[3],
-            tilt_rad: fade * now[4],
-            thorax_yaw_rad: fade * now[5],
-            shoulder_rad: [fade * now[6], fade * now[7]],
-            elbow_rad: [fade * now[8], fade * now[9]],
-            arm_spread_rad: [0.0; 2],
+            pelvis_forward_m: fade * leg_m * own.sway * now[0],
+            pelvis_left_m: fade * leg_m * own.sway * now[1],
+            pelvis_yaw_rad: fade * own.pelvis_turn * now[2],
+            pelvis_list_rad: fade * own.pelvis_list * now[3],
+            tilt_rad: fade * now[4] + own.lean_rad,
+            thorax_yaw_rad: fade * own.thorax_turn * now[5] + twist_rad,
+            shoulder_rad: [0, 1].map(|arm| {
+                let middle_rad = self.shoulders_rad[arm];
+                fade * (middle_rad + own.arm_swing[arm] * (now[6 + arm] - middle_rad))
+            }),
+            elbow_rad: [0, 1].map(|arm| fade * above_zero(now[8 + arm] + own.elbow_rad[arm])),
+            arm_spread_rad: own.arm_spread_rad,
         };
         let level = PelvisPose::new(position_m, heading_rad, &upper, 0.0);
         let facing = DMat3::from_rotation_z(heading_rad);
-        let rest = feet::at_rest(build, &Individual::MEAN);
+        let rest = feet::at_rest(build, own);
         let mut lowest_m = f64::INFINITY;
         let feet: [FootPose; 2] = std::array::from_fn(|i| {
             let side = if i == 0 { 1.0 } else { -1.0 };
             let hip = DVec3::new(0.0, side * build.hip_offset_m(), build.hip_height_m() - 0.006);
-            let recorded = leg_m * DVec3::new(now[10 + 4 * i], now[11 + 4 * i], now[12 + 4 * i]);
+            let recorded = leg_m * DVec3::new(own.stride * now[10 + 4 * i], now[11 + 4 * i], now[12 + 4 * i]);
             let ankle = (rest[i].ankle_m - hip).lerp(recorded, fade).clamp_length_max(0.9998 * leg_m);
             let pitch_rad = fade * now[13 + 4 * i];
             let toe_pitch_rad = pitch_rad.max(0.0);
@@ -143,33 +157,66 @@ impl Gait {
     }
 }
 
-/// First and last frame of the stride at whose ends the limbs are most alike.
+/// First and last frame of the stride at whose ends the limbs are most alike. Where no brisk stride closes, a slower one may
+/// last longer.
 fn best_loop(frame_s: f64, figures: &[Figure]) -> Result<(usize, usize), Error> {
-    let [shortest, longest] = STRIDE_S.map(|seconds| (seconds / frame_s).round() as usize);
+    let [shortest, longest, slowest] =
+        [STRIDE_S[0], STRIDE_S[1], SLOW_STRIDE_S].map(|seconds| (seconds / frame_s).round() as usize);
     let way = |a: usize, b: usize| (figures[b].root - figures[a].root).truncate().length();
     let speed = |a: usize, b: usize| way(a, b) / (b - a) as f64;
-    let ends =
-        |a: usize| (a + shortest..=a + longest).take_while(|&b| b < figures.len()).map(move |b| (a, b));
-    let fastest = (0..figures.len()).flat_map(ends).map(|(a, b)| speed(a, b)).fold(0.0, f64::max);
-    if fastest == 0.0 {
+    let ends = |a: usize, longest: usize| {
+        (a + shortest..=a + longest).take_while(|&b| b < figures.len()).map(move |b| (a, b))
+    };
+    // Who walks sideways or turns about is no model of a walk ahead.
+    let goes_ahead = |&(a, b): &(usize, usize)| {
+        let way = (figures[b].root - figures[a].root).truncate().normalize_or_zero();
+        [a, (a + b) / 2, b].iter().all(|&k| way.dot(facing(&figures[k])) > AHEAD)
+    };
+    let all = |longest: usize| (0..figures.len()).flat_map(move |a| ends(a, longest));
+    let fastest = all(longest).filter(goes_ahead).map(|(a, b)| speed(a, b)).fold(0.0, f64::max);
+    let moves = all(longest).any(|(a, b)| speed(a, b) > 0.0);
+    if !moves {
         let length_s = frame_s * figures.len() as f64;
         return Err(Error::new(format!(
             "expected a walk of {} s or longer, found {length_s} s without a step",
             STRIDE_S[0]
         )));
     }
+    // Limbs as the body has them, wherever it looks: a walk may turn.
+    let own = |f: &Figure| {
+        let turn = DMat3::from_rotation_z(-facing(f).to_angle());
+        f.pairs.map(|pair| pair.map(|joint| turn * (joint - f.root)))
+    };
+    let limbs: Vec<_> = figures.iter().map(own).collect();
     let apart = |a: usize, b: usize| -> f64 {
-        let limbs = |f: &Figure| f.pairs.map(|pair| pair.map(|joint| joint - f.root));
-        let (a, b) = (limbs(&figures[a]), limbs(&figures[b]));
-        a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a.distance_squared(*b)).sum()
+        let pairs = limbs[a].as_flattened().iter().zip(limbs[b].as_flattened());
+        pairs.map(|(a, b)| a.distance_squared(*b)).sum()
     };
     // Both the places and how they change shall meet.
     let cost = |&(a, b): &(usize, usize)| {
         apart(a, b) + apart(a + shortest / 8, (b + shortest / 8).min(figures.len() - 1))
     };
-    let brisk = (0..figures.len()).flat_map(ends).filter(|&(a, b)| speed(a, b) >= BRISK * fastest);
-    let best = brisk.map(|pair| (cost(&pair), pair)).min_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(best.map_or((0, figures.len() - 1), |(_, pair)| pair))
+    let best = |longest: usize| {
+        let brisk = all(longest).filter(|&(a, b)| speed(a, b) >= BRISK * fastest).filter(goes_ahead);
+        brisk.map(|pair| (cost(&pair), pair)).min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let within = best(longest);
+    let closed = within.is_some_and(|(cost, _)| cost < CLOSED * legs(&figures[0]).powi(2));
+    let found = if closed { within } else { best(slowest) };
+    let found = found.ok_or_else(|| Error::new("expected somebody who walks ahead, found nobody"))?;
+    Ok(found.1)
+}
+
+/// Where the pelvis of a figure faces, seen from above.
+fn facing(figure: &Figure) -> DVec2 {
+    let [left, right] = figure.pairs[0];
+    -(left - right).truncate().perp().normalize_or_zero()
+}
+
+/// How long the legs of a figure are on the mean.
+fn legs(figure: &Figure) -> f64 {
+    let [hip, knee, ankle] = [figure.pairs[0], figure.pairs[1], figure.pairs[2]];
+    (0..2).map(|i| hip[i].distance(knee[i]) + knee[i].distance(ankle[i])).sum::<f64>() / 2.0
 }
 
 /// The frames of a stride in the body's frame, the gap between its ends spread over it.
@@ -178,10 +225,6 @@ fn looped(figures: &[Figure]) -> Gait {
     let way = (last.root - first.root).truncate();
     let turn = DMat3::from_rotation_z(-way.to_angle());
     let steps = (figures.len() - 1) as f64;
-    let legs = |f: &Figure| {
-        let [hip, knee, ankle] = [f.pairs[0], f.pairs[1], f.pairs[2]];
-        (0..2).map(|i| hip[i].distance(knee[i]) + knee[i].distance(ankle[i])).sum::<f64>() / 2.0
-    };
     let leg = legs(first);
     let flat = flat_foot(figures);
     let mut instants: Vec<Instant> = figures
@@ -199,7 +242,9 @@ fn looped(figures: &[Figure]) -> Gait {
         }
     }
     instants.pop();
-    Gait { instants, stride: way.length() / leg }
+    let mean = |value: usize| instants.iter().map(|i| i.0[value]).sum::<f64>() / instants.len() as f64;
+    let shoulders_rad = [mean(6), mean(7)];
+    Gait { instants, stride: way.length() / leg, shoulders_rad }
 }
 
 /// How far toes point down while the foot is flat: the middle value of the frames in which its ankle is low.
@@ -317,8 +362,9 @@ mod tests {
     fn a_walker_with_a_recorded_gait_stays_on_the_floor_and_keeps_its_pace() {
         let gait = Gait::new(0.01, &names(), &clip(0.3)).unwrap();
         let walker = walker(gait.clone());
+        let own = Individual::draw(4, walker.build.male);
         let strides = walker.walk.at(4_000_000_000).phase - walker.walk.at(1_000_000_000).phase;
-        assert!((strides * gait.stride_m(&walker.build) - 3.6).abs() < 0.01, "{strides}");
+        assert!((strides * own.stride * gait.stride_m(&walker.build) - 3.6).abs() < 0.01, "{strides}");
         let mut mesh = Vec::new();
         for i in 0..490 {
             assert!(walker.mesh_at(i * 10_000_000, &mut mesh));
@@ -337,5 +383,14 @@ mod tests {
         };
         assert!(refused(&names()[1..], &clip(0.3)).contains("expected a joint Hips"));
         assert!(refused(&names(), &clip(0.3)[..50]).contains("found 0.5 s without a step"));
+        let sideways: Vec<Vec<[f64; 3]>> =
+            clip(0.3).iter().map(|frame| frame.iter().map(|&[x, y, z]| [-z, y, x]).collect()).collect();
+        assert!(Gait::new(0.01, &names(), &sideways).is_ok(), "whole bodies turned walk ahead still");
+        let ahead = |k: usize| 4.0 * 0.8 * 0.3_f64.sin() * k as f64 / 100.0;
+        let backward = clip(0.3).into_iter().enumerate();
+        let backward =
+            backward.map(|(k, frame)| frame.iter().map(|&[x, y, z]| [x, y, z - 2.0 * ahead(k)]).collect());
+        let backward: Vec<Vec<[f64; 3]>> = backward.collect();
+        assert!(refused(&names(), &backward).contains("walks ahead, found nobody"));
     }
 }

@@ -2,11 +2,13 @@
 //! overlap at the joints, each carried by one bone or bent between two.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use umbracast::geometry::DVec3;
 
 use super::build::{ANKLE_SHARE, BALL_SHARE, Build};
 use super::loft::{self, Along, Ring, rounded, smooth};
+use super::meshes::Skin;
 use super::skeleton::Bone;
 
 /// One closed surface, carried by one bone or bent between two.
@@ -25,7 +27,12 @@ pub enum Form {
     Loft(Along, Vec<Ring>, usize),
     /// A wheel's rim and tyre about an axle along y: middle, radius to the middle of the tyre, half its width.
     Hoop(DVec3, f64, f64),
+    /// Vertices and triangles as they are.
+    Ready(Vec<DVec3>, Vec<[u32; 3]>),
 }
+
+/// By so much what is carried may go farther from the axis than at rest.
+const SWAYS_M: f64 = 0.15;
 
 /// What every mesh of a body has in common.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -37,33 +44,55 @@ pub struct Surface {
 }
 
 /// One body at rest.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shape {
     /// Rest position and how far the vertex follows the part's second bone, part after part.
     vertices: Vec<(DVec3, f64)>,
     bones: Vec<[Bone; 2]>,
+    /// In place of a body's parts, with vertices before all others.
+    skin: Option<Arc<Skin>>,
     surface: Surface,
 }
 
 impl Shape {
     /// Lofts the body of a build, and what the person has.
     pub fn new(build: &Build, things: Vec<Part>) -> Self {
-        let mut shape =
-            Self { vertices: Vec::with_capacity(2200), bones: Vec::new(), surface: Surface::default() };
+        let mut shape = Self::default();
         body(build).into_iter().chain(things).for_each(|part| shape.add(part));
+        shape
+    }
+
+    /// Somebody else's body, and what the person has.
+    pub fn of_skin(skin: Arc<Skin>, things: Vec<Part>) -> Self {
+        let mut shape = Self { surface: skin.surface.clone(), skin: Some(skin), ..Self::default() };
+        things.into_iter().for_each(|part| shape.add(part));
         shape
     }
 
     /// Moves every vertex with its bones; `posed(bone, rest)` says where a point of a bone comes to lie.
     pub fn skin(&self, posed: impl Fn(Bone, DVec3) -> DVec3, out: &mut Vec<DVec3>) {
         out.clear();
-        for ([first, second], (range, _)) in self.bones.iter().zip(&self.surface.parts) {
-            out.extend(self.vertices[range.clone()].iter().map(|&(rest, share)| match share {
-                0.0 => posed(*first, rest),
-                1.0 => posed(*second, rest),
-                _ => posed(*first, rest).lerp(posed(*second, rest), share),
-            }));
+        let mut parts = self.surface.parts.as_slice();
+        if let Some(skin) = &self.skin {
+            skin.posed(&posed, out);
+            parts = &parts[skin.surface.parts.len()..];
         }
+        let before = out.len();
+        for ([first, second], (range, _)) in self.bones.iter().zip(parts) {
+            out.extend(self.vertices[range.start - before..range.end - before].iter().map(
+                |&(rest, share)| match share {
+                    0.0 => posed(*first, rest),
+                    1.0 => posed(*second, rest),
+                    _ => posed(*first, rest).lerp(posed(*second, rest), share),
+                },
+            ));
+        }
+    }
+
+    /// How far from the body axis anything may be that follows trunk or ground: more than what is carried is at rest.
+    pub fn reach_m(&self) -> f64 {
+        let far = self.vertices.iter().map(|(at, _)| at.truncate().length()).fold(0.0, f64::max);
+        far + SWAYS_M
     }
 
     /// How the vertices hang together.
@@ -72,7 +101,8 @@ impl Shape {
     }
 
     fn add(&mut self, part: Part) {
-        let (from, first) = (self.vertices.len(), self.surface.triangles.len());
+        let before = self.skin.as_ref().map_or(0, |skin| skin.vertices());
+        let (from, first) = (before + self.vertices.len(), self.surface.triangles.len());
         match part.form {
             Form::Loft(along, mut rings, points) => {
                 // Limbs are listed from the top; rings are stacked upward.
@@ -83,11 +113,22 @@ impl Shape {
                 loft::triangles(rings.len(), points, from, &mut self.surface.triangles);
             }
             Form::Hoop(middle_m, radius_m, half_m) => {
-                loft::hoop(middle_m, radius_m, half_m, &mut self.vertices, &mut self.surface.triangles);
+                loft::hoop(
+                    middle_m,
+                    radius_m,
+                    half_m,
+                    before,
+                    &mut self.vertices,
+                    &mut self.surface.triangles,
+                );
+            }
+            Form::Ready(vertices, triangles) => {
+                self.vertices.extend(vertices.into_iter().map(|at| (at, 0.0)));
+                self.surface.triangles.extend(triangles.iter().map(|t| t.map(|corner| from as u32 + corner)));
             }
         }
         self.bones.push(part.bones);
-        self.surface.parts.push((from..self.vertices.len(), first..self.surface.triangles.len()));
+        self.surface.parts.push((from..before + self.vertices.len(), first..self.surface.triangles.len()));
     }
 }
 

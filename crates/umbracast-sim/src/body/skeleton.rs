@@ -24,9 +24,32 @@ pub enum Bone {
     FootRight,
     ToesLeft,
     ToesRight,
+    /// No bone: the ground below the body axis, turned as the body looks. What rolls follows it.
+    Ground,
 }
 
-/// How many bones.
+impl Bone {
+    /// Those of the body, in the order of their numbers.
+    pub const ALL: [Self; BONES] = [
+        Self::Pelvis,
+        Self::Thorax,
+        Self::Head,
+        Self::UpperArmLeft,
+        Self::UpperArmRight,
+        Self::ForearmLeft,
+        Self::ForearmRight,
+        Self::ThighLeft,
+        Self::ThighRight,
+        Self::ShankLeft,
+        Self::ShankRight,
+        Self::FootLeft,
+        Self::FootRight,
+        Self::ToesLeft,
+        Self::ToesRight,
+    ];
+}
+
+/// How many bones a body has.
 pub const BONES: usize = 15;
 
 /// The motion of one bone: takes its points at rest to the site.
@@ -111,7 +134,8 @@ pub type Holds = [Option<Hold>; 2];
 /// Every bone's motion at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    bones: [Motion; BONES],
+    /// The ground comes last.
+    bones: [Motion; BONES + 1],
 }
 
 impl Pose {
@@ -130,13 +154,17 @@ impl Pose {
         let facing = DMat3::from_rotation_z(heading_rad);
         let thorax_turn =
             facing * DMat3::from_rotation_z(upper.thorax_yaw_rad) * DMat3::from_rotation_y(upper.tilt_rad);
-        let waist_rest = DVec3::new(0.0, 0.0, build.level_m(0.60));
+        let waist_rest = DVec3::new(0.0, 0.0, build.waist_height_m());
         let thorax = Motion::about(thorax_turn, waist_rest, pelvis_motion.point(waist_rest));
-        let neck_rest = DVec3::new(-0.01, 0.0, build.level_m(0.85));
+        let neck_rest = DVec3::new(-0.01, 0.0, build.neck_height_m());
         // The head looks ahead and stays upright.
         let head = Motion::about(facing, neck_rest, thorax.point(neck_rest));
 
-        let mut bones = [pelvis_motion; BONES];
+        let mut bones = [pelvis_motion; BONES + 1];
+        let sway =
+            DVec2::from_angle(heading_rad).rotate(DVec2::new(upper.pelvis_forward_m, upper.pelvis_left_m));
+        let axis_m = (pelvis.hips_m.truncate() - sway).extend(0.0);
+        bones[Bone::Ground as usize] = Motion::about(facing, DVec3::ZERO, axis_m);
         bones[Bone::Thorax as usize] = thorax;
         bones[Bone::Head as usize] = head;
         for (i, side) in [1.0, -1.0].into_iter().enumerate() {

@@ -8,6 +8,7 @@ use rand::RngExt;
 use umbracast::geometry::{DVec2, DVec3};
 
 use super::build::Build;
+use super::carried;
 use super::kind::Kind;
 use super::shape::{Form, Part, case};
 use super::skeleton::{Bone, FootPose, Hold, Holds};
@@ -42,10 +43,11 @@ pub fn of(kind: Kind, build: &Build, seed: u64) -> Things {
             Things { holds: [1.0, -1.0].map(|side| Some(in_pocket(build, side))), ..Things::default() }
         }
         Kind::Wheelchair => wheelchair(build),
+        _ => carried::of(kind, build, side, rng),
     }
 }
 
-fn backpack(b: &Build) -> Part {
+pub(super) fn backpack(b: &Build) -> Part {
     // 2 cm into the back, which is not flat.
     let middle = DVec3::new(-(b.chest_m[1] / 2.0 + 0.07), 0.0, b.level_m(0.70));
     case(Bone::Thorax, middle, DVec3::new(0.18, 0.30, 0.45))

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::site::{Hall, Ue};
 
@@ -11,15 +11,19 @@ use super::build::Build;
 use super::gestures::Gestures;
 use super::individual::Individual;
 use super::kind::Kind;
+use super::meshes::Meshes;
 use super::recorded::Gait;
 use super::shape::{Shape, Surface};
 use super::sitting::Sitting;
 use super::skeleton::{Holds, PelvisPose, Pose};
+use super::things::Things;
 use super::walk::{self, Instant, Walk};
-use super::{device, feet, gait, things};
+use super::{carried, device, feet, gait, things};
 use crate::crowd::Trajectory;
 use crate::random::stream;
 
+/// Of a person of 2 m.
+const ARM_SPAN_M: f64 = 2.0;
 /// A body climbs from one level to the next over so much of its way, before the edge and behind it.
 const CLIMB_M: f64 = 0.3;
 
@@ -74,11 +78,23 @@ impl Walker {
 
     /// The same for a kind of body. Children have heights of their own.
     pub fn of_kind(trajectory: Trajectory, seed: u64, kind: Kind) -> Self {
-        let build = match kind {
-            Kind::Child => Build::draw_child(seed),
-            _ => Build::draw(seed, trajectory.height_m),
+        Self::of_meshes(trajectory, seed, kind, None)
+    }
+
+    /// The same with a body out of these meshes. Children have bodies of our own.
+    pub fn of_meshes(trajectory: Trajectory, seed: u64, kind: Kind, meshes: Option<&Meshes>) -> Self {
+        let (build, skin) = match (kind, meshes) {
+            (Kind::Child, _) => (Build::draw_child(seed), None),
+            (_, None) => (Build::draw(seed, trajectory.height_m), None),
+            (_, Some(meshes)) => {
+                let (build, skin) = meshes.draw(seed, trajectory.height_m);
+                (build, Some(skin))
+            }
         };
-        let things = things::of(kind, &build, seed);
+        let things = match kind {
+            Kind::Pushed => pushed(seed),
+            _ => things::of(kind, &build, seed),
+        };
         let first_phase: f64 = stream(seed, "phase", 0).random();
         // Feet of who sits stay where they are.
         let faces = (kind != Kind::Sitting).then_some(seed);
@@ -91,7 +107,10 @@ impl Walker {
         };
         let pelvis = PelvisPose::new(DVec2::ZERO, 0.0, &still, hips_m);
         let upright = Pose::new(&build, 0.0, &still, &pelvis, &feet, &things.holds);
-        let shape = Shape::new(&build, things.parts);
+        let shape = match skin {
+            None => Shape::new(&build, things.parts),
+            Some(skin) => Shape::of_skin(skin, things.parts),
+        };
         Self {
             shape,
             trajectory,
@@ -113,7 +132,7 @@ impl Walker {
     /// The same body, moving as somebody who was recorded.
     #[must_use]
     pub fn with_gait(mut self, gait: Arc<Gait>) -> Self {
-        self.walk.keep_pace(gait.stride_m(&self.build));
+        self.walk.keep_pace(self.own.stride * gait.stride_m(&self.build));
         self.gait = Some(gait);
         self
     }
@@ -189,6 +208,11 @@ impl Walker {
         }
     }
 
+    /// No vertex of any mesh of this walker is farther from the body axis: arms stretched out, or what the person pushes.
+    pub fn reach_m(&self) -> f64 {
+        self.shape.reach_m().max(ARM_SPAN_M / 2.0)
+    }
+
     /// How the vertices of every mesh that this walker makes hang together.
     pub fn surface(&self) -> &Surface {
         self.shape.surface()
@@ -201,8 +225,10 @@ impl Walker {
             return Some((self.seated(seat_m, &instant, &state), state));
         }
         if let Some(gait) = &self.gait {
-            let Instant { heading_rad, speed_mps, phase, .. } = instant;
-            return Some((gait.pose(&self.build, state.position_m, heading_rad, phase, speed_mps), state));
+            let Instant { heading_rad, speed_mps, phase, twist_rad, .. } = instant;
+            let (build, own, at_m) = (&self.build, &self.own, state.position_m);
+            let pose = gait.pose(build, own, at_m, heading_rad, phase, speed_mps, twist_rad);
+            return Some((pose, state));
         }
         let upper = walk::upper_body(&instant, &self.build, &self.own);
         let mut hips_m = instant.hip_height_m;
@@ -227,6 +253,23 @@ impl Walker {
         let feet = things::feet_on_rests(&self.build, state.position_m, heading_rad);
         Pose::new(&self.build, heading_rad, &still, &pelvis, &feet, &self.holds)
     }
+}
+
+/// Somebody in a wheelchair to be pushed, a body of our own.
+fn pushed(seed: u64) -> Things {
+    let way = Trajectory {
+        person: 0,
+        start_ns: 0,
+        step_ns: 1_000_000_000,
+        positions_m: vec![DVec2::ZERO; 2],
+        arrived_ns: None,
+        height_m: None,
+    };
+    let seated = Walker::of_kind(way, stream(seed, "pushed", 0).next_u64(), Kind::Wheelchair);
+    let mut vertices = Vec::new();
+    seated.upright_mesh(DVec2::ZERO, 0.0, &mut vertices);
+    let parts: Vec<_> = seated.surface().parts.iter().map(|(range, _)| range.clone()).collect();
+    carried::pushed(&vertices, &seated.surface().triangles, &parts)
 }
 
 /// How high the floor is below a body and how it rises, both on the mean along its way: so a step is climbed steadily.

@@ -23,6 +23,7 @@ pub fn circle_crossing(preset: Preset, people: usize, radius_m: f64, seed: u64) 
     match preset {
         Preset::Orca03 | Preset::Orca06 => {}
         Preset::Mixed => return mixed::crowd(people, radius_m, seed),
+        Preset::Natural => return mixed::natural(people, radius_m, seed),
         Preset::Pairs => return mixed::pairs(people.div_ceil(2), PAIR_GAP_M, radius_m, seed),
     }
     let (parameters, spacing_m) = setting(preset);
@@ -43,7 +44,9 @@ pub fn circle_crossing(preset: Preset, people: usize, radius_m: f64, seed: u64) 
 pub(super) fn setting(preset: Preset) -> (Parameters, f32) {
     match preset {
         Preset::Orca06 => (parameters(4.0, 4.0, 0.6, 1.5), 2.0),
-        Preset::Orca03 | Preset::Mixed | Preset::Pairs => (parameters(10.0, 5.0, 0.3, 1.0), 0.8),
+        Preset::Orca03 | Preset::Mixed | Preset::Natural | Preset::Pairs => {
+            (parameters(10.0, 5.0, 0.3, 1.0), 0.8)
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! site has places for that.
 
 use glam::Vec2;
-use rand::{Rng, RngExt};
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use umbracast::geometry::DVec2;
 
@@ -12,9 +12,11 @@ use super::crossing::{ARRIVED_M, MOST_STEPS, SAMPLE_STEPS, STEP_S};
 use super::floor::Floor;
 use super::mixed::{self, Row};
 use super::orca::{Agent, Orca, Parameters};
+use super::places::{ELBOW_M, drawn_apart, in_queue};
 use super::preset::Preset;
 use super::steering::Steering;
 use super::trajectory::{Crowd, STEP_NS, Trajectory};
+use super::whims::Whims;
 use crate::random::stream;
 
 /// After so many dropped scenes the last one stands, whatever its faults.
@@ -30,14 +32,10 @@ const STANDS_M: f32 = 0.8;
 /// How near those who leave, and those who queue, come to their goal.
 const LEAVES_M: f32 = 0.5;
 const QUEUES_M: f32 = 0.25;
-/// From body to body in a queue.
-const QUEUE_GAP_M: f32 = 0.8;
 /// Through one entrance people come one after the other.
 const ENTER_EVERY_S: f32 = 2.0;
 /// The slowest walk at this speed on the longest way.
 const SLOWEST_MPS: f32 = 0.5;
-/// Nobody's axis comes nearer to a wall or a thing.
-const ELBOW_M: f32 = 0.2;
 
 /// Free floor for one who walks, square metres: below it ORCA's discs stand still.
 const FLOOR_EACH_M2: f32 = 1.5;
@@ -52,6 +50,7 @@ struct Party {
     start: Vec2,
     enters: bool,
     legs: Vec<Leg>,
+    whims: Option<Whims>,
 }
 
 #[derive(Clone, Copy)]
@@ -70,6 +69,7 @@ struct Walk {
     steering: Steering,
     stands_until_s: f32,
     row: Row,
+    whims: Option<Whims>,
     arrived_ns: Option<i64>,
     first_step: usize,
     /// By member.
@@ -98,11 +98,11 @@ pub(super) fn crowd(preset: Preset, people: usize, floor: &Floor, seed: u64) -> 
 }
 
 fn parties(preset: Preset, people: usize, floor: &Floor, rng: &mut Pcg64) -> Vec<Party> {
-    let lively = matches!(preset, Preset::Mixed | Preset::Pairs);
+    let lively = matches!(preset, Preset::Mixed | Preset::Natural | Preset::Pairs);
     let sizes = match preset {
         Preset::Orca03 | Preset::Orca06 => vec![(1, 0.0); people],
         Preset::Pairs => vec![(2, PAIR_GAP_M); people.div_ceil(2)],
-        Preset::Mixed => mixed::sizes(people, rng),
+        Preset::Mixed | Preset::Natural => mixed::sizes(people, rng),
     };
     let (plain, spacing_m) = setting(preset);
     let disc_m = |members: usize, gap_m: f64| match lively {
@@ -153,7 +153,7 @@ fn parties(preset: Preset, people: usize, floor: &Floor, rng: &mut Pcg64) -> Vec
             }
         };
         let mut legs = vec![goal];
-        if preset == Preset::Mixed && rng.random_bool(mixed::STOPPING) {
+        if matches!(preset, Preset::Mixed | Preset::Natural) && rng.random_bool(mixed::STOPPING) {
             let stop_s = rng.random_range(mixed::STOP_S);
             let (at, near_m) = match queue.len() {
                 0 => {
@@ -179,41 +179,20 @@ fn parties(preset: Preset, people: usize, floor: &Floor, rng: &mut Pcg64) -> Vec
             false => parameters,
         };
         let enters = door.is_some();
-        parties.push(Party { members, gap_m, parameters, preferred_mps, start_s, start, enters, legs });
+        let whims = (preset == Preset::Natural).then(|| Whims::new(Pcg64::seed_from_u64(rng.random())));
+        parties.push(Party {
+            members,
+            gap_m,
+            parameters,
+            preferred_mps,
+            start_s,
+            start,
+            enters,
+            legs,
+            whims,
+        });
     }
     parties
-}
-
-/// One of `places` that is so far from `others`; nearer where there is no room.
-pub(super) fn drawn_apart(
-    places: &[Vec2],
-    others: &[Vec2],
-    apart_m: f32,
-    wanted: impl Fn(Vec2) -> bool,
-    rng: &mut impl Rng,
-) -> Vec2 {
-    let (mut shrink, mut refused) = (1.0, 0);
-    while !places.is_empty() {
-        let at = places[rng.random_range(0..places.len())];
-        if wanted(at) && others.iter().all(|other| other.distance(at) >= shrink * apart_m) {
-            return at;
-        }
-        refused += 1;
-        if refused % 1000 == 0 {
-            shrink *= 0.9;
-        }
-    }
-    Vec2::ZERO
-}
-
-/// Where the one with so many before him stands: in the direction that has room for most.
-fn in_queue(floor: &Floor, place: Vec2, before: usize) -> Vec2 {
-    let along = |turn: usize, k: usize| {
-        place + Vec2::from_angle(turn as f32 * std::f32::consts::FRAC_PI_4) * (QUEUE_GAP_M * k as f32)
-    };
-    let room = |turn: usize| (1..10).take_while(|&k| floor.clear_at(along(turn, k)) > 2.0 * ELBOW_M).count();
-    let turn = (0..8).max_by_key(|&turn| (room(turn), std::cmp::Reverse(turn))).unwrap_or_default();
-    along(turn, before.min(room(turn)))
 }
 
 /// Everybody's way, and whose party each person is of.
@@ -245,7 +224,11 @@ fn walk(parties: &[Party], floor: &Floor) -> (Crowd, Vec<usize>) {
         let mut gone = Vec::new();
         for (a, &i) in party_of_agent.iter().enumerate() {
             let (party, walk, agent) = (&parties[i], &mut walks[i], &mut orca.agents[a]);
-            agent.preferred_mps = walk.prefer(party, floor, agent.position_m, steps);
+            let preferred_mps = walk.prefer(party, floor, agent.position_m, steps);
+            agent.preferred_mps = match &mut walk.whims {
+                Some(whims) => whims.change(preferred_mps, now_s),
+                None => preferred_mps,
+            };
             walk.row.turn(agent.velocity_mps);
             let places = walk.row.places(agent.position_m, party.members, party.gap_m);
             places.zip(&mut walk.positions).for_each(|(place_m, way)| way.push(place_m));
@@ -290,6 +273,7 @@ impl Walk {
             stands_until_s: if party.enters { 0.0 } else { party.start_s },
             row: Row::facing(steering.first() - party.start),
             steering,
+            whims: party.whims.clone(),
             arrived_ns: None,
             first_step: 0,
             positions: vec![Vec::new(); party.members],

@@ -12,6 +12,7 @@ use umbracast::geometry::DVec2;
 use super::crossing::{ARRIVED_M, MOST_ATTEMPTS, MOST_STEPS, SAMPLE_STEPS, STEP_S, parameters, scatter};
 use super::orca::{Agent, Orca, Parameters};
 use super::trajectory::{Crowd, STEP_NS, Trajectory};
+use super::whims::Whims;
 use crate::random::stream;
 
 /// Preferred walking speeds of adults: mean, standard deviation, and the limits outside which none is drawn
@@ -67,6 +68,7 @@ struct Walk {
     stands_until_s: f32,
     row: Row,
     arrived_ns: Option<i64>,
+    whims: Option<Whims>,
 }
 
 /// How a party stands: in a row across its way.
@@ -80,7 +82,12 @@ pub(super) struct Row {
 /// A mixed crowd that crosses a circle. Scenes are dropped and drawn anew as in [`super::circle_crossing`],
 /// and when strangers come too close; turns are as sharp as people make them.
 pub fn crowd(people: usize, radius_m: f64, seed: u64) -> Crowd {
-    first_acceptable(radius_m, seed, |rng| sizes(people, rng))
+    first_acceptable(radius_m, seed, false, |rng| sizes(people, rng))
+}
+
+/// The same, whose people wander, slow down and stop (see `whims`).
+pub fn natural(people: usize, radius_m: f64, seed: u64) -> Crowd {
+    first_acceptable(radius_m, seed, true, |rng| sizes(people, rng))
 }
 
 /// Members and gap of each party.
@@ -109,13 +116,14 @@ pub(super) fn preferred_mps(members: usize, rng: &mut impl Rng) -> f32 {
 
 /// The same, of nothing but pairs whose body axes are `gap_m` apart.
 pub fn pairs(pairs: usize, gap_m: f64, radius_m: f64, seed: u64) -> Crowd {
-    first_acceptable(radius_m, seed, |_| vec![(2, gap_m); pairs])
+    first_acceptable(radius_m, seed, false, |_| vec![(2, gap_m); pairs])
 }
 
-/// Draws scenes until one will do. `sizes` gives each party's members and gap.
+/// Draws scenes until one will do, of people with whims or without. `sizes` gives each party's members and gap.
 fn first_acceptable(
     radius_m: f64,
     seed: u64,
+    with_whims: bool,
     mut sizes: impl FnMut(&mut dyn Rng) -> Vec<(usize, f64)>,
 ) -> Crowd {
     let mut attempt = 0;
@@ -124,7 +132,10 @@ fn first_acceptable(
         let discs: Vec<f32> = sizes.iter().map(|&(members, gap_m)| disc_m(members, gap_m)).collect();
         let starts = starts(&discs, radius_m as f32, &mut stream(seed, "mixed starts", attempt));
         let parties = parties(&sizes, &discs, &starts, radius_m as f32, seed, attempt);
-        let crowd = walk(&parties, &starts);
+        let whims = |party: usize| {
+            with_whims.then(|| Whims::new(stream(seed, "whims", attempt << 32 | party as u64)))
+        };
+        let crowd = walk(&parties, &starts, whims);
         attempt += 1;
         if acceptable(&crowd, &parties) || attempt == MOST_ATTEMPTS {
             return crowd;
@@ -190,7 +201,7 @@ fn parties(
         .collect()
 }
 
-fn walk(parties: &[Party], starts: &[Vec2]) -> Crowd {
+fn walk(parties: &[Party], starts: &[Vec2], whims: impl Fn(usize) -> Option<Whims>) -> Crowd {
     let agents = parties.iter().zip(starts).map(|(party, &start)| {
         let parameters = Parameters {
             max_acceleration_mps2: MOST_ACCELERATION_MPS2,
@@ -202,11 +213,13 @@ fn walk(parties: &[Party], starts: &[Vec2]) -> Crowd {
     let mut walks: Vec<Walk> = parties
         .iter()
         .zip(starts)
-        .map(|(party, &start)| Walk {
+        .enumerate()
+        .map(|(number, (party, &start))| Walk {
             leg: 0,
             stands_until_s: party.start_s,
             row: Row::facing(party.legs[0].0 - start),
             arrived_ns: None,
+            whims: whims(number),
         })
         .collect();
     let mut positions: Vec<Vec<DVec2>> = vec![Vec::new(); parties.iter().map(|p| p.members).sum()];
@@ -214,7 +227,11 @@ fn walk(parties: &[Party], starts: &[Vec2]) -> Crowd {
     loop {
         let mut person = 0;
         for ((party, walk), agent) in parties.iter().zip(&mut walks).zip(&mut orca.agents) {
-            agent.preferred_mps = walk.prefer(party, agent.position_m, steps);
+            let preferred_mps = walk.prefer(party, agent.position_m, steps);
+            agent.preferred_mps = match &mut walk.whims {
+                Some(whims) => whims.change(preferred_mps, steps as f32 * STEP_S),
+                None => preferred_mps,
+            };
             walk.row.turn(agent.velocity_mps);
             for place_m in walk.row.places(agent.position_m, party.members, party.gap_m) {
                 positions[person].push(place_m);

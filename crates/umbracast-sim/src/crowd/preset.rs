@@ -13,13 +13,15 @@ pub enum Preset {
     Orca06,
     /// Speeds, starts, stops, turns and groups.
     Mixed,
-    /// The same walks, everybody in a pair whose body axes are 0.5 m apart; an odd number is rounded up.
+    /// The same, and nobody's way is straight and even: people wander, slow down and stop as recorded ones do.
+    Natural,
+    /// The walks of a mixed crowd, everybody in a pair whose body axes are 0.5 m apart; an odd number is rounded up.
     Pairs,
 }
 
 impl Preset {
     /// All of them, in the order of every table.
-    pub const ALL: [Self; 4] = [Self::Orca03, Self::Orca06, Self::Mixed, Self::Pairs];
+    pub const ALL: [Self; 5] = [Self::Orca03, Self::Orca06, Self::Mixed, Self::Natural, Self::Pairs];
 
     /// As it is written on the command line and in tables.
     pub fn name(self) -> &'static str {
@@ -27,6 +29,7 @@ impl Preset {
             Self::Orca03 => "orca-03",
             Self::Orca06 => "orca-06",
             Self::Mixed => "mixed",
+            Self::Natural => "natural",
             Self::Pairs => "pairs",
         }
     }

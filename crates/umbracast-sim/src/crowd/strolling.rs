@@ -11,8 +11,9 @@ use super::circle::setting;
 use super::crossing::{ARRIVED_M, STEP_S, scatter};
 use super::floor::Floor;
 use super::ground::Ground;
-use super::indoors::{ASIDE_M, THINGS_S, drawn_apart};
+use super::indoors::{ASIDE_M, THINGS_S};
 use super::orca::{Agent, Orca, Parameters};
+use super::places::drawn_apart;
 use super::preset::Preset;
 use super::steering::Steering;
 use super::trajectory::{Crowd, STEP_NS, Trajectory};
@@ -44,7 +45,7 @@ enum Walks {
 
 impl Stroll {
     /// Everybody walks across the circle, and on arrival to another point of it; on a floor from place to place. Nobody
-    /// ever arrives for good. Spacing and manners are those of the preset; a mixed crowd or pairs stroll like `orca-03`.
+    /// ever arrives for good. Spacing and manners are those of the preset; mixed and natural crowds and pairs stroll like `orca-03`.
     pub fn new(preset: Preset, people: usize, ground: &Ground, seed: u64) -> Self {
         let (mut parameters, spacing_m) = setting(preset);
         parameters.max_speed_mps = parameters.max_speed_mps.max(PREFERRED_MPS.end);

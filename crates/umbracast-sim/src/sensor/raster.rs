@@ -10,8 +10,6 @@ use super::head::Head;
 use super::view::View;
 use crate::body::Walker;
 
-/// No part of a body is farther from its axis: half the arm span of a person of 2 m.
-const REACH_M: f64 = 1.0;
 /// Limbs move evenly for so long: at 100 m/s2 (a swinging foot) a path bends by 0.3 mm in 5 ms.
 const EVEN_MOTION_NS: i64 = 5_000_000;
 /// How far a reported azimuth may lie from the true one: rounded in the packet, in its rate and by the decoder.
@@ -132,7 +130,7 @@ impl Painter {
             let foot = self.sensor_from_site.point(state.position_m.extend(state.floor_m)).truncate();
             let top_m = state.floor_m + state.height_m;
             let head = self.sensor_from_site.point(state.position_m.extend(top_m)).truncate();
-            let reach_m = REACH_M + self.aside_m;
+            let reach_m = walker.reach_m() + self.aside_m;
             if distance_to_segment(foot, head) <= reach_m {
                 return Some((0.0, 18_000.0));
             }
