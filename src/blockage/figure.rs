@@ -108,8 +108,11 @@ impl Figure {
         }
         (self.outline_m, self.of_height_m) = (*outline_m, height_m);
         self.slices.clone_from(&usual.slices);
+        let mut bottom = 0.0;
         for slice in &mut self.slices {
-            let level = LEVEL_TOPS.iter().position(|top| slice.top <= *top).unwrap_or(LEVELS - 1);
+            let middle = 0.5 * (bottom + slice.top);
+            bottom = slice.top;
+            let level = LEVEL_TOPS.iter().position(|top| middle < *top).unwrap_or(LEVELS - 1);
             let [ahead, _, round, oblong] = outline_m[level].map(|m| m / height_m);
             slice.ahead += ahead;
             slice.half_depth = (slice.half_depth + round + oblong).max(THINNEST * slice.half_depth);

