@@ -33,9 +33,7 @@ pub enum Mechanism {
     LimbPhase,
     /// Stage 1: how tall a person is; plainest: as tall as adults on the mean.
     Height,
-    /// Stage 1: how wide a body is; plainest: as wide as usual.
-    BodyWidth,
-    /// The outline of each body, learned by watching.
+    /// Stage 1: the outline of each body, learned by watching; plainest: a usual one.
     Outline,
     /// Stage 1: children and people who sit.
     ChildrenAndSeated,
@@ -57,7 +55,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All, in the order of the data.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 19] = [
         Self::RangeModel,
         Self::CountTest,
         Self::GuidedAssignment,
@@ -68,7 +66,6 @@ impl Mechanism {
         Self::Sway,
         Self::LimbPhase,
         Self::Height,
-        Self::BodyWidth,
         Self::Outline,
         Self::ChildrenAndSeated,
         Self::Residual,
@@ -100,7 +97,6 @@ impl Mechanism {
             | Self::Sway
             | Self::LimbPhase
             | Self::Height
-            | Self::BodyWidth
             | Self::Outline => &["track"],
             Self::ResidualDeparture | Self::ResidualNeighbours => &["forecast"],
             Self::Arms | Self::ArmSwing | Self::TrunkSway | Self::JointSampling => &["blockage"],
@@ -124,7 +120,6 @@ impl Mechanism {
             Self::Sway => "sway",
             Self::LimbPhase => "limb-phase",
             Self::Height => "height",
-            Self::BodyWidth => "body-width",
             Self::Outline => "outline",
             Self::ChildrenAndSeated => "children-and-seated",
             Self::Residual => "residual",

@@ -5,7 +5,7 @@ use super::axis::{AxisModel, Network};
 use super::evidence::FULL_BODY_TOP_M;
 use super::features::{AxisFeatures, Seen};
 use super::limbs::LimbCovariance;
-use super::outline::reaches;
+use super::outline::{Reach, reaches};
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
 use crate::config::{DetectConfig, Mechanism, PositionMethod};
@@ -88,6 +88,8 @@ pub struct Measurer {
     axis: Network,
     /// A person's points, moved.
     seen: Vec<Seen>,
+    /// Memory of the last frame's detections.
+    spare: Vec<Vec<Reach>>,
 }
 
 impl Measurer {
@@ -110,6 +112,7 @@ impl Measurer {
             hall: site.hall.clone(),
             axis: Network::of(AxisModel::shipped()),
             seen: Vec::new(),
+            spare: Vec::new(),
         }
     }
 
@@ -135,7 +138,7 @@ impl Measurer {
         priors: &[Prior],
         detections: &mut Vec<Detection>,
     ) {
-        detections.clear();
+        self.spare.extend(detections.drain(..).map(|detection| detection.reaches));
         let mut seen = std::mem::take(&mut self.seen);
         for cluster in clusters {
             let aabb = self.above_floor(points, cluster).1;
@@ -144,7 +147,9 @@ impl Measurer {
             let full_body = self.has_size_of_person(cluster.len(), &aabb)
                 && !(expected && aabb.max_m.z < FULL_BODY_TOP_M);
             if full_body || expected {
-                let detection = self.detection_within(&mut seen, points, cluster, priors);
+                let mut reaches = self.spare.pop().unwrap_or_default();
+                reaches.clear();
+                let detection = self.detection_within(&mut seen, reaches, points, cluster, priors);
                 detections.push(Detection { full_body, ..detection });
             }
         }
@@ -199,12 +204,13 @@ impl Measurer {
     /// Of points that are one person's, whatever their size; at least one.
     #[doc(hidden)] // For scores that know whose points they are.
     pub fn detection(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> Detection {
-        self.detection_within(&mut Vec::new(), points, cluster, priors)
+        self.detection_within(&mut Vec::new(), Vec::new(), points, cluster, priors)
     }
 
     fn detection_within(
         &self,
         seen: &mut Vec<Seen>,
+        mut all_reaches: Vec<Reach>,
         points: &[Point],
         cluster: &[u32],
         priors: &[Prior],
@@ -236,14 +242,15 @@ impl Measurer {
         };
         let time_ns = first_ns + late_ns / cluster.len() as i64;
         let feet_m = position_m.extend(floor_m);
-        let reaches = who.map_or_else(Vec::new, |who| {
-            reaches(of(), &self.sensors_m, feet_m, time_ns, who.height_m, who.velocity_mps)
-        });
+        if let Some(who) = who {
+            let (height_m, velocity_mps) = (who.height_m, who.velocity_mps);
+            reaches(of(), &self.sensors_m, feet_m, time_ns, height_m, velocity_mps, &mut all_reaches);
+        }
         Detection {
             position_m,
             covariance_m2,
             limbs,
-            reaches,
+            reaches: all_reaches,
             z_m,
             time_ns,
             points: cluster.len() as u32,

@@ -37,7 +37,7 @@ pub struct Reach {
 }
 
 /// Looks at the points of somebody `height_m` tall whose axis stood at `feet_m` at `time_ns`, and who moved on by `velocity_mps`.
-/// Points of one sensor follow each other, or else the sensor comes twice.
+/// Points of one sensor follow each other, or else the sensor comes twice. What it finds is added to `all`.
 #[doc(hidden)] // The measurer calls it.
 pub fn reaches<'a>(
     points: impl Iterator<Item = &'a Point> + Clone,
@@ -46,8 +46,8 @@ pub fn reaches<'a>(
     time_ns: i64,
     height_m: f64,
     velocity_mps: DVec2,
-) -> Vec<Reach> {
-    let mut all = Vec::new();
+    all: &mut Vec<Reach>,
+) {
     let mut rest = points.peekable();
     while let Some(&&Point { sensor, position_m, .. }) = rest.peek() {
         let seen_from = sensors_m.get(usize::from(sensor)).copied().unwrap_or(position_m);
@@ -75,5 +75,38 @@ pub fn reaches<'a>(
         }
         all.extend(levels.into_iter().filter(|reach| reach.returns >= RETURNS_MIN));
     }
-    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sensor in the west sees an arm of somebody at the origin stretched out to the north, at the height of the chest.
+    #[test]
+    fn an_arm_to_one_side_is_a_reach_to_that_side_of_its_level() {
+        let point = |x: f64, y: f64, z: f64| Point { position_m: DVec3::new(x, y, z), time_ns: 0, sensor: 0 };
+        let chest = [-0.2, -0.1, 0.0, 0.1, 0.2, 0.5].map(|y| point(-0.12, y, 1.1));
+        let thighs = [-0.1, 0.0, 0.1].map(|y| point(-0.08, y, 0.7));
+        let head = [point(0.0, 0.0, 1.7); 2];
+        let points: Vec<Point> = chest.into_iter().chain(thighs).chain(head).collect();
+        let mut seen = Vec::new();
+        let sensors_m = [DVec3::new(-10.0, 0.0, 3.0)];
+        reaches(points.iter(), &sensors_m, DVec3::ZERO, 0, 1.75, DVec2::ZERO, &mut seen);
+        let levels: Vec<usize> = seen.iter().map(|reach| reach.level).collect();
+        assert_eq!(levels, [1, 2], "two returns are no head");
+        let [thighs, chest] = [seen[0], seen[1]];
+        assert!((chest.left_m - 0.5).abs() < 1e-12 && (chest.right_m - 0.2).abs() < 1e-12, "{chest:?}");
+        assert!((chest.near_m - 0.12).abs() < 1e-12 && (thighs.left_m - 0.1).abs() < 1e-12, "{thighs:?}");
+    }
+
+    /// A walker whom a second sensor meets 50 ms later reaches no farther for it.
+    #[test]
+    fn returns_of_a_walker_are_taken_back_to_one_time() {
+        let velocity_mps = DVec2::new(0.0, 1.2);
+        let late = |y: f64, time_ns: i64| Point { position_m: DVec3::new(-0.1, y, 1.1), time_ns, sensor: 0 };
+        let points = [late(-0.2, 0), late(0.0, 0), late(0.26, 50_000_000)];
+        let mut seen = Vec::new();
+        reaches(points.iter(), &[DVec3::new(-10.0, 0.0, 3.0)], DVec3::ZERO, 0, 1.75, velocity_mps, &mut seen);
+        assert!((seen[0].left_m - 0.2).abs() < 1e-12, "{seen:?}");
+    }
 }

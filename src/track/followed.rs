@@ -4,15 +4,14 @@ use std::collections::VecDeque;
 
 use super::outline::LevelOutline;
 use super::remembered::{Remembered, Words};
-use super::width;
 use crate::detect::LEVELS;
 use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, Obb};
 
 /// Positions of the observation window: 10 frames (paper, section V-B).
 pub const OBSERVED: usize = 10;
-/// One standard deviation of the width scale of adults of whom nothing is known.
-pub const WIDTH_SCALE_SIGMA: f64 = width::PRIOR_SIGMA;
+/// One standard deviation of the width scale of adults: of trunks' widths over heights, on simulated people.
+pub const WIDTH_SCALE_SIGMA: f64 = 0.058;
 
 /// One person followed over time, at the frame's instant.
 ///
@@ -48,7 +47,7 @@ pub struct Track {
     pub height_m: f64,
     /// One standard deviation of `height_m`.
     pub height_sigma_m: f64,
-    /// Depths and widths of the body beside those of a usual one of this height: 1.
+    /// Depths and widths of the body beside those of a usual one of this height; 1 by our tracker, whose outline says more.
     pub width_scale: f64,
     /// One standard deviation of `width_scale`.
     pub width_scale_sigma: f64,

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::followed::{OBSERVED, Observed, Track};
+use super::followed::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
 use super::person::HEIGHT_MEAN_M;
-use super::width;
 use crate::STEP_NS;
 use crate::gait::{GaitPhase, WALKS_FROM_MPS};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
@@ -15,6 +14,8 @@ const POSITION_SIGMA_M: f64 = 0.05;
 const VELOCITY_SIGMA_MPS: f64 = 0.1;
 /// One standard deviation of adults' heights, as our own tracker has it.
 const HEIGHT_SIGMA_M: f64 = 0.09;
+/// Half depth and half width of a usual body's returns together, as a share of the height, measured on simulated people.
+const STANDING_SHARE: f64 = 0.226;
 /// Any heading: even over a turn.
 const ANY_HEADING_RAD: f64 = 1.813_799_364_234_217_8;
 /// A frame counts as a step after the last one in the observation window when it is no earlier than this.
@@ -50,7 +51,7 @@ impl Track {
             height_m: HEIGHT_MEAN_M,
             height_sigma_m: HEIGHT_SIGMA_M,
             width_scale: 1.0,
-            width_scale_sigma: width::PRIOR_SIGMA,
+            width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m: Default::default(),
             gait: GaitPhase::UNKNOWN,
             points: 0,
@@ -82,7 +83,7 @@ impl Track {
 
     /// Boxes of a usual body of the track's height and width at its position, on a floor at `floor_m`.
     pub fn stand_up(&mut self, floor_m: f64) {
-        let half_m = 0.5 * width::STANDING_SHARE * self.height_m * self.width_scale;
+        let half_m = 0.5 * STANDING_SHARE * self.height_m * self.width_scale;
         let half_m = DVec3::new(half_m, half_m, 0.5 * self.height_m);
         let center_m = self.position_m.extend(floor_m + half_m.z);
         self.aabb = Aabb { min_m: center_m - half_m, max_m: center_m + half_m };

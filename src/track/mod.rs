@@ -14,8 +14,6 @@ mod limb_phase;
 #[doc(hidden)] // For fits that need to know who is in free sight.
 pub mod visibility;
 mod height;
-#[doc(hidden)] // Extents, for the fit of its numbers.
-pub mod width;
 #[doc(hidden)] // Measurements, for the fit of its numbers.
 pub mod outline;
 mod heading;

@@ -45,8 +45,6 @@ pub struct Numbers {
     pub visibility: bool,
     /// Whether arms and legs tell the phase of the gait.
     pub limb_phase: bool,
-    /// Whether extents of detections tell how wide a body is.
-    pub body_width: bool,
     /// What outlines of usual bodies look like.
     pub usual: UsualOutline,
     /// Whether outlines are learned.
@@ -81,7 +79,6 @@ impl Numbers {
             noise_share: 0.7,
             visibility: !without(Mechanism::Visibility),
             limb_phase: !without(Mechanism::LimbPhase),
-            body_width: !without(Mechanism::BodyWidth),
             usual: UsualOutline::shipped(),
             outline: !without(Mechanism::Outline),
             height_sigma_m: if without(Mechanism::Height) { 1e-3 } else { 0.09 },

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::followed::{Observations, Observed, Track, seconds};
+use super::followed::{Observations, Observed, Track, WIDTH_SCALE_SIGMA, seconds};
 use super::gaussian::{Mat2, largest_sigma, plus, round};
 use super::heading::Heading;
 use super::height::Height;
@@ -13,7 +13,6 @@ use super::origin::Origin;
 use super::outline::{Axis, Outline};
 use super::remembered::{Remembered, Words};
 use super::visibility::{Body, BodyView, Visibility};
-use super::width::BodyWidth;
 use crate::detect::{ARM_SHARE, Detection, Prior, SEATED_HEIGHT_M};
 use crate::gait::relative_speed_hz;
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
@@ -85,7 +84,6 @@ pub(super) struct Person {
     points: u32,
     heading: Heading,
     height: Height,
-    width: BodyWidth,
     outline: Outline,
     /// Averaged extent along x and y.
     extent_m: DVec2,
@@ -109,7 +107,6 @@ impl Remembered for Person {
         words.u32(&mut self.points);
         self.heading.visit(words);
         self.height.visit(words);
-        self.width.visit(words);
         self.outline.visit(words);
         words.vec2(&mut self.extent_m);
         words.f64(&mut self.top_m);
@@ -156,7 +153,6 @@ impl Person {
             points: 0,
             heading: Heading::ANY,
             height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
-            width: BodyWidth::default(),
             outline: Outline::new(&numbers.usual),
             extent_m: DVec2::splat(WIDTH_M),
             top_m: HEIGHT_MEAN_M,
@@ -276,7 +272,6 @@ impl Person {
         self.observed.push(time_ns, position_m, velocity_mps);
         observed.clone_from(&self.observed.0);
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
-        let (width_scale, width_scale_sigma) = self.width.scale();
         Track {
             id: self.id,
             position_m,
@@ -287,8 +282,8 @@ impl Person {
             heading_behind: self.heading.behind,
             height_m: self.height.mean_m(),
             height_sigma_m: self.height.sigma_m(),
-            width_scale,
-            width_scale_sigma,
+            width_scale: 1.0,
+            width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m: self.outline.levels_m(),
             gait: self.limb_phase.phase(velocity_mps.length()),
             points: self.points,
@@ -331,9 +326,6 @@ impl Person {
             self.height.see(detection.top_m, view.beams_per_m_at_top);
         }
         self.heading.see(detection, view, speed_mps);
-        if numbers.body_width {
-            self.width.see(detection, view, self.height.mean_m(), speed_mps);
-        }
         if let Some(visibility) = visibility.filter(|_| numbers.outline) {
             self.see_outline(numbers, detection, view, visibility, step_s);
         }

@@ -11,7 +11,6 @@ pub mod axis;
 pub mod samples;
 pub mod residual;
 pub mod departures;
-pub mod width;
 pub mod outline;
 pub mod body;
 pub mod thresholds;

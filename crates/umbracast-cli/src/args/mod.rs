@@ -394,9 +394,6 @@ pub enum Train {
     Residual(TrainResidual),
     /// Fit what outlines of usual bodies look like, on tuning scenes; prints `models/outline.toml`.
     Outline(TrainScenes),
-    /// Fit how a body's width follows from the extents of detections, on tuning scenes; prints constants for the
-    /// source.
-    Width(TrainScenes),
     /// Fit stage 3's model of a body on recorded tuning scenes.
     Body(TrainBody),
     /// Fit the probability at which a link is called blocked, on tuning scenes.
@@ -456,7 +453,7 @@ pub struct TrainBody {
     pub recordings: Vec<PathBuf>,
 }
 
-/// `train width`, `train thresholds`
+/// `train outline`, `train thresholds`
 #[derive(Debug, Args)]
 pub struct TrainScenes {
     /// Number of scenes, of several crowds in turn.

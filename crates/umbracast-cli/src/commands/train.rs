@@ -10,7 +10,6 @@ use umbracast_train::departures::{ResidualOptions, train_residual};
 use umbracast_train::outline::fit_outline;
 use umbracast_train::residual::FitOptions;
 use umbracast_train::thresholds::tune_thresholds;
-use umbracast_train::width::fit_width;
 
 use crate::args::{Common, Fitted, Train, TrainBody, TrainLstm, TrainResidual, TrainScenes};
 use crate::ending::Ending;
@@ -27,7 +26,6 @@ pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {
         Train::Outline(args) => {
             printed(args, "scenes seen", common, |scenes, done| fit_outline(scenes, done))
         }
-        Train::Width(args) => printed(args, "scenes seen", common, |scenes, done| fit_width(scenes, done)),
         Train::Thresholds(args) => {
             printed(args, "scenes run", common, |scenes, done| tune_thresholds(scenes, done))
         }
