@@ -103,6 +103,7 @@ fn trunk_and_head_of(height_m: f64) -> BodyModel {
         half_depth: 0.5 * depth_m / height_m,
         half_width: 0.5 * width_m / height_m,
         ahead: 0.0,
+        left: 0.0,
     };
     let body = BodyModel::shipped();
     let arms = Arms { shoulder_out: 0.0, elbow_out: 0.0, hand_out: 0.0, ..body.arms };

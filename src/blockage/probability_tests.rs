@@ -39,6 +39,7 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
         height_sigma_m: 0.03,
         width_scale: 1.0 + within(0.1),
         width_scale_sigma: 0.05,
+        outline_m: Default::default(),
         gait: GaitPhase { phase_rad: within(3.0), concentration: 1.0 + within(1.0) },
         points: 30,
         confirmed: true,

@@ -27,6 +27,7 @@ pub(in crate::radio) fn somebody(id: u64, position_m: DVec2, velocity_mps: DVec2
         height_sigma_m: 0.02,
         width_scale: 1.0,
         width_scale_sigma: 0.02,
+        outline_m: Default::default(),
         gait: crate::gait::GaitPhase::UNKNOWN,
         points: 30,
         confirmed: true,

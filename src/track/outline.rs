@@ -316,7 +316,9 @@ mod tests {
         let usual = UsualOutline::shipped();
         let moved_by = |levels: &[usize]| {
             let mut outline = watched(|level, _, sin| if levels.contains(&level) { 0.03 * sin } else { 0.0 });
-            (0..200).for_each(|_| drop(outline.centre(&usual, 0.1)));
+            for _ in 0..200 {
+                outline.centre(&usual, 0.1);
+            }
             outline.offset_m().y
         };
         let (feet_and_head, waist) = (moved_by(&[0, 4]), moved_by(&[2]));
