@@ -5,7 +5,7 @@ use super::axis::{AxisModel, Network};
 use super::evidence::FULL_BODY_TOP_M;
 use super::features::{AxisFeatures, Seen};
 use super::limbs::LimbCovariance;
-use super::outline::{Reach, reaches};
+use super::outline::{LEVELS, Reach, reaches};
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
 use crate::config::{DetectConfig, Mechanism, PositionMethod};
@@ -149,6 +149,7 @@ impl Measurer {
             if full_body || expected {
                 let mut reaches = self.spare.pop().unwrap_or_default();
                 reaches.clear();
+                reaches.reserve(LEVELS * self.sensors_m.len());
                 let detection = self.detection_within(&mut seen, reaches, points, cluster, priors);
                 detections.push(Detection { full_body, ..detection });
             }
