@@ -72,7 +72,7 @@ impl Meshes {
     }
 
     /// The people of a binary glTF file. Its mesh with a skin is one of them and each morph target another. The joints of the
-    /// skin are called as the bones here ([`Bone`]); where `extras` of the mesh tell the joints of each person, these count.
+    /// skin are called as the bones here (`Bone`); where `extras` of the mesh tell the joints of each person, these count.
     ///
     /// # Errors
     /// A file that is not glTF, or lacks mesh, skin, bones or people who stand on two legs.
