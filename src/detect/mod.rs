@@ -36,7 +36,7 @@ pub use clocks::Clocks;
 pub use doubled::doubled;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
-pub(crate) use measure::SEATED_HEIGHT_M;
+
 #[doc(hidden)] // For the card of the model of the body axis.
 pub use measure::SHIFT_M;
 pub use outline::{LEVELS, Reach};

@@ -4,6 +4,7 @@
 use std::cmp::Reverse;
 
 use super::association::{Assignment, FORBIDDEN, in_order};
+use super::attached::Beside;
 use super::followed::{Track, seconds};
 use super::gaussian::{inverted, plus, quadratic, round};
 use super::numbers::Numbers;
@@ -70,6 +71,7 @@ struct Memory {
     assignment: Assignment,
     taken: Vec<bool>,
     ranks: Vec<Rank>,
+    beside: Vec<Beside>,
 }
 
 /// Fewest first: the confirmed, those of more matches, the older.
@@ -151,6 +153,7 @@ impl MixtureTracker {
         self.associate(time_ns, last_ns, detections);
         self.correct(time_ns, last_ns, detections);
         self.mark_duplicates(step_s);
+        self.mark_attached(step_s);
         self.bury(time_ns);
         self.give_birth(time_ns, detections);
         self.tell(time_ns, step_s, tracks);
@@ -223,14 +226,21 @@ impl MixtureTracker {
         places_m.clear();
         places_m.extend(self.people.iter().map(|p| p.filter.position_m()));
         for i in 0..self.people.len() {
-            let (person, place_m) = (&self.people[i], places_m[i]);
-            let doubles = |(k, other): (usize, &Person)| {
-                places_m[k].distance(place_m) < DUPLICATE_M && ranks[k] < ranks[i]
-                    || person.may_be_lap_of(other)
-            };
-            let doubled = self.people.iter().enumerate().any(doubles);
+            let place_m = places_m[i];
+            let doubles = |k: usize| places_m[k].distance(place_m) < DUPLICATE_M && ranks[k] < ranks[i];
+            let doubled = (0..self.people.len()).any(doubles);
             let person = &mut self.people[i];
             person.doubled_s = if doubled { person.doubled_s + step_s } else { 0.0 };
+        }
+    }
+
+    /// Finds who moves with somebody.
+    fn mark_attached(&mut self, step_s: f64) {
+        let beside = &mut self.memory.beside;
+        beside.clear();
+        beside.extend(self.people.iter().map(Person::beside));
+        for (person, thing) in self.people.iter_mut().zip(&*beside) {
+            person.attached.look(thing, beside, step_s);
         }
     }
 

@@ -19,6 +19,7 @@ pub mod outline;
 mod heading;
 mod followed;
 mod origin;
+mod attached;
 mod person;
 mod given;
 mod mixture;

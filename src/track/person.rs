@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::attached::{Attached, Beside};
 use super::followed::{Observations, Observed, Track, WIDTH_SCALE_SIGMA, seconds};
 use super::gaussian::{Mat2, largest_sigma, plus, round};
 use super::heading::Heading;
@@ -13,7 +14,7 @@ use super::origin::Origin;
 use super::outline::{Axis, Outline};
 use super::remembered::{Remembered, Words};
 use super::visibility::{Body, BodyView, Visibility};
-use crate::detect::{ARM_SHARE, Detection, Prior, SEATED_HEIGHT_M};
+use crate::detect::{ARM_SHARE, Detection, Prior};
 use crate::gait::relative_speed_hz;
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use crate::site::Hall;
@@ -47,12 +48,6 @@ const DUPLICATE_AFTER_S: f64 = 0.5;
 const HIDDEN_NOISE_M: f64 = 0.25;
 /// Furniture is known to the background once it is no longer found.
 const FURNITURE_GONE_S: f64 = 0.5;
-/// Who sits in a wheelchair is longer than who walks, with all that goes before him. Knees are no higher than this share of his
-/// head, so near to it, and as fast.
-const SEATED_LENGTH_M: f64 = 0.75;
-const LAP_SHARE: f64 = 0.85;
-const LAP_M: f64 = 0.65;
-const LAP_MPS: f64 = 0.5;
 /// An outline is learned of who walks at least so fast, or is known so well to face some way, and of whom others hide no more.
 const OUTLINE_FROM_MPS: f64 = 0.5;
 const FACING_SIGMA_RAD: f64 = 0.35;
@@ -85,6 +80,8 @@ pub(super) struct Person {
     heading: Heading,
     height: Height,
     outline: Outline,
+    /// Whether it is a part of somebody, or moved by one.
+    pub(super) attached: Attached,
     /// Averaged extent along x and y.
     extent_m: DVec2,
     /// How high it shows itself, averaged.
@@ -108,6 +105,7 @@ impl Remembered for Person {
         self.heading.visit(words);
         self.height.visit(words);
         self.outline.visit(words);
+        self.attached.visit(words);
         words.vec2(&mut self.extent_m);
         words.f64(&mut self.top_m);
         self.observed.visit(words);
@@ -154,6 +152,7 @@ impl Person {
             heading: Heading::ANY,
             height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
             outline: Outline::new(&numbers.usual),
+            attached: Attached::default(),
             extent_m: DVec2::splat(WIDTH_M),
             top_m: HEIGHT_MEAN_M,
             observed: Observations::default(),
@@ -226,19 +225,14 @@ impl Person {
         f64::from(detection.points) < ARM_SHARE * f64::from(self.points)
     }
 
-    /// Whether this may be knees, feet and wheels of `other`, who sits in a wheelchair: beside him, as fast, and showing no head
-    /// where he shows his.
-    pub(super) fn may_be_lap_of(&self, other: &Self) -> bool {
-        if self.top_m >= LAP_SHARE * other.top_m
-            || other.extent_m.length() <= SEATED_LENGTH_M
-            || !other.confirmed
-            || other.height.mean_m() >= SEATED_HEIGHT_M
-        {
-            return false;
+    /// As others may move beside it.
+    pub(super) fn beside(&self) -> Beside {
+        Beside {
+            position_m: self.filter.position_m(),
+            velocity_mps: self.filter.velocity_mps(),
+            top_m: self.top_m,
+            diagonal_m: self.extent_m.length(),
         }
-        let (own, others) = (self.filter.state(), other.filter.state());
-        own.position_m().distance(others.position_m()) < LAP_M
-            && own.velocity_mps().distance(others.velocity_mps()) < LAP_MPS
     }
 
     /// The body that others may hide behind.
@@ -289,6 +283,7 @@ impl Person {
             points: self.points,
             confirmed: self.confirmed
                 && !self.origin.is_furniture(time_ns)
+                && !self.attached.is_thing()
                 && largest_sigma(state.position_covariance()) < REPORTED_SIGMA_MAX_M,
             aabb,
             obb,
