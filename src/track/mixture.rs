@@ -38,6 +38,8 @@ const CROWD_M: f64 = 1.0;
 /// What shows little this near to one person may be an arm: half the span of a tall one's arms. Not where somebody else is
 /// known as near as [`ALONE_M`]: in a crowd people do show that little.
 const ARM_REACH_M: f64 = 0.95;
+/// Who shows something so low stands on legs.
+const LEGS_M: f64 = 0.6;
 /// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it.
 const DUPLICATE_M: f64 = 0.3;
 /// Nobody walks faster: spares most pairs the rest.
@@ -257,7 +259,7 @@ impl MixtureTracker {
 
     /// A track for each detection that is nobody's and far enough from everybody.
     fn give_birth(&mut self, time_ns: i64, detections: &[Detection]) {
-        let Self { numbers, people, furniture_m: known_m, next_id, memory, .. } = self;
+        let Self { numbers, people, furniture_m: known_m, next_id, memory, visibility, .. } = self;
         let Memory { order, assignment, places_m, seen, taken, .. } = memory;
         seen.clear();
         seen.extend(people.iter().map(|person| person.is_seen()));
@@ -287,12 +289,11 @@ impl MixtureTracker {
                 .iter()
                 .zip(&*places_m)
                 .filter(|(person, place)| person.confirmed && place.distance(detection.position_m) < ALONE_M);
-            let on_trial = match (around.next(), around.next()) {
-                (Some((person, place)), None) => {
-                    place.distance(detection.position_m) < ARM_REACH_M && person.may_own(detection)
-                }
-                _ => false,
-            };
+            let alone = around.clone().skip(1).next().is_none();
+            let legs = detection.aabb.min_m.z < visibility.hall.floor_m(detection.position_m) + LEGS_M;
+            let on_trial = (alone || !legs) && around.any(|(person, place)| {
+                place.distance(detection.position_m) < ARM_REACH_M && person.may_own(detection)
+            });
             let mut person = Person::born(numbers, *next_id, detection, time_ns, beside, on_trial);
             let measured_ns = measured_ns(detection, i64::MIN, time_ns);
             person.predict(numbers, seconds(measured_ns, time_ns));
