@@ -29,6 +29,11 @@ pub struct UsualOutline {
     pub centre_ahead: [f64; LEVELS],
     /// The same to the left.
     pub centre_left: [f64; LEVELS],
+    /// One standard deviation of where the axis stands, along one direction, of a body whose outline is usual, metres: what no frame
+    /// mends, for each sees the same body.
+    pub axis_sigma_m: f64,
+    /// It grows by this for each metre that an outline differs from the usual one ([`unlike_m2`]).
+    pub axis_sigma_per_m: f64,
     /// From the floor up.
     pub levels: Vec<UsualLevel>,
 }
@@ -61,6 +66,12 @@ pub fn terms(cos: f64, relative_speed_hz: f64) -> [f64; TERMS] {
 /// The outline's share in the reach in a direction from the heading.
 pub fn shares(cos: f64, sin: f64) -> LevelOutline {
     [cos, sin, 1.0, 2.0 * cos * cos - 1.0]
+}
+
+/// How far an outline differs from the usual one: mean of the squares over levels and terms, m^2.
+pub fn unlike_m2(levels_m: &[LevelOutline; LEVELS]) -> f64 {
+    let squares = levels_m.as_flattened().iter().map(|m| m * m).sum::<f64>();
+    squares / (4 * LEVELS) as f64
 }
 
 /// The axis of a body when it was seen.
@@ -156,6 +167,11 @@ impl Outline {
     /// How far ahead of where detections say, and left of it, the axis stands.
     pub(super) fn offset_m(&self) -> DVec2 {
         self.offset_m
+    }
+
+    /// Variance of the axis along one direction that no frame mends, m^2: who carries something is less surely where he seems to be.
+    pub(super) fn axis_variance_m2(&self, usual: &UsualOutline) -> f64 {
+        usual.axis_sigma_m.powi(2) + usual.axis_sigma_per_m.powi(2) * unlike_m2(&self.levels_m())
     }
 
     /// Moves the axis toward where the levels tell that it is; what is left over is what somebody carries. Returns how far it moved,

@@ -33,8 +33,8 @@ const EXISTENCE_MIN: f64 = 0.05;
 const CONFIRMING_MATCHES: u32 = 2;
 const CONFIRM_WITHIN_S: f64 = 0.25;
 /// The same of who may be an arm of somebody beside: arms do not stay.
-const CONFIRMING_MATCHES_ON_TRIAL: u32 = 8;
-const CONFIRM_WITHIN_ON_TRIAL_S: f64 = 1.0;
+const CONFIRMING_MATCHES_ON_TRIAL: u32 = 14;
+const CONFIRM_WITHIN_ON_TRIAL_S: f64 = 1.7;
 /// A track is not reported as confirmed while its position, one standard deviation of the larger axis, is less sure:
 /// who has been out of sight so long is more likely elsewhere. It is kept, to be known again.
 const REPORTED_SIGMA_MAX_M: f64 = 0.6;
@@ -255,6 +255,7 @@ impl Person {
     /// The track at the frame's time, `step_s` after the last frame; the filter stands there. `observed` gives its memory.
     pub(super) fn track(
         &mut self,
+        numbers: &Numbers,
         time_ns: i64,
         step_s: f64,
         hall: &Hall,
@@ -265,12 +266,15 @@ impl Person {
         self.heading.follow(&state, step_s);
         self.observed.push(time_ns, position_m, velocity_mps);
         observed.clone_from(&self.observed.0);
+        let lasting_m2 = self.outline.axis_variance_m2(&numbers.usual);
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
         Track {
             id: self.id,
             position_m,
             velocity_mps,
-            covariance: state.P,
+            covariance: std::array::from_fn(|i| {
+                std::array::from_fn(|j| if i == j && i < 2 { state.P[i][j] + lasting_m2 } else { state.P[i][j] })
+            }),
             heading_rad: self.heading.mean_rad,
             heading_sigma_rad: self.heading.sigma_rad(),
             heading_behind: self.heading.behind,

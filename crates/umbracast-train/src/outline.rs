@@ -11,7 +11,7 @@ use umbracast::gait::relative_speed_hz;
 use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Track;
-use umbracast::track::outline::{Axis, LevelOutline, UsualLevel, UsualOutline, measured, shares, terms};
+use umbracast::track::outline::{Axis, LevelOutline, UsualLevel, UsualOutline, measured, shares, terms, unlike_m2};
 use umbracast::track::visibility::{Body, Visibility};
 use umbracast::{Error, Health, Pipeline};
 use umbracast_eval::run::chain::{empty_frames, push};
@@ -29,8 +29,16 @@ const FREE_SHARE: f64 = 0.9;
 /// Fewer frames say nothing of a person.
 const FRAMES_MIN: usize = 60;
 /// Usual is who carries nothing; how bodies differ is asked of these too.
-const CARRYING: [Option<Kind>; 6] =
-    [None, Some(Kind::Bag), None, Some(Kind::Phone), None, Some(Kind::Pockets)];
+const CARRYING: [Option<Kind>; 8] = [
+    None,
+    Some(Kind::Bag),
+    None,
+    Some(Kind::Phone),
+    Some(Kind::Rucksack),
+    Some(Kind::Pockets),
+    None,
+    Some(Kind::Screen),
+];
 
 /// One reach: its level, whether toward the sensor, cosine and sine of its direction, speed over hip height, height, and metres.
 #[derive(Debug, Clone, Copy)]
@@ -80,23 +88,33 @@ pub fn fit_outline(scenes: usize, scene_done: impl Fn(usize, usize) + Sync) -> R
     let (levels, outlines): (Vec<UsualLevel>, Vec<Vec<Option<LevelOutline>>>) =
         (0..LEVELS).map(|level| fit_level(level, &usual, &everybody)).unzip();
     // Where the axis is by what the levels show: of everybody of whom each level was seen.
+    let shown: Vec<([LevelOutline; LEVELS], DVec2)> = everybody
+        .iter()
+        .enumerate()
+        .filter_map(|(who, person)| {
+            let shown: Option<Vec<LevelOutline>> = outlines.iter().map(|level| level[who]).collect();
+            Some((<[LevelOutline; LEVELS]>::try_from(shown?).ok()?, -person.bias_m()))
+        })
+        .collect();
     let centre = |i: usize| {
-        let rows = everybody.iter().enumerate().filter_map(|(who, person)| {
-            let shown: Option<Vec<f64>> =
-                outlines.iter().map(|level| level[who].map(|outline| outline[i])).collect();
-            Some((<[f64; LEVELS]>::try_from(shown?).ok()?, -person.bias_m().to_array()[i]))
-        });
-        let error = |weights: &[f64; LEVELS]| {
-            let left = rows
-                .clone()
-                .map(|(shown, off)| off - shown.iter().zip(weights).map(|(a, b)| a * b).sum::<f64>());
-            root_mean(left)
-        };
-        let weights = least_squares(rows.clone(), 1e-3);
-        eprintln!("axis off by {:.4} m, then {:.4}", error(&[0.0; LEVELS]), error(&weights));
-        weights
+        least_squares(shown.iter().map(|(levels, off_m)| (levels.map(|outline| outline[i]), off_m[i])), 1e-3)
     };
-    toml::to_string(&UsualOutline { centre_ahead: centre(0), centre_left: centre(1), levels })
+    let (centre_ahead, centre_left): ([f64; LEVELS], [f64; LEVELS]) = (centre(0), centre(1));
+    // What is left over, of bodies by how far they are from usual once their axis is there.
+    let left_over = shown.iter().map(|(levels, off_m)| {
+        let told = |i: usize, weights: &[f64; LEVELS]| {
+            levels.iter().zip(weights).map(|(outline, weight)| outline[i] * weight).sum::<f64>()
+        };
+        let told_m = DVec2::new(told(0, &centre_ahead), told(1, &centre_left));
+        let about_axis =
+            levels.map(|[ahead, left, round, oblong]| [ahead - told_m.x, left - told_m.y, round, oblong]);
+        (unlike_m2(&about_axis), (*off_m - told_m).length_squared() / 2.0)
+    });
+    let [least_m2, per_m2] = least_squares(left_over.clone().map(|(unlike_m2, m2)| ([1.0, unlike_m2], m2)), 0.0);
+    let off_m = root_mean(shown.iter().map(|(_, off_m)| off_m.length()));
+    eprintln!("axis off by {off_m:.4} m, then {:.4}", root_mean(left_over.map(|(_, m2)| (2.0 * m2).sqrt())));
+    let (axis_sigma_m, axis_sigma_per_m) = (least_m2.max(0.0).sqrt(), per_m2.max(0.0).sqrt());
+    toml::to_string(&UsualOutline { centre_ahead, centre_left, axis_sigma_m, axis_sigma_per_m, levels })
         .map_err(|e| Error::new(format!("outline: {e}")))
 }
 
