@@ -57,8 +57,10 @@ impl Attached {
 
     /// Looks at everybody, `step_s` later.
     pub(super) fn look(&mut self, thing: &Beside, all: &[Beside], step_s: f64) {
-        let goes_with = thing.diagonal_m > LONG_SHARE * thing.top_m && all.iter().any(|body| body.may_move(thing));
-        self.lasted_s = if goes_with { (self.lasted_s + step_s).min(LASTS_S) } else { (self.lasted_s - step_s).max(0.0) };
+        let goes_with =
+            thing.diagonal_m > LONG_SHARE * thing.top_m && all.iter().any(|body| body.may_move(thing));
+        self.lasted_s =
+            if goes_with { (self.lasted_s + step_s).min(LASTS_S) } else { (self.lasted_s - step_s).max(0.0) };
         self.is_thing = self.lasted_s > if self.is_thing { 0.0 } else { THING_AFTER_S };
     }
 }

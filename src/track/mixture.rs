@@ -291,9 +291,10 @@ impl MixtureTracker {
                 .filter(|(person, place)| person.confirmed && place.distance(detection.position_m) < ALONE_M);
             let alone = around.clone().skip(1).next().is_none();
             let legs = detection.aabb.min_m.z < visibility.hall.floor_m(detection.position_m) + LEGS_M;
-            let on_trial = (alone || !legs) && around.any(|(person, place)| {
-                place.distance(detection.position_m) < ARM_REACH_M && person.may_own(detection)
-            });
+            let on_trial = (alone || !legs)
+                && around.any(|(person, place)| {
+                    place.distance(detection.position_m) < ARM_REACH_M && person.may_own(detection)
+                });
             let mut person = Person::born(numbers, *next_id, detection, time_ns, beside, on_trial);
             let measured_ns = measured_ns(detection, i64::MIN, time_ns);
             person.predict(numbers, seconds(measured_ns, time_ns));

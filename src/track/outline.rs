@@ -104,6 +104,11 @@ impl UsualOutline {
         Self::parse(include_str!("../../models/outline.toml")).expect("the embedded file is proven by a test")
     }
 
+    /// Variance of the axis along one direction that no frame mends, m^2: who carries something is less surely where he seems to be.
+    pub fn axis_variance_m2(&self, outline_m: &[LevelOutline; LEVELS]) -> f64 {
+        self.axis_sigma_m.powi(2) + self.axis_sigma_per_m.powi(2) * unlike_m2(outline_m)
+    }
+
     fn parse(text: &str) -> Result<Self, Error> {
         let usual: Self = toml::from_str(text).map_err(|e| Error::new(format!("usual outline: {e}")))?;
         match usual.levels.len() {
@@ -167,11 +172,6 @@ impl Outline {
     /// How far ahead of where detections say, and left of it, the axis stands.
     pub(super) fn offset_m(&self) -> DVec2 {
         self.offset_m
-    }
-
-    /// Variance of the axis along one direction that no frame mends, m^2: who carries something is less surely where he seems to be.
-    pub(super) fn axis_variance_m2(&self, usual: &UsualOutline) -> f64 {
-        usual.axis_sigma_m.powi(2) + usual.axis_sigma_per_m.powi(2) * unlike_m2(&self.levels_m())
     }
 
     /// Moves the axis toward where the levels tell that it is; what is left over is what somebody carries. Returns how far it moved,

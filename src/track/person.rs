@@ -266,14 +266,17 @@ impl Person {
         self.heading.follow(&state, step_s);
         self.observed.push(time_ns, position_m, velocity_mps);
         observed.clone_from(&self.observed.0);
-        let lasting_m2 = self.outline.axis_variance_m2(&numbers.usual);
+        let outline_m = self.outline.levels_m();
+        let lasting_m2 = numbers.usual.axis_variance_m2(&outline_m);
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
         Track {
             id: self.id,
             position_m,
             velocity_mps,
             covariance: std::array::from_fn(|i| {
-                std::array::from_fn(|j| if i == j && i < 2 { state.P[i][j] + lasting_m2 } else { state.P[i][j] })
+                std::array::from_fn(
+                    |j| if i == j && i < 2 { state.P[i][j] + lasting_m2 } else { state.P[i][j] },
+                )
             }),
             heading_rad: self.heading.mean_rad,
             heading_sigma_rad: self.heading.sigma_rad(),
@@ -282,7 +285,7 @@ impl Person {
             height_sigma_m: self.height.sigma_m(),
             width_scale: 1.0,
             width_scale_sigma: WIDTH_SCALE_SIGMA,
-            outline_m: self.outline.levels_m(),
+            outline_m,
             gait: self.limb_phase.phase(velocity_mps.length()),
             points: self.points,
             confirmed: self.confirmed

@@ -5,13 +5,15 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
-use umbracast::config::Config;
+use umbracast::config::{Config, Mechanism};
 use umbracast::detect::LEVELS;
 use umbracast::gait::relative_speed_hz;
 use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Track;
-use umbracast::track::outline::{Axis, LevelOutline, UsualLevel, UsualOutline, measured, shares, terms, unlike_m2};
+use umbracast::track::outline::{
+    Axis, LevelOutline, UsualLevel, UsualOutline, measured, shares, terms, unlike_m2,
+};
 use umbracast::track::visibility::{Body, Visibility};
 use umbracast::{Error, Health, Pipeline};
 use umbracast_eval::run::chain::{empty_frames, push};
@@ -52,10 +54,21 @@ struct Seen {
     reach_m: f64,
 }
 
+/// An error of a track's position in one frame.
+#[derive(Debug, Clone, Copy)]
+struct AxisError {
+    /// See [`unlike_m2`].
+    unlike_m2: f64,
+    /// Its square along one direction, less the variance that the filter claims.
+    beyond_m2: f64,
+}
+
 /// What was seen of one body, and how far its track was ahead of the true axis and left of it, summed over the frames.
 #[derive(Debug, Clone, Default)]
 struct Person {
     seen: Vec<Seen>,
+    /// Where the tracker knows outlines.
+    errors: Vec<AxisError>,
     off_m: DVec2,
     frames: f64,
 }
@@ -73,9 +86,11 @@ impl Person {
 pub fn fit_outline(scenes: usize, scene_done: impl Fn(usize, usize) + Sync) -> Result<String, Error> {
     let done = AtomicUsize::new(0);
     let counted = |scene: usize| {
-        let people = watch(scene);
+        // What the tracker knows of outlines moves no axis where the usual one is asked for.
+        let mut people = watch(scene, true)?;
+        people.extend(watch(scene, false)?);
         scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, scenes);
-        Ok::<_, Error>((CARRYING[scene % CARRYING.len()].is_none(), people?))
+        Ok::<_, Error>((CARRYING[scene % CARRYING.len()].is_none(), people))
     };
     let watched: Result<Vec<(bool, Vec<Person>)>, Error> = (0..scenes).into_par_iter().map(counted).collect();
     let watched = watched?;
@@ -96,24 +111,14 @@ pub fn fit_outline(scenes: usize, scene_done: impl Fn(usize, usize) + Sync) -> R
             Some((<[LevelOutline; LEVELS]>::try_from(shown?).ok()?, -person.bias_m()))
         })
         .collect();
-    let centre = |i: usize| {
+    let centre = |i: usize| -> [f64; LEVELS] {
         least_squares(shown.iter().map(|(levels, off_m)| (levels.map(|outline| outline[i]), off_m[i])), 1e-3)
     };
-    let (centre_ahead, centre_left): ([f64; LEVELS], [f64; LEVELS]) = (centre(0), centre(1));
-    // What is left over, of bodies by how far they are from usual once their axis is there.
-    let left_over = shown.iter().map(|(levels, off_m)| {
-        let told = |i: usize, weights: &[f64; LEVELS]| {
-            levels.iter().zip(weights).map(|(outline, weight)| outline[i] * weight).sum::<f64>()
-        };
-        let told_m = DVec2::new(told(0, &centre_ahead), told(1, &centre_left));
-        let about_axis =
-            levels.map(|[ahead, left, round, oblong]| [ahead - told_m.x, left - told_m.y, round, oblong]);
-        (unlike_m2(&about_axis), (*off_m - told_m).length_squared() / 2.0)
-    });
-    let [least_m2, per_m2] = least_squares(left_over.clone().map(|(unlike_m2, m2)| ([1.0, unlike_m2], m2)), 0.0);
-    let off_m = root_mean(shown.iter().map(|(_, off_m)| off_m.length()));
-    eprintln!("axis off by {off_m:.4} m, then {:.4}", root_mean(left_over.map(|(_, m2)| (2.0 * m2).sqrt())));
-    let (axis_sigma_m, axis_sigma_per_m) = (least_m2.max(0.0).sqrt(), per_m2.max(0.0).sqrt());
+    let (centre_ahead, centre_left) = (centre(0), centre(1));
+    // What no frame mends: what errors are larger than the filter of the tracker that ships says, by how unusual it takes the body.
+    let left_over = || watched.iter().flat_map(|(_, people)| people.iter().flat_map(|p| &p.errors));
+    let fit = least_squares(left_over().map(|e| ([1.0, e.unlike_m2], e.beyond_m2)), 0.0);
+    let [axis_sigma_m, axis_sigma_per_m] = fit.map(|m2| m2.max(0.0).sqrt());
     toml::to_string(&UsualOutline { centre_ahead, centre_left, axis_sigma_m, axis_sigma_per_m, levels })
         .map_err(|e| Error::new(format!("outline: {e}")))
 }
@@ -152,9 +157,13 @@ fn fit_level(
     (UsualLevel { near, aside, near_sigma_m, aside_sigma_m, person_sigma_m }, people)
 }
 
-/// Everybody in a scene.
-fn watch(scene: usize) -> Result<Vec<Person>, Error> {
-    let (config, seed) = (Config::default(), FIRST_SEED + scene as u64);
+/// Everybody in a scene: without knowledge of outlines what is seen of them, with it how far off the tracker is.
+fn watch(scene: usize, without: bool) -> Result<Vec<Person>, Error> {
+    let (mut config, seed) = (Config::default(), FIRST_SEED + scene as u64);
+    if without {
+        config.track.without.push(Mechanism::Outline);
+    }
+    let usual = UsualOutline::shipped();
     let preset = [Preset::Orca03, Preset::Mixed][scene / CARRYING.len() % 2];
     let kinds = CARRYING[scene % CARRYING.len()].map(|kind| (kind, 1.0));
     let bodies = Bodies::new(kinds.into_iter().collect(), None)?;
@@ -185,6 +194,17 @@ fn watch(scene: usize) -> Result<Vec<Person>, Error> {
                 });
                 let speed_mps = track.velocity_mps.length();
                 let Some(own) = own else { continue };
+                if !without {
+                    if let Some(state) = walkers[own].state_at(frame.time_ns).filter(|_| track.confirmed) {
+                        let unlike_m2 = unlike_m2(&track.outline_m);
+                        let lasting_m2 = usual.axis_variance_m2(&track.outline_m);
+                        let claimed_m2 = 0.5 * (track.covariance[0][0] + track.covariance[1][1]) - lasting_m2;
+                        let error_m2 = 0.5 * track.position_m.distance_squared(state.position_m);
+                        let errors = &mut seen.entry(own).or_default().errors;
+                        errors.push(AxisError { unlike_m2, beyond_m2: error_m2 - claimed_m2 });
+                    }
+                    continue;
+                }
                 if view.returns < FREE_SHARE * view.returns_alone || speed_mps < 0.5 {
                     continue;
                 }
