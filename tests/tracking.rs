@@ -259,6 +259,54 @@ fn a_hand_that_shows_apart_is_nobody_and_who_stays_beside_is_somebody() {
 }
 
 #[test]
+fn a_hand_in_a_group_is_nobody_and_who_shows_legs_there_is_somebody() {
+    let config = Config::for_mode(Mode::Default).track;
+    let told = |lowest_m: f64| {
+        let mut tracker = Tracker::new(&config, &open_site());
+        let (mut tracks, mut most) = (Vec::new(), 0);
+        for k in 0..30 {
+            let frame = frame(k);
+            let somebody = |x_m: f64, points: u32| Detection {
+                points,
+                ..detection(DVec2::new(x_m, 8.0), frame.time_ns)
+            };
+            let mut detections = vec![somebody(0.0, 100), somebody(1.4, 100)];
+            if (10..18).contains(&k) {
+                let mut between = somebody(0.7, 12);
+                between.aabb.min_m.z = lowest_m;
+                detections.push(between);
+            }
+            tracker.update(&Views::of(&frame), &detections, &mut tracks);
+            most = most.max(tracks.iter().filter(|track| track.confirmed).count());
+        }
+        most
+    };
+    assert_eq!([told(1.0), told(0.1)], [2, 3]);
+}
+
+#[test]
+fn what_somebody_pushes_is_nobody_and_a_child_ahead_is_somebody() {
+    let config = Config::for_mode(Mode::Default).track;
+    let told = |long_m: f64, ahead_m: f64| {
+        let mut tracker = Tracker::new(&config, &open_site());
+        let mut tracks = Vec::new();
+        for k in 0..30 {
+            let frame = frame(k);
+            let at_m = DVec2::new(0.1 * k as f64, 8.0);
+            let mut low = detection(at_m + DVec2::X * ahead_m, frame.time_ns);
+            (low.top_m, low.aabb.max_m.z) = (1.0, 1.0);
+            low.aabb.max_m.x = low.aabb.min_m.x + long_m;
+            low.aabb.max_m.y = low.aabb.min_m.y + 0.25;
+            tracker.update(&Views::of(&frame), &[detection(at_m, frame.time_ns), low], &mut tracks);
+        }
+        tracks.iter().filter(|track| track.confirmed).count()
+    };
+    assert_eq!(told(0.8, 0.9), 1, "a pram");
+    assert_eq!(told(0.25, 0.9), 2, "a child");
+    assert_eq!(told(0.8, 2.0), 2, "out of arms' reach");
+}
+
+#[test]
 fn somebody_who_leaves_is_forgotten_within_half_a_second() {
     let config = Config::for_mode(Mode::Default).track;
     let mut tracker = Tracker::new(&config, &open_site());
@@ -337,13 +385,15 @@ fn the_order_of_detections_does_not_matter() {
 fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
     // One model and a walker who keeps to it: nothing but the filter's own account is tested.
     let model = MotionModel { acceleration_psd_m2ps3: 1e-6, share: 1.0, standing_mps: None };
-    let numbers = Numbers {
+    let mut numbers = Numbers {
         noise_floor_m: 0.05,
         noise_share: 0.0,
         sway_m: [0.0; 2],
         motion_models: vec![model],
         ..Numbers::new(&Config::default().track)
     };
+    // Nor does anything last here.
+    numbers.usual.axis_sigma_m = 0.0;
     let walkers = [(DVec2::new(-6.0, 2.0), DVec2::new(1.2, -0.3))];
     let (mut sum, mut n) = (0.0, 0);
     for seed in 0..200 {

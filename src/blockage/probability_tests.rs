@@ -186,6 +186,34 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
 }
 
 #[test]
+fn a_ray_meets_what_somebody_carries_beside_him() {
+    let config = Config::default();
+    let numbers = Numbers::new(&config.blockage);
+    let stands = |id: u64, place_m: DVec2| Track {
+        position_m: place_m,
+        velocity_mps: DVec2::ZERO,
+        covariance: std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1e-6 } else { 0.0 })),
+        heading_rad: 0.0,
+        heading_sigma_rad: 0.01,
+        width_scale: 1.0,
+        ..somebody(id, &mut Pcg64::seed_from_u64(1))
+    };
+    let p = |left_m: f64| {
+        // The ray passes 0.4 m to the left of somebody who looks along x.
+        let mut carries = stands(0, DVec2::new(0.0, -0.4));
+        carries.outline_m[1] = [0.0, left_m, left_m, -left_m];
+        carries.outline_m[2] = carries.outline_m[1];
+        let tracks = [carries, stands(1, DVec2::new(-3.0, 0.0))];
+        let forecasts = tracks.each_ref().map(constant_velocity::forecast);
+        let mut sampler = Sampler::new(&numbers, &config.site);
+        let aps_m = [DVec3::new(8.0, 0.0, 1.2)];
+        sampler.draw(&numbers, &config.site.ue, &aps_m, tracks.iter().zip(&forecasts));
+        sampler.chances(&config.site.ue, 0, aps_m[0], 1, 0.5).p_now
+    };
+    assert!(p(0.0) < 0.2 && p(0.1) > 0.8, "{} {}", p(0.0), p(0.1));
+}
+
+#[test]
 fn processors_with_narrower_registers_give_the_same_bits() {
     let config = Config::default();
     let (numbers, ue) = (Numbers::new(&config.blockage), config.site.ue);
