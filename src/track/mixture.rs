@@ -289,7 +289,7 @@ impl MixtureTracker {
                 .iter()
                 .zip(&*places_m)
                 .filter(|(person, place)| person.confirmed && place.distance(detection.position_m) < ALONE_M);
-            let alone = around.clone().skip(1).next().is_none();
+            let alone = around.clone().nth(1).is_none();
             let legs = detection.aabb.min_m.z < visibility.hall.floor_m(detection.position_m) + LEGS_M;
             let on_trial = (alone || !legs)
                 && around.any(|(person, place)| {
