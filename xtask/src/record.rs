@@ -59,12 +59,13 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 45] = [
+const JOBS: [Job; 46] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
     job("sites", "other heights, a lost sensor, more people, pairs", 10, Needs::Nothing, crowds::sites),
     job("shapes", "three halls of other shapes, devices in the hand: what blocks, by cause", 4, Needs::Nothing, crowds::shapes),
+    job("strangers", "bodies of another maker, and what people carry and push", 15, Needs::Nothing, crowds::strangers),
     job("people", "other bodies, real walkers, dense crowds", 6, Needs::Data, crowds::people),
     job("walkers", "16 real walkers, ten draws of bodies, error budget and oracles", 3, Needs::Data, crowds::walkers),
     job("circle-antipode", "8 and 16 real walkers, every mode", 2, Needs::Data, scores::antipode),

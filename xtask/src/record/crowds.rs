@@ -88,6 +88,22 @@ pub fn people(book: &mut Book) -> Result<()> {
     book.compare()
 }
 
+/// Bodies of the family that nothing was fitted to, and what people carry and push, 20 scenes each.
+pub fn strangers(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record strangers");
+    let crowd = ["--scenes", "20", "--preset", "orca-03"];
+    book.score("own", crowd)?;
+    book.score("b", crowd.into_iter().chain(["--meshes", "b"]))?;
+    let third = ["--meshes", "b", "--bodies", "phone=0.17,pockets=0.17"];
+    book.score("b-phones", crowd.into_iter().chain(third))?;
+    for kind in ["bag", "phone", "child", "rucksack", "umbrella", "pram", "frame", "wheelchair"] {
+        book.score(kind, crowd.into_iter().chain(["--bodies", kind]))?;
+    }
+    book.score("mixed", ["--scenes", "20", "--preset", "mixed"])?;
+    book.score("gesturing", ["--scenes", "20", "--preset", "mixed", "--bodies", "gesturing"])?;
+    book.compare()
+}
+
 /// Every kind of body but the plain one, each walked by everybody of a crowd; the captured gait is that of a file.
 pub fn bodies(book: &mut Book, crowd: &[&str], gait: &str) -> Result<()> {
     for kind in ["bag", "phone", "pockets", "child", "wheelchair"] {
