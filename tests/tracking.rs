@@ -271,7 +271,7 @@ fn a_hand_in_a_group_is_nobody_and_who_shows_legs_there_is_somebody() {
                 ..detection(DVec2::new(x_m, 8.0), frame.time_ns)
             };
             let mut detections = vec![somebody(0.0, 100), somebody(1.4, 100)];
-            if (10..18).contains(&k) {
+            if (10..15).contains(&k) {
                 let mut between = somebody(0.7, 12);
                 between.aabb.min_m.z = lowest_m;
                 detections.push(between);

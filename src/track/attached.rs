@@ -21,7 +21,8 @@ const LASTS_S: f64 = 2.0;
 pub(super) struct Beside {
     pub(super) position_m: DVec2,
     pub(super) velocity_mps: DVec2,
-    pub(super) top_m: f64,
+    /// As its track knows it: what others leave to see of a body is lower.
+    pub(super) height_m: f64,
     /// Of the box around it in plan view.
     pub(super) diagonal_m: f64,
 }
@@ -29,7 +30,7 @@ pub(super) struct Beside {
 impl Beside {
     /// Whether `thing` may be something that this body moves.
     fn may_move(&self, thing: &Self) -> bool {
-        thing.top_m < TOP_SHARE * self.top_m
+        thing.height_m < TOP_SHARE * self.height_m
             && thing.position_m.distance_squared(self.position_m) < REACH_M * REACH_M
             && thing.velocity_mps.distance_squared(self.velocity_mps) < APART_MPS * APART_MPS
     }
@@ -58,7 +59,7 @@ impl Attached {
     /// Looks at everybody, `step_s` later.
     pub(super) fn look(&mut self, thing: &Beside, all: &[Beside], step_s: f64) {
         let goes_with =
-            thing.diagonal_m > LONG_SHARE * thing.top_m && all.iter().any(|body| body.may_move(thing));
+            thing.diagonal_m > LONG_SHARE * thing.height_m && all.iter().any(|body| body.may_move(thing));
         self.lasted_s =
             if goes_with { (self.lasted_s + step_s).min(LASTS_S) } else { (self.lasted_s - step_s).max(0.0) };
         self.is_thing = self.lasted_s > if self.is_thing { 0.0 } else { THING_AFTER_S };

@@ -33,8 +33,8 @@ const EXISTENCE_MIN: f64 = 0.05;
 const CONFIRMING_MATCHES: u32 = 2;
 const CONFIRM_WITHIN_S: f64 = 0.25;
 /// The same of who may be an arm of somebody beside: arms do not stay.
-const CONFIRMING_MATCHES_ON_TRIAL: u32 = 14;
-const CONFIRM_WITHIN_ON_TRIAL_S: f64 = 1.7;
+const CONFIRMING_MATCHES_ON_TRIAL: u32 = 8;
+const CONFIRM_WITHIN_ON_TRIAL_S: f64 = 1.0;
 /// A track is not reported as confirmed while its position, one standard deviation of the larger axis, is less sure:
 /// who has been out of sight so long is more likely elsewhere. It is kept, to be known again.
 const REPORTED_SIGMA_MAX_M: f64 = 0.6;
@@ -84,8 +84,6 @@ pub(super) struct Person {
     pub(super) attached: Attached,
     /// Averaged extent along x and y.
     extent_m: DVec2,
-    /// How high it shows itself, averaged.
-    top_m: f64,
     observed: Observations,
 }
 
@@ -107,7 +105,6 @@ impl Remembered for Person {
         self.outline.visit(words);
         self.attached.visit(words);
         words.vec2(&mut self.extent_m);
-        words.f64(&mut self.top_m);
         self.observed.visit(words);
     }
 }
@@ -154,7 +151,6 @@ impl Person {
             outline: Outline::new(&numbers.usual),
             attached: Attached::default(),
             extent_m: DVec2::splat(WIDTH_M),
-            top_m: HEIGHT_MEAN_M,
             observed: Observations::default(),
         }
     }
@@ -230,7 +226,7 @@ impl Person {
         Beside {
             position_m: self.filter.position_m(),
             velocity_mps: self.filter.velocity_mps(),
-            top_m: self.top_m,
+            height_m: self.height.mean_m(),
             diagonal_m: self.extent_m.length(),
         }
     }
@@ -333,7 +329,6 @@ impl Person {
         }
         let new = 1.0 - (-step_s / BOX_AVERAGE_S).exp();
         self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
-        self.top_m += (detection.top_m - self.top_m) * new;
     }
 
     /// Learns the outline from a detection in free sight, where it is known which way the body faces.
