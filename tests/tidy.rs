@@ -324,20 +324,11 @@ fn pages_say_below_persistence_of_truth_where_the_record_does() {
 
 #[test]
 fn what_fits_never_reads_the_bodies_of_another_maker_that_tests_read() {
-    let mut looked = 0;
-    let mut folders = vec![root().join("crates/umbracast-train/src"), root().join("train/src")];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
-            if entry.is_dir() {
-                folders.push(entry);
-                continue;
-            }
-            let text = fs::read_to_string(&entry).expect("a file");
-            assert!(!text.to_lowercase().contains("meshes"), "{}: may read family b", entry.display());
-            looked += 1;
-        }
+    let fits = files_below(&["crates/umbracast-train/src", "train/src"]);
+    assert!(fits.len() > 5, "{}", fits.len());
+    for (name, text) in fits {
+        assert!(!text.to_lowercase().contains("meshes"), "{name}: may read family b");
     }
-    assert!(looked > 5, "{looked}");
 }
 
 /// The release's workflow takes its notes from there.

@@ -233,77 +233,70 @@ fn pieces_of_a_person_keep_a_track_and_start_none() {
     assert_eq!(followed(0), []);
 }
 
+/// How many are told of in each of 30 frames in which `seen` is found at a time.
+fn told(seen: impl Fn(u64, i64) -> Vec<Detection>) -> Vec<usize> {
+    let mut tracker = Tracker::new(&Config::for_mode(Mode::Default).track, &open_site());
+    let mut tracks = Vec::new();
+    let after = |k: u64| {
+        let frame = frame(k);
+        tracker.update(&Views::of(&frame), &seen(k, frame.time_ns), &mut tracks);
+        tracks.iter().filter(|track| track.confirmed).count()
+    };
+    (0..30).map(after).collect()
+}
+
+/// Somebody at a place along x who shows so many points.
+fn somebody_at(x_m: f64, points: u32, time_ns: i64) -> Detection {
+    Detection { points, ..detection(DVec2::new(x_m, 8.0), time_ns) }
+}
+
 #[test]
 fn a_hand_that_shows_apart_is_nobody_and_who_stays_beside_is_somebody() {
-    let config = Config::for_mode(Mode::Default).track;
-    let told = |beside_m: f64, points: u32, frames: std::ops::Range<u64>| {
-        let mut tracker = Tracker::new(&config, &open_site());
-        let (mut tracks, mut most) = (Vec::new(), 0);
-        for k in 0..30 {
-            let frame = frame(k);
-            let somebody = |x_m: f64, points: u32| Detection {
-                points,
-                ..detection(DVec2::new(x_m, 8.0), frame.time_ns)
-            };
-            let mut detections = vec![somebody(0.0, 100)];
-            detections.extend(frames.contains(&k).then(|| somebody(beside_m, points)));
-            tracker.update(&Views::of(&frame), &detections, &mut tracks);
-            most = most.max(tracks.iter().filter(|track| track.confirmed).count());
-        }
-        most
+    let most = |beside_m: f64, points: u32, frames: std::ops::Range<u64>| {
+        let seen = |k: u64, time_ns: i64| {
+            let mut seen = vec![somebody_at(0.0, 100, time_ns)];
+            seen.extend(frames.contains(&k).then(|| somebody_at(beside_m, points, time_ns)));
+            seen
+        };
+        told(seen).into_iter().max().unwrap()
     };
-    assert_eq!(told(0.7, 10, 10..15), 1, "half a second of a hand");
-    assert_eq!(told(0.7, 10, 10..25), 2, "who has come out from behind");
-    assert_eq!(told(0.7, 80, 10..13), 2, "a body beside");
-    assert_eq!(told(1.2, 10, 10..13), 2, "out of an arm's reach");
+    assert_eq!(most(0.7, 10, 10..15), 1, "half a second of a hand");
+    assert_eq!(most(0.7, 10, 10..25), 2, "who has come out from behind");
+    assert_eq!(most(0.7, 80, 10..13), 2, "a body beside");
+    assert_eq!(most(1.2, 10, 10..13), 2, "out of an arm's reach");
 }
 
 #[test]
 fn a_hand_in_a_group_is_nobody_and_who_shows_legs_there_is_somebody() {
-    let config = Config::for_mode(Mode::Default).track;
-    let told = |lowest_m: f64| {
-        let mut tracker = Tracker::new(&config, &open_site());
-        let (mut tracks, mut most) = (Vec::new(), 0);
-        for k in 0..30 {
-            let frame = frame(k);
-            let somebody = |x_m: f64, points: u32| Detection {
-                points,
-                ..detection(DVec2::new(x_m, 8.0), frame.time_ns)
-            };
-            let mut detections = vec![somebody(0.0, 100), somebody(1.4, 100)];
-            if (10..15).contains(&k) {
-                let mut between = somebody(0.7, 12);
-                between.aabb.min_m.z = lowest_m;
-                detections.push(between);
-            }
-            tracker.update(&Views::of(&frame), &detections, &mut tracks);
-            most = most.max(tracks.iter().filter(|track| track.confirmed).count());
-        }
-        most
+    let most = |lowest_m: f64| {
+        let seen = |k: u64, time_ns: i64| {
+            let mut between = somebody_at(0.7, 12, time_ns);
+            between.aabb.min_m.z = lowest_m;
+            let mut seen = vec![somebody_at(0.0, 100, time_ns), somebody_at(1.4, 100, time_ns)];
+            seen.extend((10..15).contains(&k).then_some(between));
+            seen
+        };
+        told(seen).into_iter().max().unwrap()
     };
-    assert_eq!([told(1.0), told(0.1)], [2, 3]);
+    assert_eq!([most(1.0), most(0.1)], [2, 3]);
 }
 
 #[test]
 fn what_somebody_pushes_is_nobody_and_a_child_ahead_is_somebody() {
-    let config = Config::for_mode(Mode::Default).track;
-    let told = |long_m: f64, ahead_m: f64| {
-        let mut tracker = Tracker::new(&config, &open_site());
-        let mut tracks = Vec::new();
-        for k in 0..30 {
-            let frame = frame(k);
+    let at_last = |long_m: f64, ahead_m: f64| {
+        let seen = |k: u64, time_ns: i64| {
             let at_m = DVec2::new(0.1 * k as f64, 8.0);
-            let mut low = detection(at_m + DVec2::X * ahead_m, frame.time_ns);
+            let mut low = detection(at_m + DVec2::X * ahead_m, time_ns);
             (low.top_m, low.aabb.max_m.z) = (1.0, 1.0);
             low.aabb.max_m.x = low.aabb.min_m.x + long_m;
             low.aabb.max_m.y = low.aabb.min_m.y + 0.25;
-            tracker.update(&Views::of(&frame), &[detection(at_m, frame.time_ns), low], &mut tracks);
-        }
-        tracks.iter().filter(|track| track.confirmed).count()
+            vec![detection(at_m, time_ns), low]
+        };
+        told(seen)[29]
     };
-    assert_eq!(told(0.8, 0.9), 1, "a pram");
-    assert_eq!(told(0.25, 0.9), 2, "a child");
-    assert_eq!(told(0.8, 2.0), 2, "out of arms' reach");
+    assert_eq!(at_last(0.8, 0.9), 1, "a pram");
+    assert_eq!(at_last(0.25, 0.9), 2, "a child");
+    assert_eq!(at_last(0.8, 2.0), 2, "out of arms' reach");
 }
 
 #[test]

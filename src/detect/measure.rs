@@ -24,7 +24,7 @@ const HEAD_M: f64 = 0.2;
 const OWN_M: f64 = 0.5;
 /// A wheelchair is 1.3 m from corner to corner, and who sits in one reaches no higher than this.
 const SEATED_DIAGONAL_MAX_M: f64 = 1.5;
-pub(crate) const SEATED_HEIGHT_M: f64 = 1.5;
+const SEATED_HEIGHT_M: f64 = 1.5;
 
 /// Somebody known whose arms are stretched out is as long as tall at most. What is below this share of it is legs that stand,
 /// which take up less than this.

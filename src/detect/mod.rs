@@ -36,7 +36,6 @@ pub use clocks::Clocks;
 pub use doubled::doubled;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
-
 #[doc(hidden)] // For the card of the model of the body axis.
 pub use measure::SHIFT_M;
 pub use outline::{LEVELS, Reach};

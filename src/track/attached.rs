@@ -1,13 +1,13 @@
-//! What goes with somebody's body and shows no head of its own: a wheelchair before its rider's trunk, a pram, a walking frame, a
-//! suitcase on wheels. It is followed, for what is known to be there confuses nobody, and it is nobody.
+//! What goes with somebody's body and is too long and low to be one who walks: a wheelchair before its rider's trunk, a pram, a walking
+//! frame. It is followed, for what is known to be there confuses nobody, and it is nobody.
 
 use super::remembered::{Remembered, Words};
 use crate::geometry::DVec2;
 
 /// Its longest side in plan view is more than this share of its height: of people who walk, children among them, it is 0.35 to
-/// 0.5, of prams and frames 0.6 and more. Its top is below this share of the body's.
+/// 0.5, of prams and frames 0.6 and more. It is lower than this share of the body.
 const LONG_SHARE: f64 = 0.55;
-const TOP_SHARE: f64 = 0.75;
+const HEIGHT_SHARE: f64 = 0.75;
 /// It is no farther from the body's axis: arms, a handle, half a pram. And as fast.
 const REACH_M: f64 = 1.35;
 const APART_MPS: f64 = 0.6;
@@ -30,7 +30,7 @@ pub(super) struct Beside {
 impl Beside {
     /// Whether `thing` may be something that this body moves.
     fn may_move(&self, thing: &Self) -> bool {
-        thing.height_m < TOP_SHARE * self.height_m
+        thing.height_m < HEIGHT_SHARE * self.height_m
             && thing.position_m.distance_squared(self.position_m) < REACH_M * REACH_M
             && thing.velocity_mps.distance_squared(self.velocity_mps) < APART_MPS * APART_MPS
     }
@@ -51,7 +51,7 @@ impl Remembered for Attached {
 }
 
 impl Attached {
-    /// True of what goes with somebody's body and shows no head.
+    /// True of what has gone with somebody's body for long enough.
     pub(super) fn is_thing(&self) -> bool {
         self.is_thing
     }

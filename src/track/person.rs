@@ -264,16 +264,14 @@ impl Person {
         observed.clone_from(&self.observed.0);
         let outline_m = self.outline.levels_m();
         let lasting_m2 = numbers.usual.axis_variance_m2(&outline_m);
+        let mut covariance = state.P;
+        (0..2).for_each(|axis| covariance[axis][axis] += lasting_m2);
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
         Track {
             id: self.id,
             position_m,
             velocity_mps,
-            covariance: std::array::from_fn(|i| {
-                std::array::from_fn(
-                    |j| if i == j && i < 2 { state.P[i][j] + lasting_m2 } else { state.P[i][j] },
-                )
-            }),
+            covariance,
             heading_rad: self.heading.mean_rad,
             heading_sigma_rad: self.heading.sigma_rad(),
             heading_behind: self.heading.behind,
