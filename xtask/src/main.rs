@@ -1,6 +1,7 @@
 //! `cargo xtask NAME`: the repository's own tasks. Nothing here is part of the program.
 
 mod tools;
+mod fit;
 mod answers;
 mod record;
 mod quote;
@@ -18,6 +19,7 @@ cargo xtask quote             cut every block of figures in README.md and docs/ 
 cargo xtask answers           whether the program answers what record/answers.txt keeps of it
     --write                       keep what it answers now: records of before are then of an earlier program
 cargo xtask same-tables REV   whether a git revision and the working tree write the same tables, byte for byte
+cargo xtask fit [NAME...]     fit anew what the program learns from data, in order: axis, outline, body, residual; about an hour on two cores
 cargo xtask structure         files and imports as a picture, docs/structure.svg, and in words
     --check                       write nothing; fail where the picture is stale or files of src/ use one another in a circle";
 
@@ -30,6 +32,7 @@ fn main() -> ExitCode {
         ["answers"] => record::answers(false),
         ["answers", "--write"] => record::answers(true),
         ["same-tables", revision] => same_tables::run(revision),
+        ["fit", names @ ..] => fit::run(names),
         ["structure"] => structure::run(false),
         ["structure", "--check"] => structure::run(true),
         [] | ["--help" | "-h" | "help"] => {

@@ -20,10 +20,12 @@ use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Tracker;
 use umbracast::{Error, Health};
 use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast_sim::body::Bodies;
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs, speed_augmented};
 use umbracast_sim::scene::Scene;
 
 use crate::adam::Adam;
+use crate::bodies::bodies;
 
 /// Height of the sensors, their distance from the middle, the scenes' seeds.
 type Layout = (f64, f64, Range<u64>);
@@ -93,7 +95,9 @@ fn card(model: &AxisModel, training: &[Sample], held_out: &[Sample], commit: &st
          {EVEN} + {ODD} inputs, {HIDDEN} hidden units, {OUTPUTS} outputs (`src/detect/axis.rs`).\n\n\
          Written by `umbracast train axis`, commit {commit}.\n\n\
          ## Data\n\nSimulated returns of {PEOPLE} people a scene, in turn: orca-03, mixed speed-augmented, orca-06, \
-         pairs 0.6 m apart, mixed, orca-03 speed-augmented.\n\n\
+         pairs 0.6 m apart, mixed, orca-03 speed-augmented. Six scenes have bodies of our own, the next six those of the \
+         third-party family `a`; then the same with telephones, bags, rucksacks and hands in pockets among them. No two \
+         people walk alike.\n\n\
          {layouts}\n{} clusters; {EPOCHS} epochs, Adam, negative log-likelihood, mirrored at random, seed {SEED}.\n\n\
          ## Error of one frame\n\n\
          | | training | {} scenes of their own from seed {} |\n|---|---|---|\n\
@@ -151,17 +155,20 @@ fn samples(layout: &Layout, scene_done: impl Fn() + Sync) -> Result<Vec<Sample>,
     }
     let first = seeds.start;
     let of_scenes = seeds.into_par_iter().map(|seed| {
-        let samples = watch(crowd_of(seed - first, seed), seed, &config);
+        let samples = watch(crowd_of(seed - first, seed), bodies((seed - first) / CROWDS)?, seed, &config);
         scene_done();
         samples
     });
     Ok(of_scenes.collect::<Result<Vec<Vec<Sample>>, Error>>()?.concat())
 }
 
+/// So many kinds of crowds.
+const CROWDS: u64 = 6;
+
 /// Who walks in the scene of that number.
 fn crowd_of(scene: u64, seed: u64) -> Crowd {
     let drawn = |preset| circle_crossing(preset, PEOPLE, 12.5, seed);
-    match scene % 6 {
+    match scene % CROWDS {
         0 => drawn(Preset::Orca03),
         1 => speed_augmented(&drawn(Preset::Mixed), seed),
         2 => drawn(Preset::Orca06),
@@ -172,7 +179,7 @@ fn crowd_of(scene: u64, seed: u64) -> Crowd {
 }
 
 /// Every cluster of a scene that is a person's.
-fn watch(crowd: Crowd, seed: u64, config: &Config) -> Result<Vec<Sample>, Error> {
+fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec<Sample>, Error> {
     let mut samples: Vec<Sample> = Vec::new();
     let mut health = Health::default();
     let mut background = Background::new(&config.detect, &config.site);
@@ -180,7 +187,7 @@ fn watch(crowd: Crowd, seed: u64, config: &Config) -> Result<Vec<Sample>, Error>
     let mut measurer = Measurer::new(&config.detect, &config.site);
     let mut tracker = Tracker::new(&config.track, &config.site);
     empty_frames(&config.site, seed)?.iter().for_each(|frame| background.learn_empty(frame));
-    let mut scene = Scene::new(crowd, &config.site, seed)?;
+    let mut scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&bodies);
     let walkers = scene.walkers().to_vec();
     let mut assembler = Assembler::new(&config.site)?;
     let (mut priors, mut points, mut clusters, mut detections, mut tracks) =

@@ -7,6 +7,7 @@
 
 pub mod adam;
 pub mod weights;
+mod bodies;
 pub mod axis;
 pub mod samples;
 pub mod residual;

@@ -22,6 +22,8 @@ use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 
+use crate::bodies::of_family_a;
+
 /// Tuning seeds only (docs/CONVENTIONS.md).
 const FIRST_SEED: u64 = 135_000;
 /// A track nearer than this to a person is that person's.
@@ -41,6 +43,9 @@ const CARRYING: [Option<Kind>; 8] = [
     None,
     Some(Kind::Screen),
 ];
+
+/// Which of these have bodies of another maker.
+const OF_FAMILY_A: usize = 2;
 
 /// One reach: its level, whether toward the sensor, cosine and sine of its direction, speed over hip height, height, and metres.
 #[derive(Debug, Clone, Copy)]
@@ -166,7 +171,8 @@ fn watch(scene: usize, without: bool) -> Result<Vec<Person>, Error> {
     let usual = UsualOutline::shipped();
     let preset = [Preset::Orca03, Preset::Mixed][scene / CARRYING.len() % 2];
     let kinds = CARRYING[scene % CARRYING.len()].map(|kind| (kind, 1.0));
-    let bodies = Bodies::new(kinds.into_iter().collect(), None)?;
+    let own = Bodies::new(kinds.into_iter().collect(), None)?;
+    let bodies = if scene % CARRYING.len() == OF_FAMILY_A { of_family_a(own)? } else { own };
     let crowd = circle_crossing(preset, 10, 12.5, seed);
     let mut scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&bodies);
     let walkers = scene.walkers().to_vec();

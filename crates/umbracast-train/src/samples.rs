@@ -18,6 +18,11 @@ use umbracast_io::rows;
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, mixed, speed_augmented};
 use umbracast_sim::scene::Scene;
 
+use crate::bodies::bodies;
+
+/// So many scenes in a row have the same bodies.
+const SCENES_ALIKE: u64 = 6;
+
 /// A track at a frame, and its person's way from there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
@@ -90,7 +95,8 @@ fn of_scene(scene: &SampleScene, config: &Config) -> Result<Vec<Sample>, Error> 
     let mut pipeline = Pipeline::new(&config, None)?;
     empty_frames(&config.site, scene.seed)?.iter().for_each(|frame| pipeline.learn_empty(frame));
     let (mut assembler, mut health) = (Assembler::new(&config.site)?, Health::default());
-    let mut simulated = Scene::new(scene.crowd.clone(), &config.site, scene.seed)?;
+    let mut simulated = Scene::new(scene.crowd.clone(), &config.site, scene.seed)?
+        .with_bodies(&bodies(scene.seed / SCENES_ALIKE)?);
     let (mut truth, mut tracks) = (SceneTruth::default(), Vec::new());
     let mut seen: BTreeMap<(u64, u64), (Seen, [DVec2; 2])> = BTreeMap::new();
     let mut step = |frame: &Frame, tracks: &mut Vec<_>| {

@@ -1,0 +1,124 @@
+//! Everything that the program learns from data, fitted anew in order: the body axis, outlines, stage 3's body, the forecast's
+//! residual. Each fit runs the program with what was fitted before it, so the program is built again in between.
+
+use std::fs;
+use std::path::Path;
+
+use crate::tools::{Result, Scratch, built, data, output, root, target};
+
+/// The outline's lasting spread is that of the tracker with the outline that ships, so its fit is asked again until its
+/// numbers stay, but no oftener than this.
+const OUTLINES_MAX: usize = 4;
+const OUTLINE_HEAD: &str = "# What outlines of usual bodies look like; see outline.md.\n";
+const BODY_HEAD: &str = "# The body that a ray meets, in shares of the standing height; see body.md.\n";
+
+/// Tuning scenes that the body is fitted on: the words of `simulate`.
+const BODY_SCENES: [&[&str]; 3] = [
+    &["--preset", "orca-03", "--scenes", "4", "--seed", "136000"],
+    &["--preset", "orca-03", "--scenes", "4", "--seed", "136050", "--meshes", "a"],
+    &["--preset", "mixed", "--scenes", "4", "--seed", "136100"],
+];
+/// Recorded people from whom the residual learns.
+const RECORDED: [&str; 4] = [
+    "pedpy/traj_UNI_CORR_500_01.txt",
+    "madras/Topview_1B.csv",
+    "madras/Topview_2C.csv",
+    "madras/Topview_2D.csv",
+];
+
+/// Fits these, or all; needs a clean tree, for the cards name its commit.
+pub fn run(names: &[&str]) -> Result<()> {
+    const ALL: [(&str, fn(&str, &Path) -> Result<()>); 4] =
+        [("axis", axis), ("outline", outline), ("body", body), ("residual", residual)];
+    if let Some(name) = names.iter().find(|name| !ALL.iter().any(|(known, _)| known == *name)) {
+        return Err(format!("fit: expected axis, outline, body or residual, found {name:?}"));
+    }
+    let changed = output(&root(), "git", &["status", "--porcelain", "--untracked-files=no"])?;
+    if !changed.is_empty() {
+        return Err(format!(
+            "fit: expected a tree without changes, for cards name the commit, found\n{changed}"
+        ));
+    }
+    let commit = output(&root(), "git", &["rev-parse", "--short=10", "HEAD"])?;
+    for (name, fit) in ALL.iter().filter(|(name, _)| names.is_empty() || names.contains(name)) {
+        eprintln!("fit {name}");
+        fit(&commit, &Scratch::new(&format!("fit-{name}"))?.0)?;
+    }
+    Ok(())
+}
+
+fn axis(commit: &str, folder: &Path) -> Result<()> {
+    umbracast(&["train", "axis", "--commit", commit, "--out", text(folder)?])?;
+    ["body_axis.toml", "body_axis.md"].iter().try_for_each(|name| take(&folder.join(name), name))
+}
+
+fn outline(commit: &str, _: &Path) -> Result<()> {
+    let mut before = String::new();
+    for _ in 0..OUTLINES_MAX {
+        let fitted = umbracast(&["train", "outline", "--scenes", "32", "--quiet"])?;
+        write("outline.toml", &format!("{OUTLINE_HEAD}{fitted}\n"))?;
+        if fitted == before {
+            break;
+        }
+        before = fitted;
+    }
+    name_commit("outline.md", commit)
+}
+
+fn body(commit: &str, folder: &Path) -> Result<()> {
+    let mut words = vec!["train".to_owned(), "body".to_owned(), "--quiet".to_owned()];
+    for (i, scenes) in BODY_SCENES.iter().enumerate() {
+        let [simulated, run] = ["simulated", "run"].map(|what| folder.join(format!("{what}-{i}")));
+        let [simulated, run] = [text(&simulated)?, text(&run)?];
+        umbracast(&[&["simulate", "--quiet", "--out", simulated], *scenes].concat())?;
+        umbracast(&["run", "--quiet", "--mode", "default", simulated, "--out", run])?;
+        words.extend([simulated.to_owned(), run.to_owned()]);
+    }
+    let fitted = umbracast(&words.iter().map(String::as_str).collect::<Vec<_>>())?;
+    write("body.toml", &format!("{BODY_HEAD}{fitted}\n"))?;
+    name_commit("body.md", commit)
+}
+
+fn residual(commit: &str, folder: &Path) -> Result<()> {
+    let data =
+        data().ok_or("fit residual: expected the folder of the real data in UMBRACAST_DATA, found none")?;
+    let recorded: Vec<String> = RECORDED.iter().map(|file| data.join(file).display().to_string()).collect();
+    let mut words = vec!["train", "residual", "--scenes", "96", "--centre", "--commit", commit];
+    words.extend(["--out", text(folder)?, "--trajectories"]);
+    words.extend(recorded.iter().map(String::as_str));
+    umbracast(&words)?;
+    ["residual.safetensors", "residual.md"].iter().try_for_each(|name| take(&folder.join(name), name))
+}
+
+/// What the command prints, built from the models as they are now.
+fn umbracast(words: &[&str]) -> Result<String> {
+    let program = built(&root(), &target())?;
+    output(&root(), &program.display().to_string(), words)
+}
+
+fn text(path: &Path) -> Result<&str> {
+    path.to_str().ok_or_else(|| format!("{}: expected a path in UTF-8", path.display()))
+}
+
+fn take(from: &Path, name: &str) -> Result<()> {
+    let bytes = fs::read(from).map_err(|e| format!("{}: {e}", from.display()))?;
+    let to = root().join("models").join(name);
+    fs::write(&to, bytes).map_err(|e| format!("{}: {e}", to.display()))
+}
+
+fn write(name: &str, text: &str) -> Result<()> {
+    let to = root().join("models").join(name);
+    fs::write(&to, text).map_err(|e| format!("{}: {e}", to.display()))
+}
+
+/// In a card that is written by hand.
+fn name_commit(card: &str, commit: &str) -> Result<()> {
+    const BEFORE: &str = "at commit `";
+    let path = root().join("models").join(card);
+    let old = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let (head, rest) = old
+        .split_once(BEFORE)
+        .ok_or_else(|| format!("{}: expected {BEFORE:?}, found none", path.display()))?;
+    let (_, tail) = rest.split_once('`').unwrap_or_default();
+    write(card, &format!("{head}{BEFORE}{commit}`{tail}"))
+}
