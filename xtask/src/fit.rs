@@ -8,7 +8,7 @@ use crate::tools::{Result, Scratch, built, data, output, root, target};
 
 /// The outline's lasting spread is that of the tracker with the outline that ships, so its fit is asked again until its
 /// numbers stay, but no oftener than this.
-const OUTLINES_MAX: usize = 4;
+const OUTLINES_MAX: usize = 3;
 const OUTLINE_HEAD: &str = "# What outlines of usual bodies look like; see outline.md.\n";
 const BODY_HEAD: &str = "# The body that a ray meets, in shares of the standing height; see body.md.\n";
 
