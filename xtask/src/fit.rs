@@ -26,10 +26,12 @@ const RECORDED: [&str; 4] = [
     "madras/Topview_2D.csv",
 ];
 
+/// A fit: what it is called, and what makes its model and card from the commit that the card names, in a folder of its own.
+type Fit = (&'static str, fn(&str, &Path) -> Result<()>);
+const ALL: [Fit; 4] = [("axis", axis), ("outline", outline), ("body", body), ("residual", residual)];
+
 /// Fits these, or all; needs a clean tree, for the cards name its commit.
 pub fn run(names: &[&str]) -> Result<()> {
-    const ALL: [(&str, fn(&str, &Path) -> Result<()>); 4] =
-        [("axis", axis), ("outline", outline), ("body", body), ("residual", residual)];
     if let Some(name) = names.iter().find(|name| !ALL.iter().any(|(known, _)| known == *name)) {
         return Err(format!("fit: expected axis, outline, body or residual, found {name:?}"));
     }
