@@ -11,9 +11,9 @@ const HAND_SHARE: f64 = 0.37;
 /// A raised hand is no higher than this share of the stature.
 const RAISED_SHARE: f64 = 1.2;
 /// Of the points of a body an arm has so many at most: who stands behind somebody shows more.
-pub(crate) const ARM_SHARE: f64 = 0.5;
+const ARM_SHARE: f64 = 0.5;
 /// Arms are looked for where nobody else is known as near: in a crowd people show as little of themselves.
-pub(crate) const ALONE_M: f64 = 2.0;
+pub(super) const ALONE_M: f64 = 2.0;
 /// Of a body that stands, more of the points are below that; of an arm with a hip beside it, fewer.
 const LOW_SHARE: f64 = 0.15;
 /// Points so near to the highest are the head's.

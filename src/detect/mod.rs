@@ -28,7 +28,6 @@ mod measure;
 mod clocks;
 mod doubled;
 
-pub(crate) use arms::{ALONE_M, ARM_SHARE};
 pub use background::Background;
 #[doc(hidden)] // For who joins the foreground of several front ends.
 pub use background::keep_most;

@@ -14,7 +14,7 @@ use super::remembered::{FURNITURE_MAX, PEOPLE_MAX, Remembered, Words};
 use super::visibility::{Body, BodyView, Visibility, detection_probability};
 use crate::Site;
 use crate::config::TrackConfig;
-use crate::detect::{ALONE_M, Detection, Prior};
+use crate::detect::{Detection, Prior};
 use crate::geometry::DVec2;
 use crate::lidar::Views;
 
@@ -35,11 +35,8 @@ const BIRTH_RADIUS_M: f64 = 0.45;
 const BIRTH_BESIDE_SEEN_M: f64 = 0.30;
 const CROWD_PEOPLE: usize = 3;
 const CROWD_M: f64 = 1.0;
-/// What shows little this near to one person may be an arm: half the span of a tall one's arms. Not where somebody else is
-/// known as near as [`ALONE_M`]: in a crowd people do show that little.
+/// What is found so near to a person may be his arm, or held by him: half the span of a tall one's arms.
 const ARM_REACH_M: f64 = 0.95;
-/// Who shows something so low stands on legs.
-const LEGS_M: f64 = 0.6;
 /// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it.
 const DUPLICATE_M: f64 = 0.3;
 /// Nobody walks faster: spares most pairs the rest.
@@ -259,7 +256,7 @@ impl MixtureTracker {
 
     /// A track for each detection that is nobody's and far enough from everybody.
     fn give_birth(&mut self, time_ns: i64, detections: &[Detection]) {
-        let Self { numbers, people, furniture_m: known_m, next_id, memory, visibility, .. } = self;
+        let Self { numbers, people, furniture_m: known_m, next_id, memory, .. } = self;
         let Memory { order, assignment, places_m, seen, taken, .. } = memory;
         seen.clear();
         seen.extend(people.iter().map(|person| person.is_seen()));
@@ -285,16 +282,9 @@ impl MixtureTracker {
                 .copied()
                 .chain(furniture_m)
                 .any(|place| place.distance(detection.position_m) < BESIDE_M);
-            let mut around = people
-                .iter()
-                .zip(&*places_m)
-                .filter(|(person, place)| person.confirmed && place.distance(detection.position_m) < ALONE_M);
-            let alone = around.clone().nth(1).is_none();
-            let legs = detection.aabb.min_m.z < visibility.hall.floor_m(detection.position_m) + LEGS_M;
-            let on_trial = (alone || !legs)
-                && around.any(|(person, place)| {
-                    place.distance(detection.position_m) < ARM_REACH_M && person.may_own(detection)
-                });
+            let on_trial = people.iter().zip(&*places_m).any(|(person, place)| {
+                person.confirmed && place.distance(detection.position_m) < ARM_REACH_M
+            });
             let mut person = Person::born(numbers, *next_id, detection, time_ns, beside, on_trial);
             let measured_ns = measured_ns(detection, i64::MIN, time_ns);
             person.predict(numbers, seconds(measured_ns, time_ns));

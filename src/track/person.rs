@@ -14,7 +14,7 @@ use super::origin::Origin;
 use super::outline::{Axis, Outline};
 use super::remembered::{Remembered, Words};
 use super::visibility::{Body, BodyView, Visibility};
-use crate::detect::{ARM_SHARE, Detection, Prior};
+use crate::detect::{Detection, Prior};
 use crate::gait::relative_speed_hz;
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use crate::site::Hall;
@@ -32,9 +32,15 @@ const EXISTENCE_MIN: f64 = 0.05;
 /// So many detections confirm a track, within a time: two of three frames at 10 Hz.
 const CONFIRMING_MATCHES: u32 = 2;
 const CONFIRM_WITHIN_S: f64 = 0.25;
-/// The same of who may be an arm of somebody beside: arms do not stay.
+/// Who may be an arm of somebody beside is confirmed by so many in which legs are to be seen, within a longer time. Where legs
+/// would not be seen it takes more, for arms do not stay.
 const CONFIRMING_MATCHES_ON_TRIAL: u32 = 8;
 const CONFIRM_WITHIN_ON_TRIAL_S: f64 = 1.0;
+/// Legs reach up to this share of the height. They would be seen where so many returns of them are expected, and so much of what
+/// they give in free sight.
+const LEGS_SHARE: f64 = 0.4;
+const LEGS_RETURNS_MIN: f64 = 5.0;
+const LEGS_FREE_SHARE: f64 = 0.5;
 /// A track is not reported as confirmed while its position, one standard deviation of the larger axis, is less sure:
 /// who has been out of sight so long is more likely elsewhere. It is kept, to be known again.
 const REPORTED_SIGMA_MAX_M: f64 = 0.6;
@@ -67,8 +73,10 @@ pub(super) struct Person {
     pub(super) filter: Filter,
     limb_phase: LimbPhase,
     pub(super) confirmed: bool,
-    /// Born so near to somebody, showing so little, that it may be an arm.
+    /// Born so near to somebody that it may be an arm.
     on_trial: bool,
+    /// How many matches showed legs.
+    matches_with_legs: u32,
     /// Probability that somebody is there.
     pub(super) existence: f64,
     pub(super) matches: u32,
@@ -94,6 +102,7 @@ impl Remembered for Person {
         self.limb_phase.visit(words);
         words.bool(&mut self.confirmed);
         words.bool(&mut self.on_trial);
+        words.u32(&mut self.matches_with_legs);
         words.f64(&mut self.existence);
         words.u32(&mut self.matches);
         words.f64(&mut self.doubled_s);
@@ -140,6 +149,7 @@ impl Person {
             limb_phase: LimbPhase::default(),
             confirmed: false,
             on_trial: false,
+            matches_with_legs: 0,
             existence: EXISTENCE_AT_BIRTH,
             matches: 1,
             doubled_s: 0.0,
@@ -180,9 +190,21 @@ impl Person {
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.matches += 1;
         self.last_match_ns = time_ns;
-        let enough = if self.on_trial { CONFIRMING_MATCHES_ON_TRIAL } else { CONFIRMING_MATCHES };
-        self.confirmed |= self.matches >= enough;
+        let lowest_m = detection.aabb.min_m.z - visibility.hall.floor_m(self.filter.position_m());
+        self.matches_with_legs += u32::from(lowest_m < LEGS_SHARE * self.height.mean_m());
+        self.confirmed |= self.is_somebody(view);
         self.see(numbers, detection, view, Some(visibility), step_s);
+    }
+
+    /// Whether enough of it was seen, by this frame's view, to be somebody of his own.
+    fn is_somebody(&self, view: &BodyView) -> bool {
+        if !self.on_trial {
+            return self.matches >= CONFIRMING_MATCHES;
+        }
+        let legs_would_be_seen = view.beams_known
+            && view.returns_of_legs >= LEGS_RETURNS_MIN.max(LEGS_FREE_SHARE * view.returns_of_legs_alone);
+        self.matches_with_legs >= CONFIRMING_MATCHES
+            || !legs_would_be_seen && self.matches >= CONFIRMING_MATCHES_ON_TRIAL
     }
 
     /// No detection in this frame, although there was one with chance `detection_probability` a step.
@@ -214,11 +236,6 @@ impl Person {
     /// Whether it has a detection in this frame.
     pub(super) fn is_seen(&self) -> bool {
         self.points > 0
-    }
-
-    /// Whether so few points may be of an arm of this body, which shows more in this frame.
-    pub(super) fn may_own(&self, detection: &Detection) -> bool {
-        f64::from(detection.points) < ARM_SHARE * f64::from(self.points)
     }
 
     /// As others may move beside it.

@@ -13,6 +13,8 @@ use crate::site::{Hall, Site, from_segment_m};
 const BODY_RADIUS_M: f64 = 0.155;
 /// A body is looked at in so many slices from the feet to the top.
 const SLICES: usize = 8;
+/// The lowest of them are the legs'.
+const LEGS_SLICES: usize = 4;
 /// Expected returns at which the chance of a detection has fallen to half, measured; a cluster has at least 5 points.
 const RETURNS_AT_HALF: f64 = 6.0;
 /// A body that sensors meet only below this height is not detected: legs alone are not taken for a person.
@@ -84,7 +86,11 @@ pub struct BodyView {
     pub returns: f64,
     /// The same if nobody and nothing stood between.
     pub returns_alone: f64,
-    /// Whether both were counted from the sensors' beams; a guess otherwise.
+    /// Of them from below the hips.
+    pub returns_of_legs: f64,
+    /// Those of the legs if nobody and nothing stood between.
+    pub returns_of_legs_alone: f64,
+    /// Whether all were counted from the sensors' beams; a guess otherwise.
     pub beams_known: bool,
     /// Beams that meet a metre of upright head, all sensors together.
     pub beams_per_m_at_top: f64,
@@ -214,11 +220,17 @@ impl Eye {
                 }
                 let returns = beams * side.columns_on(slice) * 0.5;
                 view.returns_alone += returns;
+                if slice < LEGS_SLICES {
+                    view.returns_of_legs_alone += returns;
+                }
                 if between.hide(i, self.origin_m, above(*foot_m, 0.5 * (low_m + high_m))) {
                     continue;
                 }
                 view.top_m = view.top_m.max(high_m);
                 view.returns += returns;
+                if slice < LEGS_SLICES {
+                    view.returns_of_legs += returns;
+                }
                 if slice + 1 == SLICES {
                     view.beams_per_m_at_top += 0.5 * beams / (high_m - low_m);
                 }
