@@ -84,7 +84,7 @@ const JOBS: [Job; 46] = [
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", 5, Needs::Nothing, glass::glass),
     job("gestures", "people who talk with their hands beside a sensor", 10, Needs::Nothing, gestures::gestures),
     job("cut", "what a frame gains that closes as soon as the part with people has", 3, Needs::Nothing, crowds::cut),
-    job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", 20, Needs::Nothing, crowds::network),
+    job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", 30, Needs::Data, crowds::network),
     job("bindings", "which device is carried by whom, from the power heard", 4, Needs::Nothing, crowds::bindings),
     job("live", "ten minutes live, three times over, the page open", 33, Needs::Asking, live::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", 25, Needs::Asking, nodes::nodes),

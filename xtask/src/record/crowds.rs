@@ -217,31 +217,26 @@ fn losses(report: &str) -> Vec<(String, [String; 3])> {
 /// Policies of changing access points, in closed loop; then sweeps, each model as truth and as predictor, and the dB told.
 pub fn network(book: &mut Book) -> Result<()> {
     let first = "220000";
-    book.umbracast_says(["network", "--scenes", "40", "--seed", first])?;
-    let few =
-        ["--policies", "a3-60-40,conditional-60-40,forecast,oracle", "--seed", "220100", "--scenes", "10"];
+    book.umbracast_says(["network", "--scenes", "20", "--seed", first])?;
+    let few = "--policies a3-60-40,conditional-60-40,forecast,oracle --carrier 28 --seed 220100 --scenes 4";
     for sweep in [
-        ["--carrier", "28", "--truth", "edges", "--margin", "5,10,15,20"].as_slice(),
-        &["--carrier", "28", "--truth", "edges", "--interruption", "3,25,70"],
-        &["--carrier", "28", "--truth", "edges", "--people", "5,20,40"],
-        &["--carrier", "28", "--truth", "edges", "--access-points", "1,2,4,8"],
-        &["--carrier", "28", "--truth", "edges", "--own-body"],
-        &[
-            "--carrier",
-            "28",
-            "--truth",
-            "model-b,kirchhoff,edges",
-            "--predictor",
-            "kirchhoff,model-b,three-edges",
-        ],
+        "--truth edges --margin 5,10,15,20",
+        "--truth edges --interruption 3,25,70",
+        "--truth edges --people 5,20,40",
+        "--truth edges --access-points 1,2,8",
+        "--truth edges --own-body",
+        "--truth model-b,kirchhoff,edges --predictor kirchhoff,model-b,three-edges",
     ] {
-        book.umbracast_says(["network"].iter().chain(sweep).chain(&few).copied())?;
+        book.umbracast_says(
+            ["network"].into_iter().chain([sweep, few].into_iter().flat_map(str::split_whitespace)),
+        )?;
     }
-    book.umbracast_says(["network", "--losses", "--scenes", "10", "--seed", first])?;
-    let many = ["--people", "50", "--access-points", "8", "--carrier", "28", "--truth", "edges"];
-    book.umbracast_says(
-        ["network", "--losses", "--scenes", "1", "--seed", first].iter().chain(&many).copied(),
-    )
+    book.umbracast_says(["network", "--losses", "--scenes", "6", "--seed", first])?;
+    let many = "--people 50 --access-points 8 --carrier 28 --truth edges";
+    let losses = ["network", "--losses", "--scenes", "1", "--seed", first];
+    book.umbracast_says(losses.into_iter().chain(many.split_whitespace()))?;
+    let traces = book.data("immerse/traces.csv")?;
+    book.umbracast_says(["network".into(), "--shape".into(), traces])
 }
 
 /// Which device is carried by whom, told from the power heard.
