@@ -7,6 +7,7 @@ mod step;
 mod packets;
 mod files;
 mod tables;
+mod own_tracks;
 mod messages;
 mod requests;
 mod plans;
@@ -24,9 +25,10 @@ pub struct Target {
 }
 
 /// Every target.
-pub const TARGETS: [Target; 23] = [
+pub const TARGETS: [Target; 24] = [
     files::MCAP,
     tables::PARQUET,
+    own_tracks::OWN_TRACKS,
     files::CSV,
     files::NDJSON,
     files::PETRACK,
