@@ -93,7 +93,8 @@ fn without_walls_the_sensors_are_found_against_one_another() {
     assert!((place(0).distance(place(1)) - 32.0).abs() < 0.03, "{} {}", place(0), place(1));
     let turned_deg =
         (found.sensors[0].rotation_deg.yaw - found.sensors[1].rotation_deg.yaw).rem_euclid(360.0);
-    assert!((turned_deg - 180.0).abs() < 0.1, "{turned_deg}");
+    // By people alone, in so short a time: four other draws of them gave 0.005 to 0.16 degrees.
+    assert!((turned_deg - 180.0).abs() < 0.25, "{turned_deg}");
     // Both were a metre off in the same direction: nothing tells, and nothing is said to.
     assert!((0.5 * (place(0).x + place(1).x) - 1.0).abs() < 0.1);
 }

@@ -21,7 +21,7 @@ use common::folder;
 /// Two people who cross in front of the access point `side`, for three seconds.
 const CROSSING: &str = "t_s,id,x_m,y_m,height_m\n\
     0.0,1,6.0,-2.0,1.80\n1.0,1,6.0,-0.7,1.80\n2.0,1,6.0,0.6,1.80\n3.0,1,6.0,1.9,1.80\n\
-    0.0,2,1.0,0.3,1.70\n1.0,2,0.0,0.3,1.70\n2.0,2,-1.0,0.3,1.70\n3.0,2,-2.0,0.3,1.70\n";
+    0.0,2,3.0,0.3,1.70\n1.0,2,2.0,0.3,1.70\n2.0,2,1.0,0.3,1.70\n3.0,2,0.0,0.3,1.70\n";
 
 fn text(path: &Path) -> &str {
     path.to_str().expect("the test's folder has a plain name")

@@ -6,8 +6,7 @@ use std::sync::LazyLock;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Outcome};
 use umbracast_io::own_tracks::OwnTracks;
-use umbracast_io::rows::TrackRow;
-use umbracast_io::tables::{self, path_in};
+use umbracast_io::tables::{self, Values};
 
 use super::files::in_file;
 use super::{Target, settings};
@@ -24,20 +23,21 @@ static WEIGHTS: LazyLock<Weights> =
 
 fn written() -> Vec<Vec<u8>> {
     let short = "id,time_s,x,y,vx,vy,height_m\n1,0.1,4,0,0,0,1.7\n2,0.1,6,-1.9,0,1.3,1.1\n1,0.2,4,0,0,0,\n";
-    let folder = tempfile::tempdir().expect("a folder");
-    let row = |k: u32| TrackRow {
-        track: u64::from(k % 2),
-        time_ns: i64::from(k / 2 + 1) * 100_000_000,
-        ..TrackRow::default()
+    let place = |k: u32, name: &str| {
+        (name.to_owned(), Values::F64((0..8).map(|row| 0.1 * f64::from(row * k)).collect()))
     };
-    let rows: Vec<TrackRow> = (0..8).map(row).collect();
-    tables::write(folder.path(), &[], true, &rows).expect("the folder can be written to");
-    let whole = path_in::<TrackRow>(folder.path());
-    let read = |path| fs::read(path).expect("it was written");
+    let mut columns = vec![
+        ("id".to_owned(), Values::U32((0..8).map(|row| row % 2).collect())),
+        ("time_s".to_owned(), Values::F64((0..8).map(|row| 0.1 * f64::from(row / 2 + 1)).collect())),
+    ];
+    columns.extend((0..).zip(["x", "y", "vx", "vy"]).map(|(k, name)| place(k, name)));
+    let folder = tempfile::tempdir().expect("a folder");
+    tables::write_columns(folder.path(), "tracks", &columns).expect("the folder can be written to");
+    let file = |name: &str| fs::read(folder.path().join(name)).expect("it was written");
     vec![
         [b"\0", short.as_bytes()].concat(),
-        [b"\0".to_vec(), read(whole.with_extension("csv"))].concat(),
-        [b"\x01".to_vec(), read(whole)].concat(),
+        [b"\0".to_vec(), file("tracks.csv")].concat(),
+        [b"\x01".to_vec(), file("tracks.parquet")].concat(),
     ]
 }
 

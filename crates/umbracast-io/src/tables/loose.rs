@@ -91,7 +91,8 @@ impl Loose {
         self.lines.get(row).map_or_else(|| format!("row {row}"), |line| format!("line {line}"))
     }
 
-    /// The rows. What has no column stays as `missing` has it, where `may_miss` allows it; otherwise it is asked for.
+    /// The rows. What has no column, or no value in a row, stays as `missing` has it, where `may_miss` allows it; otherwise it is
+    /// asked for.
     ///
     /// # Errors
     /// A column that is not there, or a value of another kind: with column, row or line, expected and found.
@@ -123,7 +124,8 @@ impl Loose {
             row.visit(&mut |_, cell| {
                 let Some((name, Some(values))) = column.next() else { return };
                 let expected = kind(&cell);
-                if !set(cell, &values[r], access_points) && wrong.is_none() {
+                let may_stay = values[r] == Value::Null && !cell.may_be_null() && may_miss(name);
+                if !may_stay && !set(cell, &values[r], access_points) && wrong.is_none() {
                     let place = self.place(r);
                     wrong = Some(format!("{place}, column {name}: expected {expected}, found {}", values[r]));
                 }
@@ -257,6 +259,10 @@ mod tests {
         };
         let message = told("frame,time_ns,person,track\n1,5,0,0\n2,6,-1,0\n").unwrap_err().to_string();
         assert_eq!(message, "line 3, column person: expected a whole number from 0 to 4294967295, found -1");
+        let message = told("frame,time_ns,person,track\n1,5,0,\n").unwrap_err().to_string();
+        assert_eq!(message, "line 2, column track: expected a whole number, found null");
+        let nothing_of_scene = told("scene,frame,time_ns,person,track\n,1,5,0,3\n").unwrap();
+        assert_eq!((nothing_of_scene[0].scene, nothing_of_scene[0].track), (0, 3));
         let message = told("frame,time_ns,person\n1,5,0\n").unwrap_err().to_string();
         assert!(
             message.contains("column track: expected a whole number, found no such column but frame"),
