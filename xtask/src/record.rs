@@ -92,7 +92,7 @@ const JOBS: [Job; 46] = [
     job("deployed", "the files for containers and clusters, run here", 2, Needs::Asking, nodes::deployed),
     job("faults", "a live run in which something fails", 5, Needs::Nothing, live::faults),
     job("kills", "a recording run killed at twenty moments", 3, Needs::Nothing, live::kills),
-    job("mutations", "damaged files of every format, given to the command", 100, Needs::Nothing, mutations::mutations),
+    job("mutations", "damaged files of every format, given to the command", 60, Needs::Nothing, mutations::mutations),
     job("same-bytes", "the same seed on one thread and on two", 1, Needs::Nothing, house::same_bytes),
     job("resume", "an experiment killed and gone on with", 3, Needs::Nothing, house::resume),
     job("explain", "why the paper's figures are what they are", 4, Needs::Nothing, scores::explain),
