@@ -87,14 +87,14 @@ fn without_walls_the_sensors_are_found_against_one_another() {
         sensor.rotation_deg.yaw += 5.0;
         sensor.position_m[0] += 1.0;
     }
-    let found = calibrated(&truth, &given, 25);
+    // A minute, for people alone tell the angle: in 25 s draws of them differ by 0.2 degrees.
+    let found = calibrated(&truth, &given, 60);
     let place = |s: usize| umbracast::geometry::DVec3::from_array(found.sensors[s].position_m);
     assert!(found.sensors.iter().all(|sensor| sensor.frame == Held::SiteFile));
     assert!((place(0).distance(place(1)) - 32.0).abs() < 0.03, "{} {}", place(0), place(1));
     let turned_deg =
         (found.sensors[0].rotation_deg.yaw - found.sensors[1].rotation_deg.yaw).rem_euclid(360.0);
-    // By people alone, in so short a time: four other draws of them gave 0.005 to 0.16 degrees.
-    assert!((turned_deg - 180.0).abs() < 0.25, "{turned_deg}");
+    assert!((turned_deg - 180.0).abs() < 0.1, "{turned_deg}");
     // Both were a metre off in the same direction: nothing tells, and nothing is said to.
     assert!((0.5 * (place(0).x + place(1).x) - 1.0).abs() < 0.1);
 }
