@@ -86,7 +86,7 @@ const JOBS: [Job; 46] = [
     job("cut", "what a frame gains that closes as soon as the part with people has", 3, Needs::Nothing, crowds::cut),
     job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", 30, Needs::Data, crowds::network),
     job("bindings", "which device is carried by whom, from the power heard", 4, Needs::Nothing, crowds::bindings),
-    job("live", "ten minutes live, three times over, the page open", 33, Needs::Asking, live::live),
+    job("live", "ten minutes live, four times over, the page open or not", 44, Needs::Asking, live::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", 25, Needs::Asking, nodes::nodes),
     job("halls", "1 to 64 halls on one host", 8, Needs::Asking, nodes::halls),
     job("deployed", "the files for containers and clusters, run here", 2, Needs::Asking, nodes::deployed),

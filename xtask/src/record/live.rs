@@ -1,4 +1,4 @@
-//! What a live run promises: it loses nothing, keeps time and flat memory, and survives faults.
+//! What a live run promises: it loses nothing, keeps time and flat memory, survives faults, and its page costs it nothing.
 
 use std::ffi::OsString;
 use std::io::{Read, Write};
@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::book::{Book, spoken};
 use super::house::script;
@@ -26,22 +26,24 @@ pub fn faults(book: &mut Book) -> Result<()> {
 }
 
 /// Ten minutes of simulated sensors over loopback, recorded, the page open: what was lost, how late warnings came, and
-/// how much memory it took in the first minute and in the last. Sensors are a process of their own, as in a hall: how their
-/// memory grows is not what is asked.
+/// how much memory it and the browser took in the first minute and in the last. One run is made once more without a
+/// browser: the difference is what the page costs. Sensors are a process of their own, as in a hall: how their memory
+/// grows is not what is asked.
 pub fn live(book: &mut Book) -> Result<()> {
     let ouster = book.scratch("ouster.toml");
     let site = "[[site.sensors]]\nname = \"lidar\"\nmodel = \"os0-128\"\nposition_m = [16.0, 0.0, 9.0]\n\
                 rotation_deg = { yaw = 180.0, pitch = 35.0, roll = 0.0 }\nrange_noise_m = 0.02\n";
     std::fs::write(&ouster, site).map_err(|e| format!("{}: {e}", ouster.display()))?;
-    live_run(book, "10", None)?;
-    live_run(book, "40", None)?;
-    live_run(book, "10", Some(&ouster))?;
+    live_run(book, "10", None, true)?;
+    live_run(book, "40", None, true)?;
+    live_run(book, "40", None, false)?;
+    live_run(book, "10", Some(&ouster), true)?;
     book.line(&format!("# ouster.toml:\n{site}"));
     Ok(())
 }
 
-/// Sensors, the run that they send to, and who looks on, each a process of its own.
-fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
+/// Sensors, the run that they send to, and who looks on if anybody does, each a process of its own.
+fn live_run(book: &mut Book, people: &str, site: Option<&Path>, watched: bool) -> Result<()> {
     let (hall, folder) = (book.scratch("hall"), book.scratch("live"));
     let of_site: Vec<OsString> =
         site.into_iter().flat_map(|site| ["--site".into(), argument(site)]).collect();
@@ -60,11 +62,8 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
         ),
         &[],
     );
-    book.command(&format!(
-        "umbracast {} & umbracast {} & nice -n 19 chromium --headless ...",
-        spoken(&listen),
-        spoken(&send)
-    ));
+    let browser = if watched { " & nice -n 19 chromium --headless ..." } else { "" };
+    book.command(&format!("umbracast {} & umbracast {}{browser}", spoken(&listen), spoken(&send)));
     let start = |words: &[OsString]| {
         let mut command = Command::new(book.umbracast());
         command.args(words).stdout(Stdio::piped()).stderr(Stdio::null());
@@ -73,31 +72,46 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>) -> Result<()> {
     let live = start(&listen)?;
     sleep(Duration::from_secs(1));
     let sensors = start(&send)?;
-    let mut page = look_on()?;
+    let mut page = watched.then(look_on).transpose()?;
     sleep(START);
-    let (mut resident_kb, mut open) = (Vec::new(), Vec::new());
+    let weight = watched.then(weight).transpose()?;
+    let (mut resident_kb, mut open, mut browser_kb) = (Vec::new(), Vec::new(), Vec::new());
     while let Some(kb) = resident(live.id()) {
         resident_kb.push(kb);
-        open.extend(streams());
+        if let Some(page) = &page {
+            open.extend(streams());
+            browser_kb.push(proportional(page.id()));
+        }
         sleep(Duration::from_secs(1));
     }
-    page.kill().and_then(|()| page.wait()).map_err(|e| e.to_string())?;
-    let seen = seen_open(&open)?;
+    if let Some(page) = &mut page {
+        page.kill().and_then(|()| page.wait()).map_err(|e| e.to_string())?;
+    }
     for process in [live, sensors] {
         let output = process.wait_with_output().map_err(|e| e.to_string())?;
         book.line(String::from_utf8_lossy(&output.stdout).trim_end());
     }
-    book.line(&seen);
-    let minute = resident_kb.len().min(60);
-    let mean = |kb: &[u64]| kb.iter().sum::<u64>() as f64 / kb.len().max(1) as f64 / 1024.0;
-    let (first, last) = (mean(&resident_kb[..minute]), mean(&resident_kb[resident_kb.len() - minute..]));
-    let grown = 100.0 * (last / first - 1.0);
-    book.line(&format!(
-        "resident, mean of the minute after the first ten seconds and of the last: {first:.1} MiB, {last:.1} MiB ({grown:+.1} %)\n"
-    ));
+    book.line(&first_and_last("resident", &resident_kb));
+    if let Some(weight) = weight {
+        book.line(&weight);
+        book.line(&first_and_last("browser, its share of what its processes hold", &browser_kb));
+        book.line(&seen_open(&open)?);
+    }
+    book.line("");
     [hall, folder].iter().try_for_each(|folder| {
         std::fs::remove_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))
     })
+}
+
+/// What a process held, one look a second.
+fn first_and_last(what: &str, kb: &[u64]) -> String {
+    let minute = kb.len().min(60);
+    let mean = |kb: &[u64]| kb.iter().sum::<u64>() as f64 / kb.len().max(1) as f64 / 1024.0;
+    let (first, last) = (mean(&kb[..minute]), mean(&kb[kb.len() - minute..]));
+    let grown = 100.0 * (last / first - 1.0);
+    format!(
+        "{what}, mean of the minute after the first ten seconds and of the last: {first:.1} MiB, {last:.1} MiB ({grown:+.1} %)"
+    )
 }
 
 /// A browser with the page. Who looks has a computer of his own: here he takes what is left.
@@ -111,12 +125,35 @@ fn look_on() -> Result<Child> {
 
 /// How many pages and other readers of the stream the running program counts now.
 fn streams() -> Option<u32> {
-    let mut server = TcpStream::connect(PAGE).ok()?;
-    server.set_read_timeout(Some(Duration::from_secs(1))).ok()?;
-    write!(server, "GET /metrics HTTP/1.1\r\nHost: {PAGE}\r\nConnection: close\r\n\r\n").ok()?;
-    let mut said = String::new();
-    server.read_to_string(&mut said).ok()?;
+    let said = answered("GET /metrics HTTP/1.1\r\nConnection: close", Duration::from_secs(1))?;
+    let said = String::from_utf8_lossy(&said);
     said.lines().find_map(|line| line.strip_prefix("umbracast_streams "))?.parse().ok()
+}
+
+/// What the page weighs: its one file, and what the stream behind it sends in ten seconds.
+fn weight() -> Result<String> {
+    const LISTEN: Duration = Duration::from_secs(10);
+    let page = answered("GET / HTTP/1.1\r\nConnection: close", LISTEN);
+    let page = page.ok_or_else(|| format!("expected a page at {PAGE}, found none"))?.len();
+    let stream = "GET /api/live HTTP/1.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+                  Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
+    let sent = answered(stream, LISTEN).ok_or("expected a stream behind the page, found none")?.len();
+    Ok(format!("page: {page} bytes once, then {:.1} kB a second", 1e-3 * sent as f64 / LISTEN.as_secs_f64()))
+}
+
+/// All that the server of the page answers to a request until it closes the connection or the time is over.
+fn answered(head: &str, within: Duration) -> Option<Vec<u8>> {
+    let mut server = TcpStream::connect(PAGE).ok()?;
+    write!(server, "{head}\r\nHost: {PAGE}\r\n\r\n").ok()?;
+    let (from, mut said, mut part) = (Instant::now(), Vec::new(), [0; 65536]);
+    while let Some(left) = within.checked_sub(from.elapsed()).filter(|left| !left.is_zero()) {
+        server.set_read_timeout(Some(left)).ok()?;
+        match server.read(&mut part) {
+            Ok(bytes @ 1..) => said.extend_from_slice(&part[..bytes]),
+            _ => break,
+        }
+    }
+    Some(said)
 }
 
 /// In words, at how many of the looks somebody had the page open. Fails below nine of ten: a record of a run that nobody
@@ -137,6 +174,19 @@ fn resident(id: u32) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{id}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     line.trim().trim_end_matches(" kB").trim().parse().ok()
+}
+
+/// KiB that a process and those that it started hold; what they share with others counts in part.
+fn proportional(id: u32) -> u64 {
+    let own = std::fs::read_to_string(format!("/proc/{id}/smaps_rollup")).unwrap_or_default();
+    let own = own.lines().find_map(|line| line.strip_prefix("Pss:"));
+    let own = own.and_then(|kb| kb.trim().trim_end_matches(" kB").trim().parse::<u64>().ok());
+    let threads = std::fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
+    let children: Vec<u32> = threads
+        .filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok())
+        .flat_map(|ids| ids.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<u32>>())
+        .collect();
+    own.unwrap_or(0) + children.into_iter().map(proportional).sum::<u64>()
 }
 
 /// A recording run killed at twenty moments, drawn by chance: what each file still holds.

@@ -1,0 +1,25 @@
+//! Our side of the comparison with named peers: `peers ROW FOLDER` writes what the row works on to FOLDER, so that a peer
+//! works on the same, times ours on it, and prints one JSON object. `bench/peers/run.py` calls this, then the peer.
+//! Everything runs on one thread.
+
+mod exchange;
+
+use std::path::Path;
+
+use exchange::Answer;
+
+/// What one row does: its inputs go to the folder, its times into the answer.
+type Row = fn(&Path) -> Answer;
+
+/// Every row by name, in the order of the table.
+const ROWS: [(&str, Row); 0] = [];
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let [name, folder] = &words[..] else {
+        ROWS.iter().for_each(|(name, _)| println!("{name}"));
+        return;
+    };
+    let row = ROWS.iter().find(|(row, _)| row == name).unwrap_or_else(|| panic!("no row is called {name}")).1;
+    println!("{}", row(Path::new(folder)).json());
+}
