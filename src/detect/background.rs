@@ -98,7 +98,7 @@ impl Background {
             }
             BackgroundMethod::Voxels => {
                 let mut points = Vec::new();
-                self.all_points(frame, &mut Health::default(), &mut points);
+                self.points(frame, |_| true, &mut Health::default(), &mut points);
                 self.learn_map(&points);
             }
         }
@@ -136,11 +136,7 @@ impl Background {
                 self.forget_people(frame);
             }
             BackgroundMethod::Voxels => {
-                self.all_points(frame, health, points);
-                // Without an empty scan the first cloud is the map, and nothing changes it after, as in the
-                // adapted code: who stands in it is never seen.
-                let map = self.map.get_or_insert_with(|| VoxelMap::new(VOXEL_M, points));
-                points.retain(|p| map.is_new(p.position_m, VOXEL_POINTS_MIN));
+                self.new_points(frame, health, points);
                 if self.thin_m == 0.0 {
                     // DP-means depends on the order; a thinned cloud has one already, its voxels'.
                     points.sort_unstable_by(in_space);
@@ -194,8 +190,36 @@ impl Background {
         }
     }
 
-    /// All points of a frame in the site frame, thinned where the config says so.
-    fn all_points(&mut self, frame: &Frame, health: &mut Health, points: &mut Vec<Point>) {
+    /// The points of a frame that lie where the map has none.
+    fn new_points(&mut self, frame: &Frame, health: &mut Health, points: &mut Vec<Point>) {
+        let is_new = |map: &VoxelMap, p: &Point| map.is_new(p.position_m, VOXEL_POINTS_MIN);
+        // Nine of ten points are the hall's: where they need not be thinned first, they are not even written down.
+        let map = match self.map.take() {
+            Some(map) if self.thin_m == 0.0 => {
+                self.points(frame, |point| is_new(&map, point), health, points);
+                map
+            }
+            map => {
+                self.points(frame, |_| true, health, points);
+                // Without an empty scan the first cloud is the map, and nothing changes it after, as in the
+                // adapted code: who stands in it is never seen.
+                let map = map.unwrap_or_else(|| VoxelMap::new(VOXEL_M, points));
+                points.retain(|point| is_new(&map, point));
+                map
+            }
+        };
+        self.map = Some(map);
+    }
+
+    /// The points of a frame that are to be kept, in the site frame, thinned where the config says so.
+    #[inline(always)]
+    fn points(
+        &mut self,
+        frame: &Frame,
+        keeps: impl Fn(&Point) -> bool,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
         points.clear();
         let azimuths = self.azimuths.get_or_insert_with(Azimuths::of_a_turn);
         for scan in &frame.scans {
@@ -205,21 +229,28 @@ impl Background {
                 health.points_invalid += u64::from(!ok);
                 ok
             };
+            let mut keep = |point: Point| {
+                if keeps(&point) {
+                    points.push(point);
+                }
+            };
             match &scan.cloud {
                 Cloud::Organised(image) => {
-                    for (i, &range_m) in image.range_m.iter().enumerate() {
-                        let (c, b) = (i / image.beams.len().max(1), i % image.beams.len().max(1));
-                        if range_m != 0.0 && c < image.columns.len() && valid(range_m, health) {
-                            let position_m = image.tabled_point_m(azimuths, c, b, f64::from(range_m));
-                            let time_ns = image.time_ns(c, b);
-                            points.push(to_site(&scan.site_from_sensor, scan.sensor, position_m, time_ns));
+                    let ranges_m = image.range_m.chunks(image.beams.len().max(1));
+                    for (c, ranges_m) in (0..image.columns.len()).zip(ranges_m) {
+                        for (b, &range_m) in ranges_m.iter().enumerate() {
+                            if range_m != 0.0 && valid(range_m, health) {
+                                let position_m = image.tabled_point_m(azimuths, c, b, f64::from(range_m));
+                                let time_ns = image.time_ns(c, b);
+                                keep(to_site(&scan.site_from_sensor, scan.sensor, position_m, time_ns));
+                            }
                         }
                     }
                 }
                 Cloud::Unorganised(cloud) => {
                     for point in cloud {
                         if valid(DVec3::from(point.position_m.map(f64::from)).length() as f32, health) {
-                            points.push(unorganised_point(scan, point));
+                            keep(unorganised_point(scan, point));
                         }
                     }
                 }

@@ -6,6 +6,7 @@
 mod cluster;
 mod first_sight;
 mod range_model;
+mod cloud_limits;
 mod sensor_model;
 mod voxel;
 mod background;

@@ -144,6 +144,11 @@ impl RangeModel {
         if self.looked.is_some() { Self::of_rays(bin_deg) } else { Self::new(bin_deg) }
     }
 
+    /// How many bins of azimuth there are.
+    pub fn bins(&self) -> usize {
+        self.bins
+    }
+
     /// How many rows there are.
     pub fn rows(&self) -> usize {
         self.rows
@@ -180,10 +185,10 @@ impl RangeModel {
         }
     }
 
-    /// A turn more or less is common, more than one is not: no remainder in the hot loop. Nor a call of `floor` or a
+    /// The bin of an azimuth. A turn more or less is common, more than one is not: no remainder in the hot loop. Nor a call of `floor` or a
     /// conversion that asks for NaN, which no vector register does where the processor may be any.
     #[inline(always)]
-    fn bin(&self, azimuth_cdeg: f32) -> u32 {
+    pub fn bin(&self, azimuth_cdeg: f32) -> u32 {
         // Numbers of this size are whole: adding it and taking it away rounds, and the bits of a sum end in those of
         // the whole number. Bins are far fewer.
         const WHOLE: f32 = 8_388_608.0;

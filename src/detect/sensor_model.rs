@@ -1,5 +1,6 @@
 //! One sensor's view of the empty scene, pixel by pixel, and the returns that are nearer.
 
+use super::cloud_limits::{CloudLimits, Elevations, azimuth_cdeg as azimuth_of_cdeg, range_m as range_of_m};
 use super::first_sight::Return;
 use super::range_model::{RangeModel, Verdict};
 use super::{Point, Prior};
@@ -36,7 +37,9 @@ pub(super) struct SensorModel {
     cloud_ranges: RangeModel,
     /// Row of each bin of elevation, for clouds whose beams are not known.
     row_of_elevation: Vec<Option<u16>>,
-    elevation_bins_per_rad: f64,
+    elevations: Elevations,
+    /// Of the scene as it was learned; `None` from what is learned until it is asked again.
+    cloud_limits: Option<CloudLimits>,
     /// True once the empty scene was shown.
     known: bool,
     /// Since the start.
@@ -149,13 +152,15 @@ impl Clip {
 impl SensorModel {
     /// Knows nothing yet.
     pub(super) fn new(sensor: &Sensor) -> Self {
+        let elevations = Elevations::of_deg(CLOUD_ELEVATION_BIN_DEG);
         Self {
             range_min_m: sensor.range_min_m as f32,
             range_max_m: sensor.range_max_m as f32,
             ranges: RangeModel::of_rays(azimuth_bin_deg(sensor)),
             cloud_ranges: RangeModel::new(CLOUD_AZIMUTH_BIN_DEG),
-            row_of_elevation: vec![None; (180.0 / CLOUD_ELEVATION_BIN_DEG) as usize + 3],
-            elevation_bins_per_rad: 1.0_f64.to_degrees() / CLOUD_ELEVATION_BIN_DEG,
+            row_of_elevation: vec![None; elevations.bins],
+            elevations,
+            cloud_limits: None,
             known: false,
             frames: 0,
             returns: Vec::new(),
@@ -170,6 +175,7 @@ impl SensorModel {
         self.ranges = self.ranges.forgotten();
         self.cloud_ranges = self.cloud_ranges.forgotten();
         self.row_of_elevation.fill(None);
+        self.cloud_limits = None;
         (self.known, self.frames) = (false, 0);
     }
 
@@ -336,6 +342,15 @@ impl SensorModel {
         points: &mut Vec<Point>,
     ) {
         let Look { scan, clip, learn } = look;
+        if self.sees_new_only(learn)
+            && let Some(out_of_range) = self.sort_new(cloud)
+        {
+            health.points_invalid += out_of_range;
+            let new = self.returns.iter().map(|r| unorganised_point(scan, &r.point));
+            points.extend(new.filter(|point| clip.holds(point.position_m)));
+            return;
+        }
+        self.cloud_limits = None;
         self.sort_returns(cloud, matches!(learn, Learn::OnTheWay(_)), health);
         for i in 0..self.returns.len() {
             let CloudReturn { elevation_bin, azimuth_cdeg, range_m, point } = self.returns[i];
@@ -365,31 +380,55 @@ impl SensorModel {
     fn sort_returns(&mut self, cloud: &[SensorPoint], keep_near: bool, health: &mut Health) {
         self.returns.clear();
         for &point in cloud {
-            let [x, y, z] = point.position_m;
-            let range_m = (x * x + y * y + z * z).sqrt();
+            let range_m = range_of_m(point.position_m);
             if !(range_m >= self.range_min_m && range_m <= self.range_max_m) {
                 health.points_invalid += 1;
                 if !(keep_near && range_m > 0.0 && range_m < self.range_min_m) {
                     continue;
                 }
             }
-            let elevation_rad = f64::from(z / range_m).clamp(-1.0, 1.0).asin();
-            let above_nadir_rad = elevation_rad + std::f64::consts::FRAC_PI_2;
-            // Bins are centred on their multiples, where beams use to be; bin 0 stays empty for the neighbours.
-            let elevation_bin = (above_nadir_rad * self.elevation_bins_per_rad).round() as usize + 1;
-            let elevation_bin = elevation_bin.min(self.row_of_elevation.len() - 2);
+            let elevation_bin = self.elevations.bin(point.position_m[2], range_m);
             if self.row_of_elevation[elevation_bin].is_none() {
                 self.row_of_elevation[elevation_bin] = Some(self.cloud_ranges.rows() as u16);
                 self.cloud_ranges.grow(self.cloud_ranges.rows() + 1);
             }
-            let azimuth_cdeg = (-y).atan2(x).to_degrees() * 100.0;
+            let azimuth_cdeg = azimuth_of_cdeg(point.position_m);
             self.returns.push(CloudReturn { elevation_bin, azimuth_cdeg, range_m, point });
         }
-        self.returns.sort_unstable_by(|a, b| {
-            let key = |r: &CloudReturn| (r.elevation_bin, r.point.time_ns, r.range_m.to_bits());
-            let place = |r: &CloudReturn| r.point.position_m.map(f32::to_bits);
-            key(a).cmp(&key(b)).then_with(|| place(a).cmp(&place(b)))
-        });
+        self.returns.sort_unstable_by(CloudReturn::in_order);
+    }
+
+    /// Whether a cloud teaches nothing: the scene is known, and nothing was put there or is looked for.
+    fn sees_new_only(&self, learn: Learn) -> bool {
+        let Learn::Furniture(priors) = learn else { return false };
+        !self.cloud_ranges.has_furniture() && !priors.iter().any(|prior| prior.is_furniture)
+    }
+
+    /// The same as [`SensorModel::sort_returns`] of those alone that are new. Returns how many were out of range; `None`
+    /// where an elevation is to be learned first.
+    fn sort_new(&mut self, cloud: &[SensorPoint]) -> Option<u64> {
+        let Self { cloud_ranges, row_of_elevation, elevations, pixels, returns, .. } = self;
+        let limits = || CloudLimits::new(cloud_ranges, row_of_elevation, *elevations);
+        let limits = self.cloud_limits.get_or_insert_with(limits);
+        let range_m = [self.range_min_m, self.range_max_m];
+        let out_of_range = limits.new_of(cloud, cloud_ranges, range_m, pixels)?;
+        returns.clear();
+        returns.extend(pixels.iter().map(|&i| {
+            let (point, range_m) = (cloud[i as usize], range_of_m(cloud[i as usize].position_m));
+            let elevation_bin = elevations.bin(point.position_m[2], range_m);
+            CloudReturn { elevation_bin, azimuth_cdeg: azimuth_of_cdeg(point.position_m), range_m, point }
+        }));
+        returns.sort_unstable_by(CloudReturn::in_order);
+        Some(out_of_range)
+    }
+}
+
+impl CloudReturn {
+    /// By what was seen alone, not by its place in the cloud.
+    fn in_order(a: &Self, b: &Self) -> std::cmp::Ordering {
+        let key = |r: &Self| (r.elevation_bin, r.point.time_ns, r.range_m.to_bits());
+        let place = |r: &Self| r.point.position_m.map(f32::to_bits);
+        key(a).cmp(&key(b)).then_with(|| place(a).cmp(&place(b)))
     }
 }
 

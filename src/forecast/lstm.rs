@@ -112,7 +112,7 @@ impl Weights {
             if frame < OBSERVED_DISPLACEMENTS {
                 fed_m.iter_mut().zip(observed_m).for_each(|(fed, observed)| *fed = observed[frame]);
             }
-            network.step(&fed_m, &mut groups);
+            network.step(&fed_m, &mut groups, frame == 0);
             let Some(ahead) = (frame + 1).checked_sub(OBSERVED_DISPLACEMENTS) else { continue };
             for (person, (steps, fed)) in foreseen.iter_mut().zip(&mut fed_m).enumerate() {
                 steps[ahead] = network.head(&groups[person / GROUP], person % GROUP);
@@ -133,7 +133,7 @@ impl fmt::Debug for Weights {
 
 impl Network {
     /// Eq. (1a): e = ReLU(W_emb dx), then Eq. (1b): h = LSTM(h, e; W_enc).
-    fn step(&self, displacements_m: &[DVec2], groups: &mut [GroupState]) {
+    fn step(&self, displacements_m: &[DVec2], groups: &mut [GroupState], first: bool) {
         for (group, displacements) in groups.iter_mut().zip(displacements_m.chunks(GROUP)) {
             for (row, &[weight_x, weight_y, bias]) in group.rows.iter_mut().zip(&self.embedding) {
                 for (value, displacement) in row.iter_mut().zip(displacements) {
@@ -142,7 +142,7 @@ impl Network {
                 }
             }
         }
-        lstm_cell::step(&self.cell, groups);
+        lstm_cell::step(&self.cell, groups, first);
     }
 
     /// Eq. (2): [mu, sigma, rho] = W_dec h, as a Gaussian of the next displacement. The paper does not say how

@@ -183,6 +183,7 @@ impl RangeImage {
 
     /// The same point, to the last bit, where there are many.
     #[doc(hidden)] // See `Azimuths`.
+    #[inline]
     pub fn tabled_point_m(&self, azimuths: &Azimuths, c: usize, b: usize, range_m: f64) -> DVec3 {
         let beam = &self.beams[b];
         let head_sin_cos = match beam.whole_cdeg {
