@@ -20,7 +20,10 @@ BENCH = HERE.parent
 VENV = BENCH / "target" / "peers"
 
 # Row, what it is, and its peers: name and command, with {python}, {built} (the folder of compiled peers) and {folder}.
-ROWS = []
+ROWS = [
+    ("background", [("PCL", ["{built}/background_pcl", "{folder}"]), ("PCL, whole", ["{built}/background_pcl", "{folder}", "whole"])]),
+    ("unorganised", [("PCL", ["{built}/background_pcl", "{folder}"]), ("PCL, whole", ["{built}/background_pcl", "{folder}", "whole"])]),
+]
 
 
 def answer(command, folder):

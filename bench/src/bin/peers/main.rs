@@ -3,6 +3,7 @@
 //! Everything runs on one thread.
 
 mod exchange;
+mod background;
 
 use std::path::Path;
 
@@ -12,7 +13,10 @@ use exchange::Answer;
 type Row = fn(&Path) -> Answer;
 
 /// Every row by name, in the order of the table.
-const ROWS: [(&str, Row); 0] = [];
+const ROWS: [(&str, Row); 2] = [
+    ("background", background::organised),
+    ("unorganised", background::unorganised),
+];
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
