@@ -20,9 +20,27 @@ BENCH = HERE.parent
 VENV = BENCH / "target" / "peers"
 
 # Row, what it is, and its peers: name and command, with {python}, {built} (the folder of compiled peers) and {folder}.
+PCL = [
+    ("PCL, thinned first", ["{built}/background_pcl", "{folder}"]),
+    ("PCL, whole cloud", ["{built}/background_pcl", "{folder}", "whole"]),
+]
 ROWS = [
-    ("background", [("PCL", ["{built}/background_pcl", "{folder}"]), ("PCL, whole", ["{built}/background_pcl", "{folder}", "whole"])]),
-    ("unorganised", [("PCL", ["{built}/background_pcl", "{folder}"]), ("PCL, whole", ["{built}/background_pcl", "{folder}", "whole"])]),
+    (
+        "simulate",
+        [
+            ("Embree", ["{built}/simulate_embree", "{folder}"]),
+            ("Embree, bodies still through the frame", ["{built}/simulate_embree", "{folder}", "still"]),
+        ],
+    ),
+    (
+        "links",
+        [
+            ("Embree", ["{built}/links_embree", "{folder}"]),
+            ("Embree, rays culled by hand", ["{built}/links_embree", "{folder}", "culled"]),
+        ],
+    ),
+    ("background", PCL),
+    ("unorganised", PCL),
 ]
 
 

@@ -34,7 +34,8 @@ pub fn unorganised(folder: &Path) -> Answer {
 fn row(folder: &Path, config: &Config, taken_as: impl Fn(&mut Frame)) -> Answer {
     let mut answer = Answer::default();
     for people in PEOPLE {
-        let mut hall = crossing(&Config::default().site, people, 12.5, FRAMES).expect("the default site is simulated");
+        let mut hall =
+            crossing(&Config::default().site, people, 12.5, FRAMES).expect("the default site is simulated");
         hall.empty.iter_mut().chain(&mut hall.frames).for_each(&taken_as);
         let (before, frame) = (&hall.frames[..FRAMES - 1], &hall.frames[FRAMES - 1]);
         write(folder, people, &hall.empty, frame, &hall.truth[FRAMES - 1]);
@@ -42,15 +43,23 @@ fn row(folder: &Path, config: &Config, taken_as: impl Fn(&mut Frame)) -> Answer 
         before.iter().for_each(|frame| stages.step(frame));
         stages.expect(frame);
         // Each try begins from a copy, for the stages remember.
-        let halfway = times(TRIES, || stages.clone(), |stages| {
-            stages.foreground(frame);
-            stages.clusters();
-        });
-        let whole = times(TRIES, || stages.clone(), |stages| {
-            stages.foreground(frame);
-            stages.clusters();
-            stages.detections();
-        });
+        let halfway = times(
+            TRIES,
+            || stages.clone(),
+            |stages| {
+                stages.foreground(frame);
+                stages.clusters();
+            },
+        );
+        let whole = times(
+            TRIES,
+            || stages.clone(),
+            |stages| {
+                stages.foreground(frame);
+                stages.clusters();
+                stages.detections();
+            },
+        );
         stages.foreground(frame);
         stages.clusters();
         stages.detections();
@@ -96,7 +105,9 @@ fn write(folder: &Path, people: usize, empty: &[Frame], frame: &Frame, truth: &S
         let mut frame = frame.clone();
         disorganise(&mut frame);
         match &frame.scans[sensor].cloud {
-            Cloud::Unorganised(points) => points.iter().flat_map(|point| point.position_m).collect::<Vec<f32>>(),
+            Cloud::Unorganised(points) => {
+                points.iter().flat_map(|point| point.position_m).collect::<Vec<f32>>()
+            }
             Cloud::Organised(_) => Vec::new(),
         }
     };
@@ -108,7 +119,8 @@ fn write(folder: &Path, people: usize, empty: &[Frame], frame: &Frame, truth: &S
         whole("empty", &empty.iter().flat_map(|frame| points(frame, sensor)).collect::<Vec<f32>>());
         write_f32(folder, &format!("site_from_sensor_{sensor}"), &[4, 4], &matrix(&scan.site_from_sensor));
     }
-    let places_m: Vec<f64> = truth.people.iter().flat_map(|person| person.state.position_m.to_array()).collect();
+    let places_m: Vec<f64> =
+        truth.people.iter().flat_map(|person| person.state.position_m.to_array()).collect();
     write_f64(folder, &format!("truth_{people}"), &[truth.people.len(), 2], &places_m);
 }
 

@@ -3,6 +3,9 @@
 //! Everything runs on one thread.
 
 mod exchange;
+mod bodies;
+mod simulate;
+mod links;
 mod background;
 
 use std::path::Path;
@@ -13,7 +16,9 @@ use exchange::Answer;
 type Row = fn(&Path) -> Answer;
 
 /// Every row by name, in the order of the table.
-const ROWS: [(&str, Row); 2] = [
+const ROWS: [(&str, Row); 4] = [
+    ("simulate", simulate::row),
+    ("links", links::row),
     ("background", background::organised),
     ("unorganised", background::unorganised),
 ];

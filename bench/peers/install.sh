@@ -1,0 +1,63 @@
+#!/bin/bash
+# Fetches and builds what run.py compares with: packages of Debian, the programs beside this file, and a Python environment.
+# What it cannot have it names and goes on without; the rows that need it are skipped by run.py.
+set -euo pipefail
+
+here="$(cd "$(dirname "$0")" && pwd)"
+built="$here/../target/peers"
+missing=()
+
+# What Python's peers need, with versions, so that the table can be made again.
+python_packages=()
+
+without() {
+    echo "without $1" >&2
+    missing+=("$1")
+}
+
+debian_packages() {
+    local packages=(g++ pkg-config libembree-dev libpcl-dev python3-venv) as_root=()
+    if dpkg -s "${packages[@]}" >/dev/null 2>&1; then
+        return
+    fi
+    if [ "$(id -u)" -ne 0 ]; then
+        as_root=(sudo)
+    fi
+    "${as_root[@]}" apt-get install -y --no-install-recommends "${packages[@]}" || without "packages of Debian: ${packages[*]}"
+}
+
+# NAME.cpp with these flags becomes a program; templates are built here, for this machine, and not taken from a library that
+# was built for every machine.
+compile() {
+    local name="$1"
+    shift
+    g++ -std=c++17 -O3 -march=native -DNDEBUG "$here/$name.cpp" -o "$built/$name" "$@" || without "$name"
+}
+
+compiled_peers() {
+    local pcl
+    compile simulate_embree -lembree3
+    compile links_embree -lembree3
+    if pcl="$(pkg-config --cflags --libs pcl_filters pcl_segmentation pcl_search pcl_common)"; then
+        # shellcheck disable=SC2086 # Flags are words.
+        compile background_pcl -DPCL_NO_PRECOMPILE $pcl
+    else
+        without background_pcl
+    fi
+}
+
+python_peers() {
+    if ! { [ -x "$built/bin/python" ] || python3 -m venv "$built"; }; then
+        without "an environment for Python"
+        return
+    fi
+    for package in "${python_packages[@]}"; do
+        "$built/bin/pip" install --quiet "$package" || without "$package"
+    done
+}
+
+mkdir -p "$built"
+debian_packages
+compiled_peers
+python_peers
+echo "all is there but: ${missing[*]:-nothing}"
