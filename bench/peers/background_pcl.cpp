@@ -81,13 +81,8 @@ struct Person {
     float x_m, y_m;
 };
 
-struct Result {
-    Cloud::Ptr foreground;
-    std::vector<pcl::PointIndices> clusters;
-};
-
-static Result cluster(const std::vector<Seen> &sensors, const Occupied &occupied, bool thin) {
-    Cloud::Ptr cloud = together(sensors);
+static Cloud::Ptr foreground(const std::vector<Seen> &sensors, const Occupied &occupied, bool thin) {
+    Cloud::Ptr cloud = together(sensors), foreground(new Cloud);
     if (thin) {
         Cloud::Ptr thinned(new Cloud);
         pcl::VoxelGrid<pcl::PointXYZ> grid;
@@ -96,14 +91,18 @@ static Result cluster(const std::vector<Seen> &sensors, const Occupied &occupied
         grid.filter(*thinned);
         cloud = thinned;
     }
-    Result result{Cloud::Ptr(new Cloud), {}};
-    Cloud::Ptr flat(new Cloud);
     for (const auto &point : *cloud)
-        if (occupied.is_new(point)) {
-            result.foreground->push_back(point);
-            flat->emplace_back(point.x, point.y, point.z * 0.01f);
-        }
-    if (flat->empty()) return result;
+        if (occupied.is_new(point)) foreground->push_back(point);
+    return foreground;
+}
+
+using Clusters = std::vector<pcl::PointIndices>;
+
+static Clusters clusters(const Cloud &foreground) {
+    Clusters clusters;
+    if (foreground.empty()) return clusters;
+    Cloud::Ptr flat(new Cloud(foreground));
+    for (auto &point : *flat) point.z *= 0.01f;
     pcl::search::KdTree<pcl::PointXYZ>::Ptr tree(new pcl::search::KdTree<pcl::PointXYZ>);
     tree->setInputCloud(flat);
     pcl::EuclideanClusterExtraction<pcl::PointXYZ> extraction;
@@ -112,17 +111,17 @@ static Result cluster(const std::vector<Seen> &sensors, const Occupied &occupied
     extraction.setMaxClusterSize(100000);
     extraction.setSearchMethod(tree);
     extraction.setInputCloud(flat);
-    extraction.extract(result.clusters);
-    return result;
+    extraction.extract(clusters);
+    return clusters;
 }
 
 // Of each cluster the middle and the box, with the sizes that the method takes for a person's.
-static std::vector<Person> people(const Result &result, bool only_of_size) {
+static std::vector<Person> people(const Cloud &foreground, const Clusters &clusters, bool only_of_size) {
     std::vector<Person> people;
-    for (const auto &indices : result.clusters) {
+    for (const auto &indices : clusters) {
         Eigen::Vector4f middle, least, most;
-        pcl::compute3DCentroid(*result.foreground, indices, middle);
-        pcl::getMinMax3D(*result.foreground, indices, least, most);
+        pcl::compute3DCentroid(foreground, indices, middle);
+        pcl::getMinMax3D(foreground, indices, least, most);
         const Eigen::Vector4f size = most - least;
         const auto within = [](float m, float low, float high) { return m >= low && m <= high; };
         if (!only_of_size || (within(size.x(), 0.2f, 1.0f) && within(size.y(), 0.2f, 1.0f) && within(size.z(), 0.3f, 2.0f)))
@@ -149,11 +148,21 @@ int main(int count, char **words) {
     for (const std::string number : {"10", "100"}) {
         const std::vector<Seen> sensors{seen(folder, "cloud_" + number, 0), seen(folder, "cloud_" + number, 1)};
         const auto truth = read<double>(folder, "truth_" + number).values;
-        Result result;
+        Cloud::Ptr points;
+        Clusters groups;
         std::vector<Person> sized;
-        const auto clusters_ms = times(20, [&] { result = cluster(sensors, occupied, thin); });
-        const auto detections_ms = times(20, [&] { sized = people(cluster(sensors, occupied, thin), true); });
-        answer.add(number + " people, clusters", clusters_ms, found(truth, people(result, false)));
+        const auto background_ms = times(20, [&] { points = foreground(sensors, occupied, thin); });
+        const auto clusters_ms = times(20, [&] {
+            points = foreground(sensors, occupied, thin);
+            groups = clusters(*points);
+        });
+        const auto detections_ms = times(20, [&] {
+            points = foreground(sensors, occupied, thin);
+            groups = clusters(*points);
+            sized = people(*points, groups, true);
+        });
+        answer.add(number + " people, background", background_ms, {{"points", double(points->size())}});
+        answer.add(number + " people, clusters", clusters_ms, found(truth, people(*points, groups, false)));
         answer.add(number + " people, detections", detections_ms, found(truth, sized));
     }
     answer.print();

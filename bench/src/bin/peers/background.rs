@@ -1,4 +1,4 @@
-//! From a frame to clusters of people: background and clusters, then detections as well. As the beams of known sensors, or as
+//! From a frame to people: background, then clusters as well, then detections. As the beams of known sensors, or as
 //! a cloud of points of which nothing more is known.
 
 use std::path::Path;
@@ -43,26 +43,13 @@ fn row(folder: &Path, config: &Config, taken_as: impl Fn(&mut Frame)) -> Answer 
         before.iter().for_each(|frame| stages.step(frame));
         stages.expect(frame);
         // Each try begins from a copy, for the stages remember.
-        let halfway = times(
-            TRIES,
-            || stages.clone(),
-            |stages| {
-                stages.foreground(frame);
-                stages.clusters();
-            },
-        );
-        let whole = times(
-            TRIES,
-            || stages.clone(),
-            |stages| {
-                stages.foreground(frame);
-                stages.clusters();
-                stages.detections();
-            },
-        );
-        stages.foreground(frame);
-        stages.clusters();
-        stages.detections();
+        let ms = |until: &[fn(&mut Stages, &Frame)]| {
+            times(TRIES, || stages.clone(), |stages| until.iter().for_each(|stage| stage(stages, frame)))
+        };
+        let all: [fn(&mut Stages, &Frame); 3] =
+            [Stages::foreground, |stages, _| stages.clusters(), |stages, _| stages.detections()];
+        let [background_ms, clusters_ms, detections_ms] = [1, 2, 3].map(|stages| ms(&all[..stages]));
+        all.iter().for_each(|stage| stage(&mut stages, frame));
         let middle = |cluster: &Vec<u32>| {
             let sum: DVec3 = cluster.iter().map(|&i| stages.foreground[i as usize].position_m).sum();
             sum.truncate() / cluster.len() as f64
@@ -70,8 +57,10 @@ fn row(folder: &Path, config: &Config, taken_as: impl Fn(&mut Frame)) -> Answer 
         let truth = &hall.truth[FRAMES - 1];
         let clusters: Vec<DVec2> = stages.clusters.iter().map(middle).collect();
         let detections: Vec<DVec2> = stages.detections.iter().map(|detection| detection.position_m).collect();
-        answer.case(&format!("{people} people, clusters"), &halfway, &found(truth, &clusters));
-        answer.case(&format!("{people} people, detections"), &whole, &found(truth, &detections));
+        let points = [("points", stages.foreground.len() as f64)];
+        answer.case(&format!("{people} people, background"), &background_ms, &points);
+        answer.case(&format!("{people} people, clusters"), &clusters_ms, &found(truth, &clusters));
+        answer.case(&format!("{people} people, detections"), &detections_ms, &found(truth, &detections));
     }
     answer
 }

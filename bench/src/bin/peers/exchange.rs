@@ -27,12 +27,18 @@ impl Answer {
 pub fn times<T>(tries: usize, mut prepare: impl FnMut() -> T, mut work: impl FnMut(&mut T)) -> Vec<f64> {
     let mut once = || {
         let mut prepared = prepare();
-        let from = Instant::now();
-        work(&mut prepared);
-        1e3 * from.elapsed().as_secs_f64()
+        took_ms(|| work(&mut prepared))
     };
     once();
     (0..tries).map(|_| once()).collect()
+}
+
+/// Wall time of one run.
+#[expect(clippy::disallowed_methods, reason = "a benchmark measures its own speed")]
+pub fn took_ms(work: impl FnOnce()) -> f64 {
+    let from = Instant::now();
+    work();
+    1e3 * from.elapsed().as_secs_f64()
 }
 
 /// Writes an array of `f64` as `NAME.npy` (format 1.0) in the folder, row after row.

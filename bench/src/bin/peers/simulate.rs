@@ -1,7 +1,6 @@
 //! One frame of two HDL-32E in the default hall with ten walkers: the rays that may meet somebody, and all that a frame is.
 
 use std::path::Path;
-use std::time::Instant;
 
 use umbracast::geometry::{DVec3, Pose};
 use umbracast::lidar::{Cloud, Frame, RangeImage};
@@ -13,12 +12,12 @@ use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
 
 use crate::bodies::{write_triangles, write_vertices};
-use crate::exchange::{Answer, times, write_f32, write_f64};
+use crate::exchange::{Answer, times, took_ms, write_f32, write_f64};
 
 /// That of every simulated hall of the benchmarks.
 const SEED: u64 = 100_000;
-/// Ten seconds after people set off they meet in the middle of the circle.
-const FRAME: u64 = 100;
+/// So many tenths of a second after people set off they meet in the middle of the circle.
+const FRAME: u64 = 120;
 const TRIES: usize = 40;
 /// Ranges in packets are whole multiples of 2 mm; what is nearer than the hall by more is a body.
 const UNIT_M: f32 = 0.002;
@@ -42,17 +41,12 @@ pub fn row(folder: &Path) -> Answer {
 /// A frame with people less one of the empty hall, which has the same noise and packets, less what posing takes. Every sensor
 /// sees every body at the beginning and at the end of its sweep at least, and bodies are posed for both.
 fn rays_ms(sensors: &Sensors, walkers: &[Walker]) -> Vec<f64> {
-    let ms = |work: &mut dyn FnMut()| {
-        let from = Instant::now();
-        work();
-        1e3 * from.elapsed().as_secs_f64()
-    };
     let mut vertices_m = Vec::new();
     let once = |_| {
         let [mut with, mut without] = [sensors.clone(), sensors.clone()];
-        let with_ms = ms(&mut || drop(with.frame(FRAME, walkers)));
-        let without_ms = ms(&mut || drop(without.frame(FRAME, &[])));
-        let posing_ms = ms(&mut || {
+        let with_ms = took_ms(|| drop(with.frame(FRAME, walkers)));
+        let without_ms = took_ms(|| drop(without.frame(FRAME, &[])));
+        let posing_ms = took_ms(|| {
             for walker in walkers {
                 (0..4).for_each(|i| {
                     assert!(walker.mesh_at(FRAME as i64 * umbracast::STEP_NS + i, &mut vertices_m))
