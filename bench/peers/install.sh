@@ -8,7 +8,7 @@ built="$here/../target/peers"
 missing=()
 
 # What Python's peers need, with versions, so that the table can be made again.
-python_packages=()
+python_packages=(open3d==0.20.0)
 
 without() {
     echo "without $1" >&2

@@ -20,9 +20,10 @@ BENCH = HERE.parent
 VENV = BENCH / "target" / "peers"
 
 # Row, what it is, and its peers: name and command, with {python}, {built} (the folder of compiled peers) and {folder}.
-PCL = [
+CLOUDS = [
     ("PCL, thinned first", ["{built}/background_pcl", "{folder}"]),
     ("PCL, whole cloud", ["{built}/background_pcl", "{folder}", "whole"]),
+    ("Open3D", ["{python}", "{here}/background_open3d.py", "{folder}"]),
 ]
 ROWS = [
     (
@@ -39,8 +40,8 @@ ROWS = [
             ("Embree, rays culled by hand", ["{built}/links_embree", "{folder}", "culled"]),
         ],
     ),
-    ("background", PCL),
-    ("unorganised", PCL),
+    ("background", CLOUDS),
+    ("unorganised", CLOUDS),
 ]
 
 
