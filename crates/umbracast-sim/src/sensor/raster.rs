@@ -23,6 +23,7 @@ pub struct Painter {
     sensor_from_site: Pose,
     /// From the lowest to the highest.
     beams: Vec<SlopedBeam>,
+    steps: Steps,
     /// Of the beams where they pass the sensor's axis, above the sensor's origin.
     lowest_origin_m: f64,
     highest_origin_m: f64,
@@ -88,6 +89,7 @@ impl Painter {
             highest_origin_m: past_axis().map(|(z_m, _)| z_m).fold(f64::NEG_INFINITY, f64::max),
             aside_m: past_axis().map(|(_, aside_m)| aside_m).fold(0.0, f64::max),
             column_sweep_cdeg: (turned().fold(0.0, f64::min), turned().fold(0.0, f64::max)),
+            steps: Steps::new(&beams),
             beams,
             start_m: Vec::new(),
             end_m: Vec::new(),
@@ -182,15 +184,16 @@ impl Painter {
             let narrow = bounds.ahead_m.0 > 4.0 * self.aside_m && width < 1.0;
             // By what a beam that does not pass through the axis seems turned and stretched, at most.
             let aside = if narrow { self.aside_m / bounds.ahead_m.0 } else { 0.0 };
-            let aside_cdeg = cdeg(aside.asin());
             let (low, high) = match narrow {
-                true => stretched(bounds.slope, width.hypot(2.0 * aside)),
+                true => stretched(bounds.slope, width * width + 4.0 * aside * aside),
                 false => self.slopes_near_axis(corners),
             };
-            let first = self.beams.partition_point(|b| b.slope < low);
+            // Most triangles lie between two beams.
+            let first = self.steps.first_from(low, &self.beams);
             if first == self.beams.len() || self.beams[first].slope > high {
                 continue;
             }
+            let aside_cdeg = cdeg(aside.asin());
             let (from_cdeg, to_cdeg) = if narrow {
                 let (from, to) = bounds.tangent;
                 (pass.middle_cdeg + cdeg(from.atan()), pass.middle_cdeg + cdeg(to.atan()))
@@ -257,6 +260,40 @@ impl Painter {
     }
 }
 
+/// Slopes in even steps, and for each the first beam that is not below it: finds beams without searching.
+#[derive(Debug, Clone)]
+struct Steps {
+    lowest: f64,
+    per_slope: f64,
+    first: Vec<usize>,
+}
+
+impl Steps {
+    /// Several to a beam.
+    const A_BEAM: usize = 8;
+
+    fn new(beams: &[SlopedBeam]) -> Self {
+        let (lowest, highest) =
+            (beams.first().map_or(0.0, |b| b.slope), beams.last().map_or(0.0, |b| b.slope));
+        let count = Self::A_BEAM * beams.len().max(1);
+        let per_slope = count as f64 / (highest - lowest).max(1e-6);
+        let from = |step: usize| lowest + step as f64 / per_slope;
+        let first = (0..=count).map(|step| beams.partition_point(|b| b.slope < from(step))).collect();
+        Self { lowest, per_slope, first }
+    }
+
+    /// The first beam with at least this slope; one past the last where there is none.
+    fn first_from(&self, slope: f64, beams: &[SlopedBeam]) -> usize {
+        // A slope below all, or none, counts as the lowest. One step less, for rounding may have led one too far.
+        let step = (((slope - self.lowest) * self.per_slope) as usize).saturating_sub(1);
+        let mut first = self.first[step.min(self.first.len() - 1)];
+        while beams.get(first).is_some_and(|b| b.slope < slope) {
+            first += 1;
+        }
+        first
+    }
+}
+
 impl Bounds {
     fn around(self, other: Self) -> Self {
         let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
@@ -277,9 +314,10 @@ fn past_axis(beam: &Beam) -> (f64, f64) {
 }
 
 /// Slopes between corners are steeper than at them: a chord is nearer to the axis than its ends, by up to the
-/// cosine of half the angle between them. 1 / cos(w / 2) < 1 + w2 / 4 for w < 2, and w < the tangents' difference.
-fn stretched((low, high): (f64, f64), width: f64) -> (f64, f64) {
-    let stretch = 1.0 + width * width * 0.25;
+/// cosine of half the angle between them. 1 / cos(w / 2) < 1 + w2 / 4 for w < 2, and w < the tangents' difference, whose
+/// square is given.
+fn stretched((low, high): (f64, f64), width_squared: f64) -> (f64, f64) {
+    let stretch = 1.0 + width_squared * 0.25;
     (low.min(low * stretch), high.max(high * stretch))
 }
 
