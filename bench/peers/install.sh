@@ -7,9 +7,6 @@ here="$(cd "$(dirname "$0")" && pwd)"
 built="$here/../target/peers"
 missing=()
 
-# What Python's peers need, with versions, so that the table can be made again.
-python_packages=(open3d==0.20.0)
-
 without() {
     echo "without $1" >&2
     missing+=("$1")
@@ -51,7 +48,8 @@ python_peers() {
         without "an environment for Python"
         return
     fi
-    for package in "${python_packages[@]}"; do
+    # One by one, so that a package that cannot be had costs its own row alone.
+    for package in $(grep -v '^#' "$here/requirements.txt"); do
         "$built/bin/pip" install --quiet "$package" || without "$package"
     done
 }

@@ -20,6 +20,7 @@ BENCH = HERE.parent
 VENV = BENCH / "target" / "peers"
 
 # Row, what it is, and its peers: name and command, with {python}, {built} (the folder of compiled peers) and {folder}.
+OURS = str(BENCH / "target" / "release" / "peers")
 CLOUDS = [
     ("PCL, thinned first", ["{built}/background_pcl", "{folder}"]),
     ("PCL, whole cloud", ["{built}/background_pcl", "{folder}", "whole"]),
@@ -42,6 +43,20 @@ ROWS = [
     ),
     ("background", CLOUDS),
     ("unorganised", CLOUDS),
+    ("tracking", [(peer, ["{python}", f"{{here}}/tracking_{peer}.py", "{folder}"]) for peer in ["norfair", "motpy", "stonesoup"]]),
+    ("forecast", [(peer, ["{python}", f"{{here}}/forecast_{peer}.py", "{folder}"]) for peer in ["torch", "onnxruntime"]]),
+    (
+        "algorithm1",
+        [
+            ("scalar listing", [OURS, "algorithm1-listing", "{folder}"]),
+            ("trimesh", ["{python}", "{here}/algorithm1_trimesh.py", "{folder}"]),
+        ],
+    ),
+    (
+        "assignment",
+        [(peer, ["{python}", f"{{here}}/assignment_{peer}.py", "{folder}"]) for peer in ["lapjv", "lap"]]
+        + [("pathfinding", [OURS, "assignment-pathfinding", "{folder}"])],
+    ),
 ]
 
 
@@ -59,14 +74,13 @@ def answer(command, folder):
 def main():
     build = ["cargo", "build", "--release", "--quiet", "--bin", "peers"]
     subprocess.run(build, cwd=BENCH, check=True)
-    ours_program = str(BENCH / "target" / "release" / "peers")
     asked = sys.argv[1:]
     print(f"{'row, case':58} {'ours, ms':>10} {'peer, ms':>10} {'ratio':>8}  peer, and what both found")
     for row, peers in ROWS:
         if asked and row not in asked:
             continue
         with tempfile.TemporaryDirectory() as folder:
-            ours = answer([ours_program, row, folder], folder)
+            ours = answer([OURS, row, folder], folder)
             if "skipped" in ours:
                 sys.exit(f"{row}: ours failed: {ours['skipped']}")
             for name, command in peers:

@@ -2,11 +2,15 @@
 //! works on the same, times ours on it, and prints one JSON object. `bench/peers/run.py` calls this, then the peer.
 //! Everything runs on one thread.
 
+mod algorithm1;
+mod assignment;
 mod exchange;
 mod bodies;
 mod simulate;
 mod links;
 mod background;
+mod forecast;
+mod tracking;
 
 use std::path::Path;
 
@@ -15,12 +19,18 @@ use exchange::Answer;
 /// What one row does: its inputs go to the folder, its times into the answer.
 type Row = fn(&Path) -> Answer;
 
-/// Every row by name, in the order of the table.
-const ROWS: [(&str, Row); 4] = [
+/// Every row by name, in the order of the table, and the peers that are written in Rust as `ROW-PEER`.
+const ROWS: [(&str, Row); 10] = [
     ("simulate", simulate::row),
     ("links", links::row),
     ("background", background::organised),
     ("unorganised", background::unorganised),
+    ("tracking", tracking::row),
+    ("forecast", forecast::row),
+    ("algorithm1", algorithm1::row),
+    ("algorithm1-listing", algorithm1::listing),
+    ("assignment", assignment::row),
+    ("assignment-pathfinding", assignment::pathfinding),
 ];
 
 fn main() {
