@@ -1,7 +1,7 @@
 //! Assigns detections to tracks.
 //!
-//! The assignment is written by hand. Its algorithm allows rows without a partner and forbidden pairs; crates for
-//! square matrices of integers have neither.
+//! The assignment is written by hand. Its algorithm allows rows without a partner and forbidden pairs, and looks at no others than
+//! those that are allowed; crates for square matrices have none of this.
 
 use crate::detect::Detection;
 
@@ -11,8 +11,8 @@ pub const FORBIDDEN: f64 = f64::INFINITY;
 /// Gives rows to columns so that the sum of the costs is the least; `cost(r, c)` may be [`FORBIDDEN`], and a row
 /// that stays alone costs nothing, so only pairs below zero are made. Returns each row's column.
 ///
-/// Shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016), one column of cost zero
-/// for each row beside the real ones. Of equal sums the one with the earlier rows and columns is taken.
+/// Shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016) over the pairs below zero. Which of equal
+/// sums is taken depends on the order of rows and columns alone.
 pub fn optimal(rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
     let mut assignment = Assignment::default();
     assignment.optimal(rows, columns, cost);
@@ -25,73 +25,131 @@ pub struct Assignment {
     /// Each row's column.
     pub column_of: Vec<Option<usize>>,
     row_of: Vec<Option<usize>>,
-    costs: Vec<f64>,
+    /// Pairs below zero, row after row, and where each row's begin.
+    pairs: Vec<Pair>,
+    starts: Vec<usize>,
     row_price: Vec<f64>,
     column_price: Vec<f64>,
+    /// Of the path that is looked for: from its row to every column, over which row, and whether that is settled.
     distance: Vec<f64>,
     came_from: Vec<usize>,
     done: Vec<bool>,
+    /// Columns that are not infinitely far; those that are settled come first.
+    reached: Vec<usize>,
+}
+
+/// A column that a row may have.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    column: usize,
+    cost: f64,
+}
+
+/// Where a path ends.
+enum End {
+    /// At a column that nobody has.
+    Free(usize),
+    /// At a row that stays alone from now on.
+    Alone(usize),
 }
 
 impl Assignment {
     /// [`optimal`], into `column_of`. Every cost is asked once.
     pub fn optimal(&mut self, rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) {
-        let width = columns + rows;
-        let Self { column_of, row_of, costs, row_price, column_price, distance, came_from, done } = self;
-        refill(costs, rows * columns, 0.0);
-        for (r, costs) in costs.chunks_exact_mut(columns.max(1)).enumerate() {
-            costs.iter_mut().enumerate().for_each(|(c, place)| *place = cost(r, c));
+        self.pairs.clear();
+        self.starts.clear();
+        for r in 0..rows {
+            self.starts.push(self.pairs.len());
+            let pairs = (0..columns).map(|column| Pair { column, cost: cost(r, column) });
+            self.pairs.extend(pairs.filter(|pair| pair.cost < 0.0));
         }
-        refill(row_price, rows, 0.0);
-        refill(column_price, width, 0.0);
-        refill(row_of, width, None);
-        refill(column_of, rows, None);
-        for start in 0..rows {
-            // Dijkstra from `start` over reduced costs to the nearest free column.
-            refill(distance, width, f64::INFINITY);
-            refill(came_from, width, start);
-            refill(done, width, false);
-            let (mut row, mut so_far) = (start, 0.0);
-            let free = loop {
-                let mut nearest = None;
-                let costs = &costs[row * columns..(row + 1) * columns];
-                for c in (0..width).filter(|&c| !done[c]) {
-                    let cost = costs.get(c).copied().unwrap_or(0.0);
-                    let through = so_far + cost - row_price[row] - column_price[c];
-                    if through < distance[c] {
-                        (distance[c], came_from[c]) = (through, row);
+        self.starts.push(self.pairs.len());
+        refill(&mut self.column_of, rows, None);
+        refill(&mut self.row_of, columns, None);
+        refill(&mut self.row_price, rows, 0.0);
+        refill(&mut self.column_price, columns, 0.0);
+        refill(&mut self.distance, columns, f64::INFINITY);
+        refill(&mut self.came_from, columns, 0);
+        refill(&mut self.done, columns, false);
+        // Who is alone in wanting a column most has it; paths are looked for where rows want the same.
+        for r in 0..rows {
+            let best = self.pairs[self.starts[r]..self.starts[r + 1]].iter();
+            let Some(best) = best.reduce(|a, b| if b.cost < a.cost { b } else { a }) else { continue };
+            self.row_price[r] = best.cost;
+            if self.row_of[best.column].is_none() {
+                (self.row_of[best.column], self.column_of[r]) = (Some(r), Some(best.column));
+            }
+        }
+        for r in 0..rows {
+            if self.column_of[r].is_none() && self.starts[r] < self.starts[r + 1] {
+                self.augment(r);
+            }
+        }
+    }
+
+    /// Gives a row a column, or leaves one alone, whichever costs least together.
+    fn augment(&mut self, start: usize) {
+        let (end, length) = self.shortest(start);
+        self.row_price[start] += length;
+        for &c in self.reached.iter().take_while(|&&c| self.done[c]) {
+            if let Some(owner) = self.row_of[c] {
+                self.row_price[owner] += length - self.distance[c];
+                self.column_price[c] -= length - self.distance[c];
+            }
+        }
+        let mut column = match end {
+            End::Free(column) => Some(column),
+            End::Alone(row) => self.column_of[row].take(),
+        };
+        while let Some(c) = column {
+            let row = self.came_from[c];
+            self.row_of[c] = Some(row);
+            column = self.column_of[row].replace(c);
+        }
+        for c in self.reached.drain(..) {
+            (self.distance[c], self.done[c]) = (f64::INFINITY, false);
+        }
+    }
+
+    /// Dijkstra from a row over reduced costs to the nearest column that is free, or row that may as well stay alone.
+    fn shortest(&mut self, start: usize) -> (End, f64) {
+        let Self {
+            row_of, pairs, starts, row_price, column_price, distance, came_from, done, reached, ..
+        } = self;
+        let (mut row, mut so_far, mut settled) = (start, 0.0, 0);
+        let (mut alone, mut alone_row) = (f64::INFINITY, start);
+        loop {
+            if so_far - row_price[row] < alone {
+                (alone, alone_row) = (so_far - row_price[row], row);
+            }
+            let off = so_far - row_price[row];
+            for &Pair { column, cost } in &pairs[starts[row]..starts[row + 1]] {
+                let through = off + cost - column_price[column];
+                if through < distance[column] && !done[column] {
+                    if distance[column] == f64::INFINITY {
+                        reached.push(column);
                     }
-                    if nearest.is_none_or(|n: usize| distance[c] < distance[n]) {
-                        nearest = Some(c);
-                    }
+                    (distance[column], came_from[column]) = (through, row);
                 }
-                // A column of cost zero is always free for every row.
-                let Some(column) = nearest else { return };
-                (done[column], so_far) = (true, distance[column]);
-                match row_of[column] {
-                    Some(owner) => row = owner,
-                    None => break column,
-                }
+            }
+            let nearer = |a: usize, b: usize| {
+                let (a, b) = ((distance[reached[a]], reached[a]), (distance[reached[b]], reached[b]));
+                a.0 < b.0 || (a.0 == b.0 && a.1 < b.1)
             };
-            row_price[start] += so_far;
-            for c in (0..width).filter(|&c| done[c] && c != free) {
-                if let Some(owner) = row_of[c] {
-                    row_price[owner] += so_far - distance[c];
-                    column_price[c] -= so_far - distance[c];
-                }
+            let nearest = (settled..reached.len()).reduce(|a, b| if nearer(b, a) { b } else { a });
+            let Some(nearest) = nearest.filter(|&nearest| distance[reached[nearest]] <= alone) else {
+                return (End::Alone(alone_row), alone);
+            };
+            reached.swap(settled, nearest);
+            let column = reached[settled];
+            so_far = distance[column];
+            match row_of[column] {
+                Some(owner) => row = owner,
+                None => return (End::Free(column), so_far),
             }
-            let mut column = free;
-            loop {
-                let row = came_from[column];
-                row_of[column] = Some(row);
-                let before = column_of[row].replace(column);
-                match before {
-                    Some(before) => column = before,
-                    None => break,
-                }
-            }
+            done[column] = true;
+            settled += 1;
         }
-        column_of.iter_mut().for_each(|column| *column = column.filter(|&c| c < columns));
     }
 }
 
