@@ -59,7 +59,7 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 46] = [
+const JOBS: [Job; 48] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
@@ -79,6 +79,8 @@ const JOBS: [Job; 46] = [
     job("logictronix", "real people before a real VLP-16", 1, Needs::Data, logictronix::logictronix),
     job("speed", "how long a frame takes, in every mode", 1, Needs::Nothing, house::speed),
     job("growth", "how long a step takes with more people and access points", 5, Needs::Nothing, house::growth),
+    job("peers", "the same work by other programs", 15, Needs::Asking, house::peers),
+    job("instructions", "how many instructions a frame takes", 3, Needs::Program("valgrind"), house::instructions),
     job("living", "furniture put in, people who stand, no empty scan", 15, Needs::Nothing, living::living),
     job("standing", "people who stand or sit from the first frame on", 25, Needs::Nothing, standing::standing),
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", 5, Needs::Nothing, glass::glass),

@@ -38,6 +38,36 @@ pub fn growth(book: &mut Book) -> Result<()> {
     keep(book, &picture, "growth.svg")
 }
 
+/// Others' programs on the same work, one core each.
+pub fn peers(book: &mut Book) -> Result<()> {
+    book.command("bench/peers/install.sh");
+    book.bash(&root(), "bench/peers/install.sh")?;
+    script(book, "python3 bench/peers/run.py", "python3 bench/peers/run.py")
+}
+
+/// Instructions of a frame of ten people, which do not depend on what else a machine does, beside those of the record before.
+pub fn instructions(book: &mut Book) -> Result<()> {
+    const FRAMES: f64 = 20.0;
+    let before = std::fs::read_to_string(root().join("record/instructions.txt")).unwrap_or_default();
+    let build = "cargo build --release --quiet --manifest-path bench/Cargo.toml --bin frame";
+    let count = "valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect='*counted*' \
+                 bench/target/release/frame";
+    book.command(&format!("{build} && {count} MODE"));
+    book.bash(&root(), build)?;
+    book.line("mode     million instructions a frame, ten people    change");
+    for mode in ["default", "paper", "hdl"] {
+        let said = book.bash(&root(), &format!("{count} {mode} 2>&1"))?;
+        let collected = said.lines().find_map(|line| line.split_once("Collected : "));
+        let collected = collected.and_then(|(_, count)| count.trim().parse::<f64>().ok());
+        let millions = 1e-6 * collected.ok_or(said)? / FRAMES;
+        let told = |line: &str| line.strip_prefix(mode)?.split_whitespace().next()?.parse::<f64>().ok();
+        let change = before.lines().find_map(told).map(|before| 100.0 * (millions / before - 1.0));
+        let change = change.map_or("-".to_owned(), |percent| format!("{percent:+.1} %"));
+        book.line(&format!("{mode:8} {millions:42.2} {change:>9}"));
+    }
+    Ok(())
+}
+
 /// The same seed twice, on one thread and on two.
 pub fn same_bytes(book: &mut Book) -> Result<()> {
     let of_threads = [("one", "1"), ("two", "2")];

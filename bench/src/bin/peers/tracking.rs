@@ -40,7 +40,7 @@ struct Scene {
 /// Everybody walks straight at a pace of their own and turns round at the edge.
 fn scene(people: usize, frames: usize) -> Scene {
     let (side_m, mut chance) = ((people as f64 * ROOM_M2).sqrt(), Chance(people as u64));
-    let place = |chance: &mut Chance| DVec2::new(side_m * chance.uniform(), side_m * chance.uniform());
+    let place = |chance: &mut Chance| DVec2::new(chance.uniform() - 0.5, chance.uniform() - 0.5) * side_m;
     let mut walkers: Vec<(DVec2, DVec2)> = (0..people)
         .map(|_| {
             let angle_rad = std::f64::consts::TAU * chance.uniform();
@@ -53,7 +53,7 @@ fn scene(people: usize, frames: usize) -> Scene {
         for (at_m, velocity_mps) in &mut walkers {
             for axis in 0..2 {
                 let next_m = at_m[axis] + velocity_mps[axis] * STEP_S;
-                if !(0.0..side_m).contains(&next_m) {
+                if next_m.abs() > 0.5 * side_m {
                     velocity_mps[axis] = -velocity_mps[axis];
                 }
             }
@@ -94,12 +94,14 @@ fn detection(at_m: DVec2, time_ns: i64) -> Detection {
 /// of single frames.
 pub fn row(folder: &Path) -> Answer {
     let mut answer = Answer::default();
-    for (people, frames) in [(100, 100), (1000, 8)] {
+    for (people, frames) in [(100, 100), (1000, 60)] {
         let scene = scene(people, frames);
         write_scene(folder, people, &scene);
         for mode in [Mode::Paper, Mode::Default] {
             // No scan looks, so that our tracker has no sight to tell a miss from somebody hidden.
-            let config = Config::for_mode(mode);
+            let mut config = Config::for_mode(mode);
+            config.site.hall.length_m = (people as f64 * ROOM_M2).sqrt() + 1.0;
+            config.site.hall.width_m = config.site.hall.length_m;
             let (mut tracker, mut tracks) = (Tracker::new(&config.track, &config.site), Vec::new());
             let (mut ms, mut rows) = (Vec::new(), Vec::new());
             for (frame, detected_m) in scene.detected_m.iter().enumerate() {

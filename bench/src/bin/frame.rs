@@ -1,0 +1,34 @@
+//! Steps of one mode, for counting their instructions: `frame MODE` prints how many. Counted is what happens in [`counted`]:
+//! `valgrind --tool=callgrind --toggle-collect='*counted*'`.
+
+use umbracast::forecast::Weights;
+use umbracast::{Config, Frame, Mode, Pipeline};
+use umbracast_bench::simulated::crossing;
+
+/// People are followed after so many frames; the rest are counted.
+const BEFORE: usize = 30;
+const FRAMES: usize = 50;
+
+fn main() {
+    let word = std::env::args().nth(1).expect("a mode");
+    let mode = Mode::ALL.into_iter().find(|mode| mode.name() == word).expect("hdl, paper or default");
+    let config = Config::for_mode(mode);
+    let weights = (mode != Mode::Default).then(|| {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/paper_lstm.safetensors");
+        Weights::from_safetensors(&std::fs::read(file).expect("the weights are there"))
+            .expect("they are weights")
+    });
+    let hall = crossing(&config.site, 10, 12.5, FRAMES).expect("the default site is simulated");
+    let mut pipeline = Pipeline::new(&config, weights.as_ref()).expect("the defaults work");
+    hall.empty.iter().for_each(|frame| pipeline.learn_empty(frame));
+    for frame in &hall.frames[..BEFORE] {
+        pipeline.step(frame);
+    }
+    let links = hall.frames[BEFORE..].iter().map(|frame| counted(&mut pipeline, frame)).sum::<usize>();
+    println!("{} frames, {links} links", FRAMES - BEFORE);
+}
+
+#[inline(never)]
+fn counted(pipeline: &mut Pipeline, frame: &Frame) -> usize {
+    pipeline.step(frame).blockages.len()
+}
