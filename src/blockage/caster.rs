@@ -179,7 +179,7 @@ impl Caster {
         blockages: &mut Vec<Blockage>,
     ) {
         let (numbers, ue) = (&self.numbers, &self.ue);
-        self.sampler.draw(numbers, ue, &self.access_points_m, people.clone());
+        self.sampler.draw(numbers, ue, people.clone());
         for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
             for (person, (track, _)) in people.clone().enumerate() {
                 let chances = self.sampler.chances(ue, access_point, ap_m, person, self.threshold);

@@ -34,9 +34,8 @@ const TESTS_MAX: usize = 1 << 18;
 /// What a person takes of that by being seen and followed, which lasts as long as so many tests: a crowd's frame is not to last
 /// longer for it. Forty people are left the fewest samples, which moves their F1 and calibration by less than .002.
 const TESTS_PER_PERSON: usize = 6000;
-/// Room for a crowd's meetings from the start: memory that nobody wrote to costs nothing, and a list that doubles when more
-/// people come leaves its old place behind.
-const MEETINGS: usize = 1 << 16;
+/// Room for the meetings of a link in a crowd.
+const MEETINGS: usize = 1 << 10;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
 const SAMPLES_MIN: usize = WORD;
 
@@ -75,12 +74,12 @@ pub struct Sampler {
     present: usize,
     /// How many samples each of them has.
     samples: usize,
-    /// How many the last frame would have left time for.
-    affordable: usize,
+    /// Shadows that fall from this access point.
     shadows: Shadows,
-    /// Of all links, access points first: who may stand in the way of each, and where each link's end.
+    seen_from: Option<usize>,
+    /// Who may stand in the way of the link that is looked at, and how many those of the frame's links are together.
     meetings: Vec<Meeting>,
-    ends: Vec<usize>,
+    asked: usize,
     rays: Rays,
     crossing: Crossing,
     link: Link,
@@ -125,10 +124,10 @@ impl Sampler {
             people: Vec::new(),
             present: 0,
             samples: numbers.samples,
-            affordable: numbers.samples,
             shadows: Shadows::default(),
+            seen_from: None,
             meetings: Vec::with_capacity(MEETINGS),
-            ends: Vec::new(),
+            asked: 0,
             rays: Rays::default(),
             crossing: Crossing::default(),
             link: Link::default(),
@@ -139,13 +138,12 @@ impl Sampler {
     }
 
     wide! {
-        /// Draws everybody's trajectories and finds out who can come in whose way. A person's draws depend on the seed, the
-        /// track and nothing else, so the samples of one frame and the next differ only by what the tracks learned.
+        /// Draws everybody's trajectories. A person's draws depend on the seed, the track and nothing else, so the samples of
+        /// one frame and the next differ only by what the tracks learned.
         pub fn draw<'a>(
             &mut self,
             numbers: &Numbers,
             ue: &Ue,
-            aps_m: &[DVec3],
             people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
         ) = draw_avx2 or draw_portably
     }
@@ -155,14 +153,15 @@ impl Sampler {
         &mut self,
         numbers: &Numbers,
         ue: &Ue,
-        aps_m: &[DVec3],
         people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
     ) {
         self.draws.retain(|&id, _| people.clone().any(|(track, _)| track.id == id));
         // Where there is more to ask than time allows, samples are left out, for all links alike; what is left is a sample of
         // the same distribution, for draws are in no order. A frame has about as much to ask as the one before.
-        self.samples = numbers.samples.min(self.affordable);
-        self.present = 0;
+        let tests = TESTS_MAX.saturating_sub(TESTS_PER_PERSON * self.present);
+        let affordable = (tests / self.asked.max(1)).max(SAMPLES_MIN) / WORD * WORD;
+        self.samples = numbers.samples.min(affordable);
+        (self.present, self.asked, self.seen_from) = (0, 0, None);
         for (track, forecast) in people {
             if self.people.len() == self.present {
                 self.people.push(Trajectories::default());
@@ -176,18 +175,6 @@ impl Sampler {
             self.people[self.present].stand_on(&self.hall);
             self.present += 1;
         }
-        self.meetings.clear();
-        self.ends.clear();
-        let people = &self.people[..self.present];
-        for &ap_m in aps_m {
-            self.shadows.fall(ap_m, ue, people);
-            for person in 0..people.len() {
-                self.shadows.meet(&self.figure, people, person, &mut self.meetings);
-                self.ends.push(self.meetings.len());
-            }
-        }
-        let tests = TESTS_MAX.saturating_sub(TESTS_PER_PERSON * self.present);
-        self.affordable = (tests / self.meetings.len().max(1)).max(SAMPLES_MIN) / WORD * WORD;
     }
 
     /// Everybody's samples of the frame that was drawn, and how many of each count.
@@ -201,8 +188,8 @@ impl Sampler {
     }
 
     wide! {
-        /// What becomes of the link between access point `ap` of those drawn for and `person`. It counts as blocked now from
-        /// `threshold` on.
+        /// What becomes of the link between access point `ap` and `person`. It counts as blocked now from `threshold` on. Each
+        /// link is asked once a frame, those of an access point one after another.
         pub fn chances(
             &mut self, ue: &Ue, ap: usize, ap_m: DVec3, person: usize, threshold: f64,
         ) -> Chances = chances_avx2 or chances_portably
@@ -217,14 +204,20 @@ impl Sampler {
         person: usize,
         threshold: f64,
     ) -> Chances {
-        let link = ap * self.present + person;
-        let of_link = link.checked_sub(1).map_or(0, |before| self.ends[before])..self.ends[link];
+        let people = &self.people[..self.present];
+        if self.seen_from != Some(ap) {
+            self.shadows.fall(ap_m, ue, people);
+            self.seen_from = Some(ap);
+        }
+        self.meetings.clear();
+        self.shadows.meet(&self.figure, people, person, &mut self.meetings);
+        self.asked += self.meetings.len();
         let samples = self.samples;
         let words = samples.div_ceil(WORD);
         self.link.begin(samples);
         let mut counts = Counts::default();
         let aim = Aim { ue, ap_m, person };
-        let later = self.take_step(aim, 0, of_link.clone(), 0..words, &mut counts);
+        let later = self.take_step(aim, 0, 0..self.meetings.len(), 0..words, &mut counts);
         counts.blocked_now = counts.now as f64 / samples as f64 >= threshold;
         // Where nothing stands in the way of any sample now, nor of the first half of them later, that is taken for the rest
         // as well: some chance below a few per cent then counts as none.

@@ -153,7 +153,7 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
         let tracks: Vec<Track> = (0..14).map(|id| somebody(id, &mut random)).collect();
         let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
         let mut sampler = Sampler::new(&numbers, &site);
-        sampler.draw(&numbers, &ue, &aps_m, tracks.iter().zip(&forecasts));
+        sampler.draw(&numbers, &ue, tracks.iter().zip(&forecasts));
         for (ap, &ap_m) in aps_m.iter().enumerate() {
             for q in 0..tracks.len() {
                 let mut bits: Vec<u16> =
@@ -207,7 +207,7 @@ fn a_ray_meets_what_somebody_carries_beside_him() {
         let forecasts = tracks.each_ref().map(constant_velocity::forecast);
         let mut sampler = Sampler::new(&numbers, &config.site);
         let aps_m = [DVec3::new(8.0, 0.0, 1.2)];
-        sampler.draw(&numbers, &config.site.ue, &aps_m, tracks.iter().zip(&forecasts));
+        sampler.draw(&numbers, &config.site.ue, tracks.iter().zip(&forecasts));
         sampler.chances(&config.site.ue, 0, aps_m[0], 1, 0.5).p_now
     };
     assert!(p(0.0) < 0.2 && p(0.1) > 0.8, "{} {}", p(0.0), p(0.1));
@@ -223,8 +223,8 @@ fn processors_with_narrower_registers_give_the_same_bits() {
     let people = || tracks.iter().zip(&forecasts);
     let aps_m = [DVec3::new(9.0, 1.0, 2.0), DVec3::new(0.0, 0.0, 3.0)];
     let (mut wide, mut narrow) = (Sampler::new(&numbers, &config.site), Sampler::new(&numbers, &config.site));
-    wide.draw(&numbers, &ue, &aps_m, people());
-    narrow.draw_portably(&numbers, &ue, &aps_m, people());
+    wide.draw(&numbers, &ue, people());
+    narrow.draw_portably(&numbers, &ue, people());
     for (ap, &ap_m) in aps_m.iter().enumerate() {
         for q in 0..tracks.len() {
             let found = wide.chances(&ue, ap, ap_m, q, 0.5);
