@@ -166,7 +166,7 @@ impl Sectors {
 fn covered(seen: &Seen) -> (usize, usize) {
     let sine2 = seen.reach_m * seen.reach_m / seen.middle2_m2;
     // The access point is in or above it, or nobody knows where it is.
-    if !(sine2 < 1.0) {
+    if sine2.is_nan() || sine2 >= 1.0 {
         return (0, SECTORS);
     }
     let tangent = DVec2::new((1.0 - sine2).sqrt(), sine2.sqrt());
