@@ -57,6 +57,15 @@ ROWS = [
         [(peer, ["{python}", f"{{here}}/assignment_{peer}.py", "{folder}"]) for peer in ["lapjv", "lap"]]
         + [("pathfinding", [OURS, "assignment-pathfinding", "{folder}"])],
     ),
+    ("orca", [("dodgy_2d, kiddo", [OURS, "orca-dodgy", "{folder}"])]),
+    (
+        "reading",
+        [
+            ("rosbags", ["{python}", "{here}/reading_rosbags.py", "{folder}"]),
+            ("rosbags + velodyne-decoder", ["{python}", "{here}/reading_velodyne.py", "{folder}"]),
+        ],
+    ),
+    ("loss", [("NumPy + SciPy", ["{python}", "{here}/loss_scipy.py", "{folder}"])]),
 ]
 
 

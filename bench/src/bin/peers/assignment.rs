@@ -15,7 +15,7 @@ const GATE_M: f64 = 1.5;
 const PARTS: f64 = 1e6;
 
 /// Numbers from 0 to 1 that do not depend on a crate (SplitMix64).
-fn uniform(state: &mut u64) -> f64 {
+pub fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let word = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

@@ -11,6 +11,9 @@ mod links;
 mod background;
 mod forecast;
 mod tracking;
+mod orca;
+mod reading;
+mod loss;
 
 use std::path::Path;
 
@@ -20,7 +23,7 @@ use exchange::Answer;
 type Row = fn(&Path) -> Answer;
 
 /// Every row by name, in the order of the table, and the peers that are written in Rust as `ROW-PEER`.
-const ROWS: [(&str, Row); 10] = [
+const ROWS: [(&str, Row); 14] = [
     ("simulate", simulate::row),
     ("links", links::row),
     ("background", background::organised),
@@ -31,6 +34,10 @@ const ROWS: [(&str, Row); 10] = [
     ("algorithm1-listing", algorithm1::listing),
     ("assignment", assignment::row),
     ("assignment-pathfinding", assignment::pathfinding),
+    ("orca", orca::row),
+    ("orca-dodgy", orca::dodgy),
+    ("reading", reading::row),
+    ("loss", loss::row),
 ];
 
 fn main() {

@@ -8,7 +8,7 @@ use umbracast::lidar::Views;
 use umbracast::track::Tracker;
 use umbracast::{Config, Mode, STEP_NS, STEP_S};
 
-use crate::exchange::{Answer, write_f64, write_u32};
+use crate::exchange::{Answer, took_ms, write_f64, write_u32};
 
 /// A person for so many square metres.
 const ROOM_M2: f64 = 16.0;
@@ -109,9 +109,7 @@ pub fn row(folder: &Path) -> Answer {
                 let views = Views { time_ns, of_scans: Vec::new() };
                 let detections: Vec<Detection> =
                     detected_m.iter().map(|&at_m| detection(at_m, time_ns)).collect();
-                let from = std::time::Instant::now();
-                tracker.update(&views, &detections, &mut tracks);
-                ms.push(1e3 * from.elapsed().as_secs_f64());
+                ms.push(took_ms(|| tracker.update(&views, &detections, &mut tracks)));
                 for track in tracks.iter().filter(|track| track.confirmed) {
                     rows.extend([frame as f64, track.id as f64, track.position_m.x, track.position_m.y]);
                 }
