@@ -8,6 +8,7 @@ and what it found. `install.sh` fetches the peers; a row whose peer is not there
 """
 
 import json
+import math
 import os
 import pathlib
 import statistics
@@ -68,6 +69,42 @@ ROWS = [
     ("loss", [("NumPy + SciPy", ["{python}", "{here}/loss_scipy.py", "{folder}"])]),
 ]
 
+# The ratios that were aimed at when these rows were chosen: by row, else by row and peer, or by row and case for its
+# first peer.
+WANTED = {
+    "simulate": 2,
+    "links": 10,
+    "background": 30,
+    "unorganised": 8,
+    "tracking": 20,
+    ("forecast", "torch"): 4,
+    ("forecast", "onnxruntime"): 1.5,
+    ("algorithm1", "10 people"): 3,
+    ("algorithm1", "100 people"): 15,
+    ("algorithm1", "1000 people"): 30,
+    "assignment": 3,
+    ("orca", "10 people"): 1,
+    ("orca", "1000 people"): 1.5,
+    ("orca", "10000 people"): 2,
+    "reading": 20,
+    "loss": 100,
+}
+
+
+def machine():
+    """The processor, and the versions of what is compared."""
+    with open("/proc/cpuinfo") as about:
+        model = next((line.split(":")[1].strip() for line in about if line.startswith("model name")), "unknown")
+    debian = ["dpkg-query", "--show", "--showformat", "${Package} ${Version}, ", "libembree-dev", "libpcl-dev"]
+    packages = subprocess.run(debian, capture_output=True, text=True).stdout
+    lines = (HERE / "requirements.txt").read_text().splitlines()
+    return f"{model}; {packages}{', '.join(line for line in lines if not line.startswith('#'))}"
+
+
+def told(name, ours, theirs):
+    """What both found, or what only the peer can tell of."""
+    return f"{name} {theirs:.6g}" if ours is None else f"{name} {ours:.6g} / {theirs:.6g}"
+
 
 def answer(command, folder):
     """What a side printed: its last line, as JSON. One core, one thread."""
@@ -84,7 +121,9 @@ def main():
     build = ["cargo", "build", "--release", "--quiet", "--bin", "peers"]
     subprocess.run(build, cwd=BENCH, check=True)
     asked = sys.argv[1:]
-    print(f"{'row, case':58} {'ours, ms':>10} {'peer, ms':>10} {'ratio':>8}  peer, and what both found")
+    print(f"machine: {machine()}\n")
+    print(f"{'row, case':34} {'peer':40} {'ours, ms':>10} {'peer, ms':>10} {'ratio':>7} {'aimed at':>8}")
+    found = []
     for row, peers in ROWS:
         if asked and row not in asked:
             continue
@@ -92,14 +131,14 @@ def main():
             ours = answer([OURS, row, folder], folder)
             if "skipped" in ours:
                 sys.exit(f"{row}: ours failed: {ours['skipped']}")
-            for name, command in peers:
+            for place, (name, command) in enumerate(peers):
                 words = {"python": str(VENV / "bin" / "python"), "built": str(VENV), "here": str(HERE), "folder": folder}
                 try:
                     theirs = answer([word.format(**words) for word in command], folder)
-                except FileNotFoundError as missing:
-                    theirs = {"skipped": str(missing)}
+                except FileNotFoundError:
+                    theirs = {"skipped": "it is not there"}
                 if "skipped" in theirs:
-                    print(f"{row + ', ' + name:58} skipped: {theirs['skipped']}")
+                    print(f"{row:34} {name:40} skipped: {theirs['skipped']}")
                     continue
                 by_case = {case["case"]: case for case in theirs["cases"]}
                 for case in ours["cases"]:
@@ -107,8 +146,15 @@ def main():
                         continue
                     peer = by_case[case["case"]]
                     ours_ms, peer_ms = (statistics.median(side["ms"]) for side in (case, peer))
-                    found = "; ".join(f"{k} {case['found'].get(k, float('nan')):.6g} / {v:.6g}" for k, v in peer["found"].items())
-                    print(f"{row + ', ' + case['case']:58} {ours_ms:10.4g} {peer_ms:10.4g} {peer_ms / ours_ms:8.2f}  {name}; {found}")
+                    keys = [row, (row, name), *([(row, case["case"])] if place == 0 else [])]
+                    aims = [WANTED[key] for key in keys if key in WANTED]
+                    aim = f"{aims[0]:8g}" if aims else ""
+                    here = f"{row}, {case['case']}"
+                    print(f"{here:34} {name:40} {ours_ms:10.4g} {peer_ms:10.4g} {peer_ms / ours_ms:7.2f} {aim}", flush=True)
+                    both = [told(k, case["found"].get(k), v) for k, v in peer["found"].items() if not math.isnan(v)]
+                    found.append(f"{here}, {name}: {'; '.join(both)}")
+    print("\nWhat both found, ours / the peer's:")
+    print("\n".join(found))
 
 
 if __name__ == "__main__":
