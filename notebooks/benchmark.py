@@ -119,3 +119,31 @@ def leaderboard(scored: dict[str, dict[str, float | None]]) -> str:
         cells = ["-" if of[name] is None else f"{of[name]:.3f}" for name in names]
         lines.append(f"| {predictor} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def constant_velocity(tracks: Arrays) -> Arrays:
+    """Everybody goes on as now; the velocity is known to a tenth of a metre a second on each axis."""
+    ahead: Arrays = {}
+    for step in range(1, STEPS + 1):
+        later_s = 0.1 * step
+        for axis in "xy":
+            ahead[f"{axis}_s{step}_m"] = tracks[f"{axis}_m"] + later_s * tracks[f"v{axis}_mps"]
+        for of in ["xx", "yy"]:
+            ahead[f"cov_{of}_s{step}_m2"] = np.full(len(tracks["track"]), (0.1 * later_s) ** 2)
+    return ahead
+
+
+def main() -> None:
+    """Prints the scores of what every predictor stands beside, on all test scenes."""
+    test = scenes("test")
+    beside = {"constant velocity": constant_velocity, "paper": of_mode("paper"), "default": of_mode("default")}
+    scored = {name: score(predictor, test) for name, predictor in beside.items()}
+    names = list(scored["paper"])
+    print("predictor".ljust(18), *(name.rjust(19) for name in names))
+    for predictor, of in scored.items():
+        cells = ["-" if of[name] is None else f"{of[name]:.3f}" for name in names]
+        print(predictor.ljust(18), *(cell.rjust(19) for cell in cells))
+
+
+if __name__ == "__main__":
+    main()

@@ -155,7 +155,7 @@ fn nothing_is_left_undone() {
 fn pages() -> Vec<(String, String)> {
     let docs = fs::read_dir(root().join("docs")).expect("docs/").flatten().map(|entry| entry.path());
     let mut paths: Vec<PathBuf> = docs.filter(|path| path.extension().is_some_and(|e| e == "md")).collect();
-    paths.push(root().join("README.md"));
+    paths.extend(["README.md", "notebooks/leaderboard.md"].map(|page| root().join(page)));
     paths.sort();
     let name = |path: &Path| path.strip_prefix(root()).unwrap_or(path).display().to_string();
     paths.iter().map(|path| (name(path), fs::read_to_string(path).expect("a page is text"))).collect()

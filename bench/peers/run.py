@@ -2,7 +2,7 @@
 
     python3 bench/peers/run.py [ROW ...]
 
-Each row's inputs and our times come from `cargo run --release --bin peers -- ROW FOLDER` (in `bench/`); the peer's from
+Each row's inputs and our times come from `target/release/peers ROW FOLDER` (in `bench/`), which this script builds; the peer's from
 the program of the row in this folder, which reads the same folder and prints the same JSON: for each case its times in ms
 and what it found. `install.sh` fetches the peers; a row whose peer is not there is named as skipped, with the reason.
 """
@@ -20,13 +20,13 @@ HERE = pathlib.Path(__file__).parent
 BENCH = HERE.parent
 VENV = BENCH / "target" / "peers"
 
-# Row, what it is, and its peers: name and command, with {python}, {built} (the folder of compiled peers) and {folder}.
 OURS = str(BENCH / "target" / "release" / "peers")
 CLOUDS = [
     ("PCL, thinned first", ["{built}/background_pcl", "{folder}"]),
     ("PCL, whole cloud", ["{built}/background_pcl", "{folder}", "whole"]),
     ("Open3D", ["{python}", "{here}/background_open3d.py", "{folder}"]),
 ]
+# Row and its peers: name and command, with {python}, {here} (this folder), {built} (compiled peers) and {folder}.
 ROWS = [
     (
         "simulate",
@@ -106,7 +106,7 @@ def told(name, ours, theirs):
     return f"{name} {theirs:.6g}" if ours is None else f"{name} {ours:.6g} / {theirs:.6g}"
 
 
-def answer(command, folder):
+def answer(command):
     """What a side printed: its last line, as JSON. One core, one thread."""
     one = {name: "1" for name in ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"]}
     pinned = ["taskset", "--cpu-list", "0", *command]
@@ -128,15 +128,14 @@ def main():
         if asked and row not in asked:
             continue
         with tempfile.TemporaryDirectory() as folder:
-            ours = answer([OURS, row, folder], folder)
+            ours = answer([OURS, row, folder])
             if "skipped" in ours:
                 sys.exit(f"{row}: ours failed: {ours['skipped']}")
             for place, (name, command) in enumerate(peers):
                 words = {"python": str(VENV / "bin" / "python"), "built": str(VENV), "here": str(HERE), "folder": folder}
-                try:
-                    theirs = answer([word.format(**words) for word in command], folder)
-                except FileNotFoundError:
-                    theirs = {"skipped": "it is not there"}
+                command = [word.format(**words) for word in command]
+                there = pathlib.Path(command[0]).exists()
+                theirs = answer(command) if there else {"skipped": "it is not there"}
                 if "skipped" in theirs:
                     print(f"{row:34} {name:40} skipped: {theirs['skipped']}")
                     continue

@@ -51,7 +51,7 @@ impl PersonBox {
         }
     }
 
-    /// Seen from above, all of the box lies so near to its centre.
+    /// FromAbove from above, all of the box lies so near to its centre.
     fn reach_m(&self) -> f64 {
         match self {
             Self::Aabb(aabb) => 0.5 * aabb.size_m().truncate().length(),
@@ -67,9 +67,9 @@ impl PersonBox {
 /// The listing tests every pair. Here a pair is tested only where the boxes lie in one direction from the access point; the
 /// answers are the same.
 pub fn cast_step(access_point_m: DVec3, people: &[(DVec2, PersonBox)], blocked: &mut [bool]) {
-    let seen: Vec<Seen> = people.iter().map(|person| Seen::of(access_point_m, person)).collect();
+    let seen: Vec<FromAbove> = people.iter().map(|person| FromAbove::of(access_point_m, person)).collect();
     let asked = blocked.iter().filter(|&&blocked| !blocked).count();
-    let sectors = (asked > FEW).then(|| Sectors::of(&seen));
+    let sectors = (asked > FEW).then(|| Directions::of(&seen));
     for (q, to_q) in seen.iter().enumerate() {
         if blocked[q] {
             continue;
@@ -85,7 +85,7 @@ pub fn cast_step(access_point_m: DVec3, people: &[(DVec2, PersonBox)], blocked: 
     }
 }
 
-/// So few people are compared with everybody sooner than everybody is sorted by direction.
+/// Up to so many people who are not blocked yet, testing every pair is faster than sorting by direction.
 const FEW: usize = 24;
 /// Of a turn. A person ten metres away covers about three.
 const SECTORS: usize = 256;
@@ -93,7 +93,7 @@ const SECTORS: usize = 256;
 const ROOM_M: f64 = 1e-6;
 
 /// A person from above, from the access point.
-struct Seen {
+struct FromAbove {
     position_m: DVec2,
     distance2_m2: f64,
     /// Of the box.
@@ -102,7 +102,7 @@ struct Seen {
     reach_m: f64,
 }
 
-impl Seen {
+impl FromAbove {
     fn of(access_point_m: DVec3, (position_m, person_box): &(DVec2, PersonBox)) -> Self {
         let position_m = position_m - access_point_m.truncate();
         let middle_m = (person_box.center_m() - access_point_m).truncate();
@@ -127,14 +127,14 @@ impl Seen {
 }
 
 /// Who is seen in which direction.
-struct Sectors {
+struct Directions {
     /// Where each sector's people begin in `people`, and one past the last.
     starts: [u32; SECTORS + 1],
     people: Vec<u32>,
 }
 
-impl Sectors {
-    fn of(seen: &[Seen]) -> Self {
+impl Directions {
+    fn of(seen: &[FromAbove]) -> Self {
         let covered: Vec<(usize, usize)> = seen.iter().map(covered).collect();
         let each = |&(first, count): &(usize, usize)| (first..first + count).map(|sector| sector % SECTORS);
         let mut starts = [0_u32; SECTORS + 1];
@@ -144,7 +144,7 @@ impl Sectors {
             sum += *start;
             *start = sum;
         }
-        // Each sector is filled from its end on, and its start with it moves to its place.
+        // A counting sort: as a sector is filled from its end, its start moves from one past its last person to its first.
         let mut people = vec![0; sum as usize];
         for (person, covered) in covered.iter().enumerate().rev() {
             for sector in each(covered) {
@@ -163,7 +163,7 @@ impl Sectors {
 }
 
 /// The first of the sectors that a box covers, and how many they are.
-fn covered(seen: &Seen) -> (usize, usize) {
+fn covered(seen: &FromAbove) -> (usize, usize) {
     let sine2 = seen.reach_m * seen.reach_m / seen.middle2_m2;
     // The access point is in or above it, or nobody knows where it is.
     if sine2.is_nan() || sine2 >= 1.0 {

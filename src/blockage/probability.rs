@@ -34,7 +34,7 @@ const TESTS_MAX: usize = 1 << 18;
 /// What a person takes of that by being seen and followed, which lasts as long as so many tests: a crowd's frame is not to last
 /// longer for it. Forty people are left the fewest samples, which moves their F1 and calibration by less than .002.
 const TESTS_PER_PERSON: usize = 6000;
-/// Room for the meetings of a link in a crowd.
+/// Room from the start for the meetings of one link in a crowd, so that a step allocates nothing.
 const MEETINGS: usize = 1 << 10;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
 const SAMPLES_MIN: usize = WORD;
@@ -74,11 +74,13 @@ pub struct Sampler {
     present: usize,
     /// How many samples each of them has.
     samples: usize,
-    /// Shadows that fall from this access point.
+    /// As they fall from the access point `seen_from`.
     shadows: Shadows,
+    /// By number; `None` after a draw.
     seen_from: Option<usize>,
-    /// Who may stand in the way of the link that is looked at, and how many those of the frame's links are together.
+    /// Who may stand in the way of the link that was asked last.
     meetings: Vec<Meeting>,
+    /// Meetings of all links that were asked since the draw: the samples of the next frame depend on it.
     asked: usize,
     rays: Rays,
     crossing: Crossing,

@@ -13,7 +13,7 @@ use crate::lidar::SensorPoint;
 
 /// Points that are worked out together.
 const LANES: usize = 32;
-/// So near to the edge of a bin, in bins, the series may be wrong: a hundred times what they err by.
+/// So near to the edge of a bin, in bins, the series are not believed: more than ten times what they err by.
 const EDGE: f32 = 2e-3;
 /// Straight above and below, the arc sine of the exact way rounds more than that.
 const STEEP: f32 = 0.99;
@@ -50,7 +50,7 @@ pub(super) fn range_m([x_m, y_m, z_m]: [f32; 3]) -> f32 {
     (x_m * x_m + y_m * y_m + z_m * z_m).sqrt()
 }
 
-/// From where on a return is not new, in every direction.
+/// For every direction, the range from which on a return belongs to the known hall.
 #[derive(Debug, Clone)]
 pub(super) struct CloudLimits {
     /// Bin of azimuth after bin, in each by elevation; NaN where nothing ever came back from.

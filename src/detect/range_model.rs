@@ -185,8 +185,8 @@ impl RangeModel {
         }
     }
 
-    /// The bin of an azimuth. A turn more or less is common, more than one is not: no remainder in the hot loop. Nor a call of `floor` or a
-    /// conversion that asks for NaN, which no vector register does where the processor may be any.
+    /// The bin of an azimuth, which is a turn off at most: one comparison takes the place of a remainder in the hot loop. There is no
+    /// call of `floor` and no conversion that asks for NaN either, for vector registers have neither on every processor.
     #[inline(always)]
     pub fn bin(&self, azimuth_cdeg: f32) -> u32 {
         // Numbers of this size are whole: adding it and taking it away rounds, and the bits of a sum end in those of

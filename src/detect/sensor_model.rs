@@ -38,7 +38,7 @@ pub(super) struct SensorModel {
     /// Row of each bin of elevation, for clouds whose beams are not known.
     row_of_elevation: Vec<Option<u16>>,
     elevations: Elevations,
-    /// Of the scene as it was learned; `None` from what is learned until it is asked again.
+    /// Limits of the known scene by direction. `None` once something was learned; made again when the next cloud needs them.
     cloud_limits: Option<CloudLimits>,
     /// True once the empty scene was shown.
     known: bool,
@@ -407,13 +407,13 @@ impl SensorModel {
     /// The same as [`SensorModel::sort_returns`] of those alone that are new. Returns how many were out of range; `None`
     /// where an elevation is to be learned first.
     fn sort_new(&mut self, cloud: &[SensorPoint]) -> Option<u64> {
-        let Self { cloud_ranges, row_of_elevation, elevations, pixels, returns, .. } = self;
+        let Self { cloud_ranges, row_of_elevation, elevations, pixels: new, returns, .. } = self;
         let limits = || CloudLimits::new(cloud_ranges, row_of_elevation, *elevations);
         let limits = self.cloud_limits.get_or_insert_with(limits);
         let range_m = [self.range_min_m, self.range_max_m];
-        let out_of_range = limits.new_of(cloud, cloud_ranges, range_m, pixels)?;
+        let out_of_range = limits.new_of(cloud, cloud_ranges, range_m, new)?;
         returns.clear();
-        returns.extend(pixels.iter().map(|&i| {
+        returns.extend(new.iter().map(|&i| {
             let (point, range_m) = (cloud[i as usize], range_of_m(cloud[i as usize].position_m));
             let elevation_bin = elevations.bin(point.position_m[2], range_m);
             CloudReturn { elevation_bin, azimuth_cdeg: azimuth_of_cdeg(point.position_m), range_m, point }

@@ -11,7 +11,7 @@ pub const FORBIDDEN: f64 = f64::INFINITY;
 /// Gives rows to columns so that the sum of the costs is the least; `cost(r, c)` may be [`FORBIDDEN`], and a row
 /// that stays alone costs nothing, so only pairs below zero are made. Returns each row's column.
 ///
-/// Shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016) over the pairs below zero. Which of equal
+/// Row reduction, then shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016) over the pairs below zero. Which of equal
 /// sums is taken depends on the order of rows and columns alone.
 pub fn optimal(rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
     let mut assignment = Assignment::default();
@@ -71,7 +71,8 @@ impl Assignment {
         refill(&mut self.distance, columns, f64::INFINITY);
         refill(&mut self.came_from, columns, 0);
         refill(&mut self.done, columns, false);
-        // Who is alone in wanting a column most has it; paths are looked for where rows want the same.
+        // The first row that wants a column most has it. Where later rows want the same, they bid, and what that leaves is left to
+        // paths.
         for r in 0..rows {
             let best = self.pairs[self.starts[r]..self.starts[r + 1]].iter();
             let Some(best) = best.reduce(|a, b| if b.cost < a.cost { b } else { a }) else { continue };
@@ -80,9 +81,45 @@ impl Assignment {
                 (self.row_of[best.column], self.column_of[r]) = (Some(r), Some(best.column));
             }
         }
+        self.outbid(rows);
         for r in 0..rows {
             if self.column_of[r].is_none() && self.starts[r] < self.starts[r + 1] {
                 self.augment(r);
+            }
+        }
+    }
+
+    /// Augmenting row reduction: a row without a column takes the column that it wants most, whose price falls until the
+    /// row's second choice is as good. The row that had the column then looks for another. That settles most conflicts without a path.
+    fn outbid(&mut self, rows: usize) {
+        let Self { column_of, row_of, pairs, starts, row_price, column_price, .. } = self;
+        // Prices may fall by ever less. What is left then is left to paths.
+        let mut bids = 4 * rows;
+        for first in 0..rows {
+            let mut row = first;
+            while column_of[row].is_none() && bids > 0 {
+                bids -= 1;
+                // To stay alone costs nothing and is free to all.
+                let (mut best, mut second, mut wanted) = (0.0, 0.0, None);
+                for &Pair { column, cost } in &pairs[starts[row]..starts[row + 1]] {
+                    let asked = cost - column_price[column];
+                    if asked < best {
+                        (second, best, wanted) = (best, asked, Some(column));
+                    } else if asked < second {
+                        second = asked;
+                    }
+                }
+                row_price[row] = second;
+                let Some(column) = wanted else { break };
+                column_price[column] -= second - best;
+                column_of[row] = Some(column);
+                match row_of[column].replace(row) {
+                    Some(owner) => {
+                        column_of[owner] = None;
+                        row = owner;
+                    }
+                    None => break,
+                }
             }
         }
     }

@@ -14,6 +14,7 @@
 //! marked as of an earlier program.
 
 use std::fs;
+use std::path::PathBuf;
 
 use crate::answers;
 use crate::record::{ANSWERS, COMMIT, TOOK};
@@ -25,11 +26,17 @@ const FENCE: &str = "```";
 /// Stands above a block whose figures the present program may not give.
 const EARLIER: &str = "*These figures are of an earlier program.*";
 
-/// Rewrites README.md and the pages of docs/. Fails, once all that can be is written, where a rule finds nothing.
+/// Those that quote records.
+fn pages() -> Vec<PathBuf> {
+    let alone = ["README.md", "notebooks/leaderboard.md"].map(|page| root().join(page));
+    [alone.to_vec(), files_below(&root().join("docs"), ".md")].concat()
+}
+
+/// Rewrites README.md, the leaderboard and the pages of docs/. Fails, once all that can be is written, where a rule finds nothing.
 pub fn run() -> Result<()> {
     let mut missing = Vec::new();
     let present = present_digest()?;
-    for page in [vec![root().join("README.md")], files_below(&root().join("docs"), ".md")].concat() {
+    for page in pages() {
         let name = page.strip_prefix(root()).unwrap_or(&page).display().to_string();
         let text = fs::read_to_string(&page).map_err(|e| format!("{name}: {e}"))?;
         let told = |what: String| missing.push(format!("{name}: {what}"));
@@ -194,7 +201,7 @@ mod tests {
     fn readme_and_the_first_results_quote_the_present_program() {
         let present = present_digest().unwrap();
         let record = |name: &str| fs::read_to_string(root().join(name)).ok();
-        for page in [vec![root().join("README.md")], files_below(&root().join("docs"), ".md")].concat() {
+        for page in pages() {
             let text = fs::read_to_string(&page).unwrap();
             assert_eq!(
                 renewed(&text, &present, record, |_| {}),

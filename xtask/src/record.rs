@@ -59,7 +59,7 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 48] = [
+const JOBS: [Job; 50] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
@@ -81,6 +81,7 @@ const JOBS: [Job; 48] = [
     job("growth", "how long a step takes with more people and access points", 5, Needs::Nothing, house::growth),
     job("peers", "the same work by other programs", 15, Needs::Asking, house::peers),
     job("instructions", "how many instructions a frame takes", 3, Needs::Program("valgrind"), house::instructions),
+    job("soak", "a day of people, as fast as it goes: memory, time, numbers", 400, Needs::Asking, house::soak),
     job("living", "furniture put in, people who stand, no empty scan", 15, Needs::Nothing, living::living),
     job("standing", "people who stand or sit from the first frame on", 25, Needs::Nothing, standing::standing),
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", 5, Needs::Nothing, glass::glass),
@@ -90,9 +91,9 @@ const JOBS: [Job; 48] = [
     job("bindings", "which device is carried by whom, from the power heard", 4, Needs::Nothing, crowds::bindings),
     job("live", "ten minutes live, four times over, the page open or not", 44, Needs::Asking, live::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", 25, Needs::Asking, nodes::nodes),
-    job("halls", "1 to 64 halls on one host", 8, Needs::Asking, nodes::halls),
+    job("halls", "1 to 96 halls on one host", 8, Needs::Asking, nodes::halls),
     job("deployed", "the files for containers and clusters, run here", 2, Needs::Asking, nodes::deployed),
-    job("faults", "a live run in which something fails", 5, Needs::Nothing, live::faults),
+    job("faults", "a live run in which something fails", 6, Needs::Nothing, live::faults),
     job("kills", "a recording run killed at twenty moments", 3, Needs::Nothing, live::kills),
     job("mutations", "damaged files of every format, given to the command", 60, Needs::Nothing, mutations::mutations),
     job("same-bytes", "the same seed on one thread and on two", 1, Needs::Nothing, house::same_bytes),
@@ -105,6 +106,7 @@ const JOBS: [Job; 48] = [
     job("kubernetes", "the job files as a cluster would read them", 3, Needs::Program("python3"), house::kubernetes),
     job("tests", "CI on a fresh clone, nothing built, step by step", 16, Needs::Asking, house::tests),
     job("chores", "what CI does apart: other formats, the training framework, licences, benchmarks", 40, Needs::Asking, house::chores),
+    job("python", "from a clone to a link in Python, and the benchmark of predictors", 12, Needs::Asking, house::python),
     job("fresh-clone", "the first command on a fresh clone, nothing built", 4, Needs::Asking, house::fresh_clone),
     job("structure", "files, imports, circles, in words", 1, Needs::Nothing, house::structure),
     job("locked", "scenes and recordings that nothing was chosen by: every look is kept", 8, Needs::Asking, locked::look),

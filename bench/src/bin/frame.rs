@@ -1,5 +1,5 @@
-//! Steps of one mode, for counting their instructions: `frame MODE` prints how many. Counted is what happens in [`counted`]:
-//! `valgrind --tool=callgrind --toggle-collect='*counted*'`.
+//! Steps of one mode, for counting their instructions: `frame MODE` runs them and prints how many frames and links there were.
+//! `valgrind --tool=callgrind --toggle-collect='*counted*'` counts what happens in [`counted`] alone.
 
 use umbracast::forecast::Weights;
 use umbracast::{Config, Frame, Mode, Pipeline};

@@ -29,8 +29,9 @@ const S: i64 = 1_000_000_000;
 const RUN_S: u64 = 14;
 const FAILS_NS: std::ops::Range<i64> = 4 * S..9 * S;
 
-/// What is done to the packets of the time in which something fails, counted from the start of the run.
-type Harm = fn(Arrived) -> Vec<Arrived>;
+/// What is done to the packets of the time in which something fails, counted from the start of the run; packets may be held
+/// back for later.
+type Harm = fn(Arrived, &mut Vec<Arrived>) -> Vec<Arrived>;
 
 struct Fault {
     name: &'static str,
@@ -38,43 +39,91 @@ struct Fault {
     harm: Harm,
     /// The folder of the recordings is taken away, too.
     disk: bool,
+    /// The first sensor hangs so much askew, all the time, and the site file does not know it.
+    askew_deg: f64,
 }
 
-const FAULTS: [Fault; 6] = [
-    Fault { name: "nothing", must: "nothing", harm: |a| vec![a], disk: false },
+const NOTHING: Fault =
+    Fault { name: "nothing", must: "nothing", harm: |a, _| vec![a], disk: false, askew_deg: 0.0 };
+
+const FAULTS: [Fault; 13] = [
+    NOTHING,
     Fault {
         name: "one sensor silent for 5 s",
         must: "people are followed with the other one",
-        harm: |a| if a.sensor == 0 { vec![] } else { vec![a] },
-        disk: false,
+        harm: |a, _| if a.sensor == 0 { vec![] } else { vec![a] },
+        ..NOTHING
+    },
+    Fault {
+        name: "one packet of ten lost for 5 s",
+        must: "counted, nobody lost",
+        harm: |a, _| if one_of(10, &a) { vec![] } else { vec![a] },
+        ..NOTHING
+    },
+    Fault {
+        name: "every second packet lost for 5 s",
+        must: "counted, people are followed",
+        harm: |a, _| if one_of(2, &a) { vec![] } else { vec![a] },
+        ..NOTHING
+    },
+    Fault {
+        name: "one packet of a hundred corrupted for 5 s",
+        must: "counted, nobody lost",
+        harm: |a, _| vec![if one_of(100, &a) { corrupted(a) } else { a }],
+        ..NOTHING
+    },
+    Fault {
+        name: "every second packet corrupted for 5 s",
+        must: "counted, frames go on",
+        harm: |a, _| vec![if one_of(2, &a) { corrupted(a) } else { a }],
+        ..NOTHING
+    },
+    Fault {
+        name: "every packet cut in half for 5 s",
+        must: "counted, all well after it",
+        harm: |mut a, _| {
+            a.packet.payload.truncate(a.packet.payload.len() / 2);
+            vec![a]
+        },
+        ..NOTHING
+    },
+    Fault {
+        name: "eight packets each in reverse order for 5 s",
+        must: "no point lost but the last",
+        harm: |a, held| {
+            held.push(a);
+            if held.len() < 8 { vec![] } else { held.drain(..).rev().collect() }
+        },
+        ..NOTHING
+    },
+    Fault {
+        name: "one sensor hangs 5 deg askew",
+        must: "told, people are followed",
+        askew_deg: 5.0,
+        ..NOTHING
     },
     Fault {
         name: "one sensor's clock half an hour off for 5 s",
         must: "shifted, counted, nobody lost",
-        harm: |a| vec![if a.sensor == 0 { with_clock_moved(a, 1_800_000_000) } else { a }],
-        disk: false,
+        harm: |a, _| vec![if a.sensor == 0 { with_clock_moved(a, 1_800_000_000) } else { a }],
+        ..NOTHING
     },
     Fault {
         name: "every packet ten times for 5 s",
         must: "repeated ones counted, no frame lost",
-        harm: |a| vec![a; 10],
-        disk: false,
+        harm: |a, _| vec![a; 10],
+        ..NOTHING
     },
     Fault {
         name: "packets of zeros beside, as many, for 5 s",
         must: "counted, nobody lost",
-        harm: |a| {
+        harm: |a, _| {
             let zeros = Packet { payload: vec![0; a.packet.payload.len()], ..a.packet };
             vec![Arrived { packet: zeros, ..a.clone() }, a]
         },
-        disk: false,
+        ..NOTHING
     },
-    Fault {
-        name: "the disk gone for 5 s",
-        must: "told, recording goes on after it",
-        harm: |a| vec![a],
-        disk: true,
-    },
+    Fault { name: "the disk gone for 5 s", must: "told, recording goes on after it", disk: true, ..NOTHING },
 ];
 
 /// The microseconds within the hour that a Velodyne's packet ends with, moved: half an hour is as far as it can be told.
@@ -85,6 +134,23 @@ fn with_clock_moved(mut arrived: Arrived, by_us: u64) -> Arrived {
         let us = u64::from(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
         bytes.copy_from_slice(&(((us + by_us) % 3_600_000_000) as u32).to_le_bytes());
     }
+    arrived
+}
+
+/// Whether this packet is among those chosen: about one of so many, by a hash of time and sensor.
+fn one_of(many: u64, arrived: &Arrived) -> bool {
+    let mixed = (arrived.packet.time_ns as u64 ^ arrived.sensor as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    (mixed >> 33).is_multiple_of(many)
+}
+
+/// Every 97th byte is changed.
+fn corrupted(mut arrived: Arrived) -> Arrived {
+    arrived
+        .packet
+        .payload
+        .iter_mut()
+        .step_by(97)
+        .for_each(|byte| *byte = byte.wrapping_mul(29).wrapping_add(113));
     arrived
 }
 
@@ -123,8 +189,10 @@ fn main() -> Result<(), Error> {
 fn run(fault: &Fault, config: &Config, sensors: &Sensors, empty: &[Frame]) -> Result<(), Error> {
     let folder = std::env::temp_dir().join(format!("umbracast-faults-{}", std::process::id()));
     let (clock, counters) = (HostClock::start(), Arc::new(Counters::default()));
+    let mut known = config.clone();
+    known.site.sensors[0].rotation_deg.yaw -= fault.askew_deg;
     let settings = Settings {
-        config: config.clone(),
+        config: known,
         weights: None,
         empty: empty.to_vec(),
         doors: (0..config.site.sensors.len()).map(|sensor| Door { sensor, port: 0, from: None }).collect(),
@@ -175,9 +243,10 @@ fn send_harmed(
     let first_ns = first as i64 * STEP_NS;
     let crowd = strolling(Preset::Orca03, PEOPLE, 10.0, SEED, RUN_S).later(first_ns);
     let scene = Scene::in_hall(crowd, &config.site, sensors, SEED).starting_at(first);
+    let mut held = Vec::new();
     let packets = send::simulated(scene).flat_map(|arrived| {
         match FAILS_NS.contains(&(arrived.packet.time_ns - first_ns)) {
-            true => harm(arrived),
+            true => harm(arrived, &mut held),
             false => vec![arrived],
         }
     });

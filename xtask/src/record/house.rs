@@ -47,7 +47,6 @@ pub fn peers(book: &mut Book) -> Result<()> {
 
 /// Instructions of a frame of ten people, which do not depend on what else a machine does, beside those of the record before.
 pub fn instructions(book: &mut Book) -> Result<()> {
-    const FRAMES: f64 = 20.0;
     let before = std::fs::read_to_string(root().join("record/instructions.txt")).unwrap_or_default();
     let build = "cargo build --release --quiet --manifest-path bench/Cargo.toml --bin frame";
     let count = "valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect='*counted*' \
@@ -59,13 +58,21 @@ pub fn instructions(book: &mut Book) -> Result<()> {
         let said = book.bash(&root(), &format!("{count} {mode} 2>&1"))?;
         let collected = said.lines().find_map(|line| line.split_once("Collected : "));
         let collected = collected.and_then(|(_, count)| count.trim().parse::<f64>().ok());
-        let millions = 1e-6 * collected.ok_or(said)? / FRAMES;
+        let frames = said.lines().find_map(|line| line.split_once(" frames, ")?.0.parse::<f64>().ok());
+        let (Some(collected), Some(frames)) = (collected, frames) else { return Err(said) };
+        let millions = 1e-6 * collected / frames;
         let told = |line: &str| line.strip_prefix(mode)?.split_whitespace().next()?.parse::<f64>().ok();
         let change = before.lines().find_map(told).map(|before| 100.0 * (millions / before - 1.0));
         let change = change.map_or("-".to_owned(), |percent| format!("{percent:+.1} %"));
         book.line(&format!("{mode:8} {millions:42.2} {change:>9}"));
     }
     Ok(())
+}
+
+/// A day of people before simulated sensors, as fast as it goes.
+pub fn soak(book: &mut Book) -> Result<()> {
+    let soak = "cargo run --release --quiet --manifest-path bench/Cargo.toml --bin soak -- 24";
+    script(book, soak, soak)
 }
 
 /// The same seed twice, on one thread and on two.
@@ -175,6 +182,33 @@ pub fn fresh_clone(book: &mut Book) -> Result<()> {
     for line in said.lines().filter(|line| !building(line)) {
         book.line(line.trim_start_matches(' '));
     }
+    Ok(())
+}
+
+/// From a clone to the first picture of a link in Python, and what the benchmark's predictors stand beside.
+pub fn python(book: &mut Book) -> Result<()> {
+    const DONE: &str = "all is done";
+    let first =
+        "awk '/^```python/ { block++; next } /^```/ { if (block) exit } block' docs/PYTHON.md > first.py";
+    let line = format!(
+        "python3 -m venv env && . env/bin/activate && {first} && time pip install -q . matplotlib \
+         && time python first.py && test -s link.png && time python notebooks/benchmark.py && echo {DONE}"
+    );
+    let said = in_fresh_clone(book, &line)?;
+    let table: Vec<&str> = said
+        .lines()
+        .skip_while(|line| !line.starts_with("predictor"))
+        .take_while(|line| *line != DONE)
+        .collect();
+    let times = said.lines().filter(|line| line.starts_with("real"));
+    let what = ["pip install . matplotlib", "first.py, a link beside its truth", "benchmark.py"];
+    let times: Vec<String> = times.zip(what).map(|(time, what)| format!("{time}   {what}")).collect();
+    if times.len() != what.len() || !said.lines().any(|line| line == DONE) {
+        return Err(said);
+    }
+    times.iter().for_each(|time| book.line(time));
+    let table = table.iter().take_while(|line| !line.is_empty());
+    table.for_each(|line| book.line(line));
     Ok(())
 }
 

@@ -12,10 +12,12 @@ use super::book::{Book, spoken};
 use super::house::script;
 use crate::tools::{Result, argument, files_below};
 
-/// So long do the sensors of [`live`] send,
+/// How long the sensors of [`live`] send.
 const SECONDS: u64 = 600;
-/// and so long after their start everybody is followed, every buffer there, and the page open.
+/// So long after their start everybody is followed, every buffer is there, and the page is open.
 const START: Duration = Duration::from_secs(10);
+/// How long the page's stream is listened to after that.
+const LISTEN: Duration = Duration::from_secs(10);
 /// Where the page is.
 const PAGE: &str = "127.0.0.1:8600";
 
@@ -63,6 +65,9 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>, watched: bool) -
         &[],
     );
     let browser = if watched { " & nice -n 19 chromium --headless ..." } else { "" };
+    if !watched {
+        book.line("Without a browser:");
+    }
     book.command(&format!("umbracast {} & umbracast {}{browser}", spoken(&listen), spoken(&send)));
     let start = |words: &[OsString]| {
         let mut command = Command::new(book.umbracast());
@@ -74,7 +79,12 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>, watched: bool) -
     let sensors = start(&send)?;
     let mut page = watched.then(look_on).transpose()?;
     sleep(START);
-    let weight = watched.then(weight).transpose()?;
+    let weight = if watched {
+        Some(weight()?)
+    } else {
+        sleep(LISTEN);
+        None
+    };
     let (mut resident_kb, mut open, mut browser_kb) = (Vec::new(), Vec::new(), Vec::new());
     while let Some(kb) = resident(live.id()) {
         resident_kb.push(kb);
@@ -110,7 +120,7 @@ fn first_and_last(what: &str, kb: &[u64]) -> String {
     let (first, last) = (mean(&kb[..minute]), mean(&kb[kb.len() - minute..]));
     let grown = 100.0 * (last / first - 1.0);
     format!(
-        "{what}, mean of the minute after the first ten seconds and of the last: {first:.1} MiB, {last:.1} MiB ({grown:+.1} %)"
+        "{what}, mean of the minute after the first twenty seconds and of the last: {first:.1} MiB, {last:.1} MiB ({grown:+.1} %)"
     )
 }
 
@@ -130,14 +140,15 @@ fn streams() -> Option<u32> {
     said.lines().find_map(|line| line.strip_prefix("umbracast_streams "))?.parse().ok()
 }
 
-/// What the page weighs: its one file, and what the stream behind it sends in ten seconds.
+/// What the page weighs on the wire, heads included: its one file, and what the stream behind it sends in ten seconds.
 fn weight() -> Result<String> {
-    const LISTEN: Duration = Duration::from_secs(10);
     let page = answered("GET / HTTP/1.1\r\nConnection: close", LISTEN);
+    let page = page.filter(|page| page.starts_with(b"HTTP/1.1 200"));
     let page = page.ok_or_else(|| format!("expected a page at {PAGE}, found none"))?.len();
     let stream = "GET /api/live HTTP/1.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
                   Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
-    let sent = answered(stream, LISTEN).ok_or("expected a stream behind the page, found none")?.len();
+    let sent = answered(stream, LISTEN).filter(|sent| sent.starts_with(b"HTTP/1.1 101"));
+    let sent = sent.ok_or("expected a stream behind the page, found none")?.len();
     Ok(format!("page: {page} bytes once, then {:.1} kB a second", 1e-3 * sent as f64 / LISTEN.as_secs_f64()))
 }
 

@@ -1,4 +1,4 @@
-"""What the compiled library has; `tests/test_stubs.py` compares the two."""
+"""What the compiled library has; `tests/test_package.py` compares the two."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Path: TypeAlias = str | PathLike[str]
 Mode: TypeAlias = Literal["hdl", "paper", "default"]
-Preset: TypeAlias = Literal["orca-03", "orca-06", "mixed", "pairs"]
+Preset: TypeAlias = Literal["orca-03", "orca-06", "mixed", "natural", "pairs"]
 Packet: TypeAlias = tuple[int, int, bytes]
 
 class Columns(Protocol):

@@ -260,7 +260,7 @@ impl Painter {
     }
 }
 
-/// Slopes in even steps, and for each the first beam that is not below it: finds beams without searching.
+/// A table of even steps of slope: for each step the first beam that is not below it, so that a beam is found in a step or two.
 #[derive(Debug, Clone)]
 struct Steps {
     lowest: f64,
@@ -270,12 +270,12 @@ struct Steps {
 
 impl Steps {
     /// Several to a beam.
-    const A_BEAM: usize = 8;
+    const PER_BEAM: usize = 8;
 
     fn new(beams: &[SlopedBeam]) -> Self {
         let (lowest, highest) =
             (beams.first().map_or(0.0, |b| b.slope), beams.last().map_or(0.0, |b| b.slope));
-        let count = Self::A_BEAM * beams.len().max(1);
+        let count = Self::PER_BEAM * beams.len().max(1);
         let per_slope = count as f64 / (highest - lowest).max(1e-6);
         let from = |step: usize| lowest + step as f64 / per_slope;
         let first = (0..=count).map(|step| beams.partition_point(|b| b.slope < from(step))).collect();
@@ -284,7 +284,7 @@ impl Steps {
 
     /// The first beam with at least this slope; one past the last where there is none.
     fn first_from(&self, slope: f64, beams: &[SlopedBeam]) -> usize {
-        // A slope below all, or none, counts as the lowest. One step less, for rounding may have led one too far.
+        // NaN and slopes below all beams count as the lowest. One step less, for rounding may have led one too far.
         let step = (((slope - self.lowest) * self.per_slope) as usize).saturating_sub(1);
         let mut first = self.first[step.min(self.first.len() - 1)];
         while beams.get(first).is_some_and(|b| b.slope < slope) {
