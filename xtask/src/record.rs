@@ -80,7 +80,7 @@ const JOBS: [Job; 50] = [
     job("speed", "how long a frame takes, in every mode", 1, Needs::Nothing, house::speed),
     job("growth", "how long a step takes with more people and access points", 5, Needs::Nothing, house::growth),
     job("peers", "the same work by other programs", 15, Needs::Asking, house::peers),
-    job("instructions", "how many instructions a frame takes", 3, Needs::Program("valgrind"), house::instructions),
+    job("instructions", "how many instructions a frame takes", 10, Needs::Program("valgrind"), house::instructions),
     job("soak", "a day of people, as fast as it goes: memory, time, numbers", 400, Needs::Asking, house::soak),
     job("living", "furniture put in, people who stand, no empty scan", 15, Needs::Nothing, living::living),
     job("standing", "people who stand or sit from the first frame on", 25, Needs::Nothing, standing::standing),
