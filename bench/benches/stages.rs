@@ -26,7 +26,7 @@ fn stages(criterion: &mut Criterion) {
         let (before, frame) = (&hall.frames[..FRAMES - 1], &hall.frames[FRAMES - 1]);
         let mut stages = Stages::new(&config, &hall.empty).expect("the defaults work");
         before.iter().for_each(|frame| stages.step(frame));
-        let whole = pipeline(&config, &hall.empty, before).expect("the defaults work");
+        let whole = pipeline(&config, None, &hall.empty, before).expect("the defaults work");
 
         // Each stage begins where the one before has ended, from a copy, for it remembers.
         stages.expect(frame);

@@ -34,3 +34,15 @@ class Answer:
 
     def print(self):
         print(json.dumps({"cases": self.cases}))
+
+
+def answer_columns(case, columns):
+    """The answer of who reads points into columns x, y, z and time: how long it takes, and sums to hold against ours."""
+    ms, (x, y, z, time_ns) = times(5, columns)
+    found = {"points": len(x)}
+    for name, column in [("x", x), ("y", y), ("z", z)]:
+        found[f"sum of {name}, m"] = column.sum(dtype=np.float64)
+    found["sum of times, s"] = (1e-9 * time_ns).sum()
+    answer = Answer()
+    answer.case(case, ms, found)
+    answer.print()

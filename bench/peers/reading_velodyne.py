@@ -4,7 +4,7 @@ import numpy as np
 import velodyne_decoder
 from rosbags.highlevel import AnyReader
 
-from exchange import FOLDER, Answer, read, times
+from exchange import FOLDER, answer_columns, read
 
 nearest, farthest = read("range")
 
@@ -32,11 +32,4 @@ def columns():
     return [np.concatenate(column) for column in zip(*parts)]
 
 
-ms, (x, y, z, time_ns) = times(5, columns)
-found = {"points": len(x)}
-for name, column in [("x", x), ("y", y), ("z", z)]:
-    found[f"sum of {name}, m"] = column.sum(dtype=np.float64)
-found["sum of times, s"] = (1e-9 * time_ns).sum()
-answer = Answer()
-answer.case("packets", ms, found)
-answer.print()
+answer_columns("packets", columns)

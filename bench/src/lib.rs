@@ -1,8 +1,11 @@
 //! What the benchmarks work on: frames of a simulated hall, and the stages in the middle of following people.
 
+use std::time::Duration;
+
+use rustix::time::{ClockId, clock_gettime};
 use umbracast::blockage::{Blockage, Caster};
 use umbracast::detect::{Background, Cluster, Clusterer, Detection, Measurer, Point, Prior};
-use umbracast::forecast::{Forecast, Forecaster};
+use umbracast::forecast::{Forecast, Forecaster, Weights};
 use umbracast::lidar::Views;
 use umbracast::track::{Track, Tracker};
 use umbracast::{Config, Error, Frame, Health, Pipeline};
@@ -125,11 +128,27 @@ impl Stages {
 ///
 /// # Errors
 /// A setting that cannot work.
-pub fn pipeline(config: &Config, empty: &[Frame], before: &[Frame]) -> Result<Pipeline, Error> {
-    let mut pipeline = Pipeline::new(config, None)?;
+pub fn pipeline(
+    config: &Config,
+    weights: Option<&Weights>,
+    empty: &[Frame],
+    before: &[Frame],
+) -> Result<Pipeline, Error> {
+    let mut pipeline = Pipeline::new(config, weights)?;
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     for frame in before {
         pipeline.step(frame);
     }
     Ok(pipeline)
+}
+
+/// Time of this thread alone, as if nothing else ran on its core.
+pub fn timed(work: impl FnOnce()) -> Duration {
+    let now = || {
+        let now = clock_gettime(ClockId::ThreadCPUTime);
+        Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
+    };
+    let before = now();
+    work();
+    now() - before
 }

@@ -5,6 +5,7 @@
 //! point than the considered one are tested, so the comparison is turned round. The hit has to lie on the
 //! segment between the access point and the centre of q's box, not on the infinite ray.
 
+use super::sectors::{Covered, Sectors};
 use crate::geometry::{Aabb, DVec2, DVec3, Obb, slab};
 
 /// A person's box, of the kind that the config chooses.
@@ -69,7 +70,11 @@ impl PersonBox {
 pub fn cast_step(access_point_m: DVec3, people: &[(DVec2, PersonBox)], blocked: &mut [bool]) {
     let seen: Vec<FromAbove> = people.iter().map(|person| FromAbove::of(access_point_m, person)).collect();
     let asked = blocked.iter().filter(|&&blocked| !blocked).count();
-    let sectors = (asked > FEW).then(|| Directions::of(&seen));
+    let sectors = (asked > FEW).then(|| {
+        let mut sectors = Sectors::<SECTORS>::default();
+        sectors.sort(&seen.iter().map(covered).collect::<Vec<_>>());
+        sectors
+    });
     for (q, to_q) in seen.iter().enumerate() {
         if blocked[q] {
             continue;
@@ -79,7 +84,7 @@ pub fn cast_step(access_point_m: DVec3, people: &[(DVec2, PersonBox)], blocked: 
         let end_m = people[q].1.center_m();
         let hides = |p: usize| seen[p].may_hide(to_q) && people[p].1.hit(access_point_m, end_m).is_some();
         blocked[q] = match &sectors {
-            Some(sectors) => sectors.towards(to_q.middle_m).iter().any(|&p| hides(p as usize)),
+            Some(sectors) => sectors.people(sector(to_q.middle_m)).iter().any(|&p| hides(p as usize)),
             None => (0..people.len()).any(hides),
         };
     }
@@ -126,55 +131,19 @@ impl FromAbove {
     }
 }
 
-/// Who is seen in which direction.
-struct Directions {
-    /// Where each sector's people begin in `people`, and one past the last.
-    starts: [u32; SECTORS + 1],
-    people: Vec<u32>,
-}
-
-impl Directions {
-    fn of(seen: &[FromAbove]) -> Self {
-        let covered: Vec<(usize, usize)> = seen.iter().map(covered).collect();
-        let each = |&(first, count): &(usize, usize)| (first..first + count).map(|sector| sector % SECTORS);
-        let mut starts = [0_u32; SECTORS + 1];
-        covered.iter().flat_map(each).for_each(|sector| starts[sector] += 1);
-        let mut sum = 0;
-        for start in &mut starts {
-            sum += *start;
-            *start = sum;
-        }
-        // A counting sort: as a sector is filled from its end, its start moves from one past its last person to its first.
-        let mut people = vec![0; sum as usize];
-        for (person, covered) in covered.iter().enumerate().rev() {
-            for sector in each(covered) {
-                starts[sector] -= 1;
-                people[starts[sector] as usize] = person as u32;
-            }
-        }
-        Self { starts, people }
-    }
-
-    /// All whose boxes may be met in a direction.
-    fn towards(&self, direction: DVec2) -> &[u32] {
-        let sector = sector(direction);
-        &self.people[self.starts[sector] as usize..self.starts[sector + 1] as usize]
-    }
-}
-
-/// The first of the sectors that a box covers, and how many they are.
-fn covered(seen: &FromAbove) -> (usize, usize) {
+/// The sectors that a box covers.
+fn covered(seen: &FromAbove) -> Covered {
     let sine2 = seen.reach_m * seen.reach_m / seen.middle2_m2;
     // The access point is in or above it, or nobody knows where it is.
     if sine2.is_nan() || sine2 >= 1.0 {
-        return (0, SECTORS);
+        return Covered { first: 0, count: SECTORS };
     }
     let tangent = DVec2::new((1.0 - sine2).sqrt(), sine2.sqrt());
     let (first, last) = (
         sector(DVec2::new(tangent.x, -tangent.y).rotate(seen.middle_m)),
         sector(tangent.rotate(seen.middle_m)),
     );
-    (first, (last + SECTORS - first) % SECTORS + 1)
+    Covered { first, count: (last + SECTORS - first) % SECTORS + 1 }
 }
 
 /// Counter-clockwise from x, by a number that grows with the angle as the angle does, without its arc tangent.

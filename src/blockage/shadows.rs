@@ -7,6 +7,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::figure::{Band, Figure};
+use super::sectors::{Covered, Sectors};
 use super::spread::Spread;
 use super::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::geometry::{DVec2, DVec3};
@@ -44,41 +45,26 @@ pub(super) struct Shadows {
     /// How far above or below that height it may be.
     ue_rises_m: f64,
     /// Sectors that each person's body covers.
-    covered: Vec<Sectors>,
-    /// Where each sector's bodies begin in `bodies`, and one past the last.
-    starts: Vec<u32>,
-    bodies: Vec<u32>,
+    covered: Vec<Covered>,
+    bodies: Sectors<SECTORS>,
     /// The last link that a body was compared with.
     compared: Vec<u32>,
     candidates: Vec<u32>,
 }
 
-/// So many from the first on, round the turn.
-#[derive(Debug, Clone, Copy)]
-struct Sectors {
-    first: usize,
-    count: usize,
-}
-
-impl Sectors {
-    /// Those in which something within `disc` is seen.
-    fn of(disc: Disc, ap_m: DVec2) -> Self {
-        let off_m = disc.center_m - ap_m;
-        let (distance_m, radius_m) = (off_m.length(), disc.radius_m + ROOM);
-        if distance_m <= radius_m {
-            return Self { first: 0, count: SECTORS };
-        }
-        let half_rad = (radius_m / distance_m).asin();
-        let sector = |rad: f64| ((rad + PI) * (SECTORS as f64 / TAU)).floor() as i32;
-        let middle_rad = off_m.to_angle();
-        let (first, last) = (sector(middle_rad - half_rad), sector(middle_rad + half_rad));
-        let count = ((last - first + 1) as usize).min(SECTORS);
-        Self { first: first.rem_euclid(SECTORS as i32) as usize, count }
+/// The sectors in which something within `disc` is seen.
+fn covered(disc: Disc, ap_m: DVec2) -> Covered {
+    let off_m = disc.center_m - ap_m;
+    let (distance_m, radius_m) = (off_m.length(), disc.radius_m + ROOM);
+    if distance_m <= radius_m {
+        return Covered { first: 0, count: SECTORS };
     }
-
-    fn each(self) -> impl Iterator<Item = usize> {
-        (self.first..self.first + self.count).map(|sector| sector % SECTORS)
-    }
+    let half_rad = (radius_m / distance_m).asin();
+    let sector = |rad: f64| ((rad + PI) * (SECTORS as f64 / TAU)).floor() as i32;
+    let middle_rad = off_m.to_angle();
+    let (first, last) = (sector(middle_rad - half_rad), sector(middle_rad + half_rad));
+    let count = ((last - first + 1) as usize).min(SECTORS);
+    Covered { first: first.rem_euclid(SECTORS as i32) as usize, count }
 }
 
 impl Shadows {
@@ -88,28 +74,10 @@ impl Shadows {
         [self.ue_reach_m, self.ue_rises_m] = ue.reach_m();
         self.ue_height_share = ue.height_share;
         self.covered.clear();
-        self.covered.extend(people.iter().map(|p| Sectors::of(wider(p.second, p.reach_m), ap_m.truncate())));
+        self.covered.extend(people.iter().map(|p| covered(wider(p.second, p.reach_m), ap_m.truncate())));
+        self.bodies.sort(&self.covered);
         self.compared.clear();
         self.compared.resize(people.len(), u32::MAX);
-        self.starts.clear();
-        self.starts.resize(SECTORS + 1, 0);
-        for sector in self.covered.iter().flat_map(|covered| covered.each()) {
-            self.starts[sector + 1] += 1;
-        }
-        for sector in 0..SECTORS {
-            self.starts[sector + 1] += self.starts[sector];
-        }
-        self.bodies.clear();
-        self.bodies.resize(self.starts[SECTORS] as usize, 0);
-        // Each sector is filled from its end on, and its start with it moves to its place.
-        for (person, covered) in self.covered.iter().enumerate().rev() {
-            for sector in covered.each() {
-                self.starts[sector + 1] -= 1;
-                self.bodies[self.starts[sector + 1] as usize] = person as u32;
-            }
-        }
-        self.starts.rotate_left(1);
-        self.starts[SECTORS] = self.bodies.len() as u32;
     }
 
     /// Adds everybody who may stand in the way of a person's link, step after step.
@@ -123,8 +91,9 @@ impl Shadows {
     ) {
         let q = &people[person];
         self.candidates.clear();
-        for sector in Sectors::of(wider(q.second, self.ue_reach_m), self.ap_m.truncate()).each() {
-            for &other in &self.bodies[self.starts[sector] as usize..self.starts[sector + 1] as usize] {
+        let towards = covered(wider(q.second, self.ue_reach_m), self.ap_m.truncate());
+        for sector in towards.each::<SECTORS>() {
+            for &other in self.bodies.people(sector) {
                 let compared = &mut self.compared[other as usize];
                 if *compared != person as u32 {
                     *compared = person as u32;

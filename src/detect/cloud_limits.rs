@@ -40,13 +40,13 @@ impl Elevations {
 }
 
 /// Where a return was measured, hundredths of a degree, clockwise from above.
-pub(super) fn azimuth_cdeg([x_m, y_m, _]: [f32; 3]) -> f32 {
+pub(super) fn azimuth_of_cdeg([x_m, y_m, _]: [f32; 3]) -> f32 {
     (-y_m).atan2(x_m).to_degrees() * 100.0
 }
 
 /// How far away a return was measured.
 #[inline(always)]
-pub(super) fn range_m([x_m, y_m, z_m]: [f32; 3]) -> f32 {
+pub(super) fn range_of_m([x_m, y_m, z_m]: [f32; 3]) -> f32 {
     (x_m * x_m + y_m * y_m + z_m * z_m).sqrt()
 }
 
@@ -104,7 +104,7 @@ impl CloudLimits {
                     continue;
                 }
                 let azimuth = inside(seen.azimuth[k])
-                    .unwrap_or_else(|| ranges.bin(azimuth_cdeg(point.position_m)) as usize);
+                    .unwrap_or_else(|| ranges.bin(azimuth_of_cdeg(point.position_m)) as usize);
                 let steep = point.position_m[2].abs() > STEEP * range_m;
                 let elevation = inside(seen.elevation[k])
                     .filter(|_| !steep)
@@ -146,7 +146,7 @@ impl Seen {
         }
         let [mut range_m, mut azimuth, mut elevation] = [[0.0; LANES]; 3];
         for k in 0..LANES {
-            range_m[k] = self::range_m([x[k], y[k], z[k]]);
+            range_m[k] = range_of_m([x[k], y[k], z[k]]);
             let turned = angle_rad(-y[k], x[k]) * (azimuths / (2.0 * PI));
             azimuth[k] = turned + if turned < 0.0 { azimuths } else { 0.0 };
             let flat_m = (x[k] * x[k] + y[k] * y[k]).sqrt();
@@ -212,9 +212,9 @@ mod tests {
             let seen = Seen::of(points, 360.0, elevations.per_rad as f32);
             for (k, point) in points.iter().enumerate() {
                 let [.., z_m] = point.position_m;
-                let range_m = range_m(point.position_m);
+                let range_m = range_of_m(point.position_m);
                 if let Some(azimuth) = inside(seen.azimuth[k]) {
-                    assert_eq!(azimuth, ranges.bin(azimuth_cdeg(point.position_m)) as usize, "{point:?}");
+                    assert_eq!(azimuth, ranges.bin(azimuth_of_cdeg(point.position_m)) as usize, "{point:?}");
                     told += 1;
                 }
                 if let Some(elevation) = inside(seen.elevation[k]).filter(|_| z_m.abs() <= STEEP * range_m) {

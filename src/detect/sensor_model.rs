@@ -1,6 +1,6 @@
 //! One sensor's view of the empty scene, pixel by pixel, and the returns that are nearer.
 
-use super::cloud_limits::{CloudLimits, Elevations, azimuth_cdeg as azimuth_of_cdeg, range_m as range_of_m};
+use super::cloud_limits::{CloudLimits, Elevations, azimuth_of_cdeg, range_of_m};
 use super::first_sight::Return;
 use super::range_model::{RangeModel, Verdict};
 use super::{Point, Prior};

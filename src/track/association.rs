@@ -71,16 +71,6 @@ impl Assignment {
         refill(&mut self.distance, columns, f64::INFINITY);
         refill(&mut self.came_from, columns, 0);
         refill(&mut self.done, columns, false);
-        // The first row that wants a column most has it. Where later rows want the same, they bid, and what that leaves is left to
-        // paths.
-        for r in 0..rows {
-            let best = self.pairs[self.starts[r]..self.starts[r + 1]].iter();
-            let Some(best) = best.reduce(|a, b| if b.cost < a.cost { b } else { a }) else { continue };
-            self.row_price[r] = best.cost;
-            if self.row_of[best.column].is_none() {
-                (self.row_of[best.column], self.column_of[r]) = (Some(r), Some(best.column));
-            }
-        }
         self.outbid(rows);
         for r in 0..rows {
             if self.column_of[r].is_none() && self.starts[r] < self.starts[r + 1] {
@@ -89,16 +79,15 @@ impl Assignment {
         }
     }
 
-    /// Augmenting row reduction: a row without a column takes the column that it wants most, whose price falls until the
-    /// row's second choice is as good. The row that had the column then looks for another. That settles most conflicts without a path.
+    /// Augmenting row reduction: every row takes the column that it wants most, whose price falls until the row's second choice is as
+    /// good. A row that had the column then looks for another. That settles most conflicts without a path.
     fn outbid(&mut self, rows: usize) {
         let Self { column_of, row_of, pairs, starts, row_price, column_price, .. } = self;
         // Prices may fall by ever less. What is left then is left to paths.
-        let mut bids = 4 * rows;
+        let mut more = 4 * rows;
         for first in 0..rows {
             let mut row = first;
-            while column_of[row].is_none() && bids > 0 {
-                bids -= 1;
+            loop {
                 // To stay alone costs nothing and is free to all.
                 let (mut best, mut second, mut wanted) = (0.0, 0.0, None);
                 for &Pair { column, cost } in &pairs[starts[row]..starts[row + 1]] {
@@ -113,13 +102,13 @@ impl Assignment {
                 let Some(column) = wanted else { break };
                 column_price[column] -= second - best;
                 column_of[row] = Some(column);
-                match row_of[column].replace(row) {
-                    Some(owner) => {
-                        column_of[owner] = None;
-                        row = owner;
-                    }
-                    None => break,
+                let Some(owner) = row_of[column].replace(row) else { break };
+                column_of[owner] = None;
+                if more == 0 {
+                    break;
                 }
+                more -= 1;
+                row = owner;
             }
         }
     }

@@ -3,6 +3,7 @@
 
 use umbracast::forecast::Weights;
 use umbracast::{Config, Frame, Mode, Pipeline};
+use umbracast_bench::pipeline;
 use umbracast_bench::simulated::crossing;
 
 /// People are followed after so many frames; the rest are counted.
@@ -19,12 +20,9 @@ fn main() {
             .expect("they are weights")
     });
     let hall = crossing(&config.site, 10, 12.5, FRAMES).expect("the default site is simulated");
-    let mut pipeline = Pipeline::new(&config, weights.as_ref()).expect("the defaults work");
-    hall.empty.iter().for_each(|frame| pipeline.learn_empty(frame));
-    for frame in &hall.frames[..BEFORE] {
-        pipeline.step(frame);
-    }
-    let links = hall.frames[BEFORE..].iter().map(|frame| counted(&mut pipeline, frame)).sum::<usize>();
+    let (before, frames) = hall.frames.split_at(BEFORE);
+    let mut pipeline = pipeline(&config, weights.as_ref(), &hall.empty, before).expect("the defaults work");
+    let links = frames.iter().map(|frame| counted(&mut pipeline, frame)).sum::<usize>();
     println!("{} frames, {links} links", FRAMES - BEFORE);
 }
 

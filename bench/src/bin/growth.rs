@@ -4,13 +4,12 @@
 
 use std::time::Duration;
 
-use rustix::time::{ClockId, clock_gettime};
 use umbracast::geometry::DVec2;
 use umbracast::lidar::Frame;
 use umbracast::site::AccessPoint;
 use umbracast::{Config, Health, Pipeline};
-use umbracast_bench::Stages;
 use umbracast_bench::simulated::{Recording, crossing, walking};
+use umbracast_bench::{Stages, timed};
 use umbracast_eval::report::plot::{Mark, Panel, Series, draw};
 use umbracast_sim::crowd::{Crowd, Trajectory};
 
@@ -229,15 +228,4 @@ fn by_stage(stages: &mut Stages, frame: &Frame) -> [Duration; 6] {
         timed(|| stages.forecast()),
         timed(|| stages.cast()),
     ]
-}
-
-/// Time of this thread alone, as if nothing else ran on its core.
-fn timed(work: impl FnOnce()) -> Duration {
-    let now = || {
-        let now = clock_gettime(ClockId::ThreadCPUTime);
-        Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
-    };
-    let before = now();
-    work();
-    now() - before
 }

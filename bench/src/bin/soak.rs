@@ -3,11 +3,11 @@
 //! minute or so; in every second hour a chair stands where none was; in the first minute of each hour one sensor is silent. A row
 //! an hour says whether memory, time, tracks and numbers stay what they were in the first.
 
-use std::time::Instant;
-
 use umbracast::lidar::{Assembler, Packet};
 use umbracast::site::Furniture;
-use umbracast::{Config, Health, Pipeline, STEP_NS, Site};
+use umbracast::{Config, Health, STEP_NS, Site};
+use umbracast_bench::simulated::walking;
+use umbracast_bench::{pipeline, timed};
 use umbracast_sim::body::Bodies;
 use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, strolling};
@@ -44,9 +44,10 @@ fn main() {
     let shares =
         [("bag", 0.2), ("phone", 0.2)].map(|(kind, share)| (kind.parse::<Kind>().expect("a kind"), share));
     let bodies = Bodies::new(shares.to_vec(), []).expect("shares of less than all");
-    let mut pipeline = Pipeline::new(&config, None).expect("the defaults work");
+    // No frame of theirs: the empty hall alone.
+    let empty = walking(&config.site, crowd(0), 0).expect("the default site is simulated").empty;
+    let mut pipeline = pipeline(&config, None, &empty, &[]).expect("the defaults work");
     let mut assembler = Assembler::new(&config.site).expect("the default site is simulated");
-    learn_empty(&config.site, &mut pipeline);
 
     println!("{PEOPLE} people, two HDL-32E; resident memory at the end of the hour, with the simulator's");
     println!("hour  frames    MiB  median, ms   99 %, ms  people  followed  nobody's, s  numbers given");
@@ -72,12 +73,12 @@ fn main() {
                 packets.iter().for_each(|(sensor, packet)| assembler.push(*sensor, packet, &mut health));
                 truth.push((frame.time_ns, frame.people));
                 while let Some(seen) = assembler.pop() {
-                    #[expect(clippy::disallowed_methods, reason = "this measures how long a step takes")]
-                    let from = Instant::now();
-                    let outcome = pipeline.step(&seen);
-                    hour.step_ms.push(1e3 * from.elapsed().as_secs_f64());
+                    let mut outcome = None;
+                    let took = timed(|| outcome = Some(pipeline.step(&seen)));
+                    hour.step_ms.push(1e3 * took.as_secs_f64());
                     truth.retain(|(time_ns, _)| *time_ns >= seen.time_ns);
-                    if let Some((_, people)) = truth.iter().find(|(time_ns, _)| *time_ns == seen.time_ns) {
+                    let people = truth.iter().find(|(time_ns, _)| *time_ns == seen.time_ns);
+                    if let (Some(outcome), Some((_, people))) = (outcome, people) {
                         hour.count(outcome, people);
                     }
                 }
@@ -143,22 +144,6 @@ fn with_a_chair(mut site: Site) -> Site {
     let chair = Furniture { position_m: [13.0, -5.0], size_m: [0.5, 0.5, 0.9], yaw_deg: 20.0 };
     site.furniture.push(chair);
     site
-}
-
-fn learn_empty(site: &Site, pipeline: &mut Pipeline) {
-    let (mut assembler, mut health) =
-        (Assembler::new(site).expect("the default site is simulated"), Health::default());
-    for packets in Scene::empty(site, SEED, 20).expect("the default site is simulated") {
-        let mut all: Vec<(usize, Packet)> = packets
-            .into_iter()
-            .enumerate()
-            .flat_map(|(sensor, packets)| packets.into_iter().map(move |packet| (sensor, packet)))
-            .collect();
-        all.sort_by_key(|(_, packet)| packet.time_ns);
-        all.iter().for_each(|(sensor, packet)| assembler.push(*sensor, packet, &mut health));
-    }
-    assembler.finish();
-    std::iter::from_fn(|| assembler.pop()).for_each(|frame| pipeline.learn_empty(&frame));
 }
 
 /// What the process holds.

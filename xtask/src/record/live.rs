@@ -184,22 +184,24 @@ fn seen_open(streams: &[u32]) -> Result<String> {
 
 /// KiB that a process holds; `None` once it has ended.
 fn resident(id: u32) -> Option<u64> {
-    let status = std::fs::read_to_string(format!("/proc/{id}/status")).ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    kilobytes(id, "status", "VmRSS:")
+}
+
+/// What such a file of a process says of it.
+fn kilobytes(id: u32, file: &str, what: &str) -> Option<u64> {
+    let said = std::fs::read_to_string(format!("/proc/{id}/{file}")).ok()?;
+    let line = said.lines().find_map(|line| line.strip_prefix(what))?;
     line.trim().trim_end_matches(" kB").trim().parse().ok()
 }
 
 /// KiB that a process and those that it started hold; what they share with others counts in part.
 fn proportional(id: u32) -> u64 {
-    let own = std::fs::read_to_string(format!("/proc/{id}/smaps_rollup")).unwrap_or_default();
-    let own = own.lines().find_map(|line| line.strip_prefix("Pss:"));
-    let own = own.and_then(|kb| kb.trim().trim_end_matches(" kB").trim().parse::<u64>().ok());
     let threads = std::fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
     let children: Vec<u32> = threads
         .filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok())
         .flat_map(|ids| ids.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<u32>>())
         .collect();
-    own.unwrap_or(0) + children.into_iter().map(proportional).sum::<u64>()
+    kilobytes(id, "smaps_rollup", "Pss:").unwrap_or(0) + children.into_iter().map(proportional).sum::<u64>()
 }
 
 /// A recording run killed at twenty moments, drawn by chance: what each file still holds.

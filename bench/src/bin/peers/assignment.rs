@@ -5,7 +5,7 @@ use std::path::Path;
 use pathfinding::prelude::{Matrix, kuhn_munkres_min};
 use umbracast::track::association::{Assignment, FORBIDDEN};
 
-use crate::exchange::{Answer, times, write_f64};
+use crate::exchange::{Answer, times, uniform, write_f64};
 
 const SIDE: usize = 1000;
 /// People on a square this wide, metres, and how far a detection may be from its track.
@@ -13,14 +13,6 @@ const HALL_M: f64 = 130.0;
 const GATE_M: f64 = 1.5;
 /// The peer with whole numbers gets millionths.
 const PARTS: f64 = 1e6;
-
-/// Numbers from 0 to 1 that do not depend on a crate (SplitMix64).
-pub fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let word = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((word ^ (word >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-}
 
 /// Dense: anything goes with anything. Gated: squared distances, less the gate's, so that only pairs below zero count.
 fn cases() -> [(&'static str, Vec<f64>); 2] {

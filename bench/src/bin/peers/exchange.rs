@@ -41,6 +41,14 @@ pub fn took_ms(work: impl FnOnce()) -> f64 {
     1e3 * from.elapsed().as_secs_f64()
 }
 
+/// Numbers from 0 to 1 that do not depend on a crate (SplitMix64).
+pub fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let word = (*state ^ (*state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((word ^ (word >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 /// Writes an array of `f64` as `NAME.npy` (format 1.0) in the folder, row after row.
 pub fn write_f64(folder: &Path, name: &str, shape: &[usize], values: &[f64]) {
     write(folder, name, "<f8", shape, values.len(), values.iter().flat_map(|value| value.to_le_bytes()));

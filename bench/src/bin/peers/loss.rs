@@ -12,8 +12,7 @@ use umbracast::geometry::{DVec2, DVec3};
 use umbracast::radio::Passage;
 use umbracast::radio::models::{Sum, ThreeEdges, double_knife_edge, three_edges};
 
-use crate::assignment::uniform;
-use crate::exchange::{Answer, times, write_f64};
+use crate::exchange::{Answer, times, uniform, write_f64};
 
 const PAIRS: usize = 1_000_000;
 const TRIES: usize = 5;

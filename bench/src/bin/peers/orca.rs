@@ -13,8 +13,7 @@ use glam::Vec2;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use umbracast_sim::crowd::orca::{Agent, Orca, Parameters};
 
-use crate::assignment::uniform;
-use crate::exchange::{Answer, times, write_f32};
+use crate::exchange::{Answer, times, uniform, write_f32};
 
 const CROWDS: [usize; 3] = [10, 1000, 10_000];
 const STEP_S: f32 = 0.1;

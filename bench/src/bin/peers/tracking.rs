@@ -8,22 +8,19 @@ use umbracast::lidar::Views;
 use umbracast::track::Tracker;
 use umbracast::{Config, Mode, STEP_NS, STEP_S};
 
-use crate::exchange::{Answer, took_ms, write_f64, write_u32};
+use crate::exchange::{Answer, took_ms, uniform, write_f64, write_u32};
 
 /// A person for so many square metres.
 const ROOM_M2: f64 = 16.0;
 const NOISE_M: f64 = 0.05;
 const HALF_M: DVec3 = DVec3::new(0.25, 0.25, 0.875);
 
-/// Numbers from 0 to 1 that do not depend on a crate (SplitMix64).
+/// Numbers by chance, from one to the next.
 struct Chance(u64);
 
 impl Chance {
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let word = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((word ^ (word >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        uniform(&mut self.0)
     }
 
     fn normal(&mut self) -> f64 {
