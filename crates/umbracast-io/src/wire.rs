@@ -197,24 +197,71 @@ pub fn decode<R: WireRow>(bytes: &[u8], access_points: &[String]) -> Option<(u64
     Some((frame, time_ns, rows))
 }
 
-/// A frame's rows as JSON, each without its keys; what is not finite or not there is null. `access_points` are the site's
-/// names, by index.
+/// A frame's rows as JSON, each without its keys; what is not finite or not there is null.
 #[derive(Debug, Clone, Copy)]
-pub struct Json<'a, R>(pub &'a [R], pub &'a [String]);
+pub struct Json<'a, R> {
+    rows: &'a [R],
+    access_points: &'a [String],
+    asked: &'a Asked,
+}
 
-impl<R: WireRow> Serialize for Json<'_, R> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.0.iter().map(|&row| JsonRow(row, self.1)))
+/// What somebody asks for of rows as JSON.
+#[derive(Debug, Clone, Default)]
+pub struct Asked {
+    /// Names of the columns; all of them where none are named.
+    pub columns: Option<Vec<String>>,
+    /// Decimals that measures are rounded to; as many as they have where it is not said.
+    pub decimals: Option<u8>,
+}
+
+impl Asked {
+    /// All of them as they are.
+    pub const WHOLE: Self = Self { columns: None, decimals: None };
+}
+
+impl<'a, R> Json<'a, R> {
+    /// Rows as they are. `access_points` are the site's names, by index.
+    pub fn whole(rows: &'a [R], access_points: &'a [String]) -> Self {
+        Self { rows, access_points, asked: &Asked::WHOLE }
+    }
+
+    /// What is asked for of them.
+    pub fn of(rows: &'a [R], access_points: &'a [String], asked: &'a Asked) -> Self {
+        Self { rows, access_points, asked }
     }
 }
 
-struct JsonRow<'a, R>(R, &'a [String]);
+impl<R: WireRow> Serialize for Json<'_, R> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        // Every row shows its cells in the same order, so that names are written out once.
+        let is_asked =
+            |name: &String| self.asked.columns.as_ref().is_none_or(|columns| columns.contains(name));
+        let names: Vec<Option<String>> =
+            all_names::<R>().into_iter().map(|name| name.filter(|name| is_asked(name))).collect();
+        serializer.collect_seq(self.rows.iter().map(|&row| JsonRow { row, names: &names, of: self }))
+    }
+}
+
+struct JsonRow<'a, R> {
+    row: R,
+    names: &'a [Option<String>],
+    of: &'a Json<'a, R>,
+}
 
 impl<R: WireRow> Serialize for JsonRow<'_, R> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let &Self(mut row, access_points) = self;
+        let &Self { mut row, names, of: Json { access_points, asked, .. } } = self;
+        let rounded = |v: f64| match asked.decimals {
+            Some(decimals) => {
+                let unit = 10_f64.powi(i32::from(decimals));
+                (v * unit).round() / unit + 0.0 // Not minus nought.
+            }
+            None => v,
+        };
         let (mut object, mut written) = (serializer.serialize_map(None)?, Ok(()));
-        each(&mut row, |name, cell| {
+        let mut names = names.iter();
+        row.visit(&mut |_, cell| {
+            let Some(Some(name)) = names.next() else { return };
             if written.is_err() {
                 return;
             }
@@ -222,10 +269,10 @@ impl<R: WireRow> Serialize for JsonRow<'_, R> {
                 Cell::U32(v) => object.serialize_entry(name, v),
                 Cell::U64(v) => object.serialize_entry(name, v),
                 Cell::I64(v) => object.serialize_entry(name, v),
-                Cell::F64(v) => object.serialize_entry(name, v),
+                Cell::F64(v) => object.serialize_entry(name, &rounded(*v)),
                 Cell::Bool(v) => object.serialize_entry(name, v),
                 Cell::MaybeBool(v) => object.serialize_entry(name, v),
-                Cell::MaybeF64(v) => object.serialize_entry(name, v),
+                Cell::MaybeF64(v) => object.serialize_entry(name, &v.map(rounded)),
                 Cell::AccessPoint(v) => object.serialize_entry(name, &access_points.get(*v as usize)),
                 Cell::MaybeAccessPoint(v) => {
                     object.serialize_entry(name, &v.and_then(|v| access_points.get(v as usize)))
@@ -236,6 +283,20 @@ impl<R: WireRow> Serialize for JsonRow<'_, R> {
         written?;
         object.end()
     }
+}
+
+/// The columns that a row has on the wire, in order.
+pub fn columns<R: WireRow>() -> Vec<String> {
+    all_names::<R>().into_iter().flatten().collect()
+}
+
+/// Of each cell in order; none for keys.
+fn all_names<R: Row>() -> Vec<Option<String>> {
+    let mut names = Vec::new();
+    R::default().visit(&mut |name, _| {
+        names.push(Some(name.to_string()).filter(|name| !KEYS.contains(&name.as_str())));
+    });
+    names
 }
 
 /// JSON Schema of the same.
@@ -323,7 +384,7 @@ mod tests {
         let leave = DecisionRow { action: Action::HandOver, target: Some(0), deadline_s: Some(0.2), ..wait };
         let bytes = encode(0, 0, &[wait, leave], &access_points());
         assert_eq!(decode(&bytes, &access_points()), Some((0, 0, vec![wait, leave])));
-        let value = serde_json::to_value(Json(&[wait, leave], &access_points())).unwrap();
+        let value = serde_json::to_value(Json::whole(&[wait, leave], &access_points())).unwrap();
         assert_eq!((&value[0]["action"], &value[0]["target"]), (&"wait".into(), &Value::Null));
         assert_eq!((&value[1]["action"], &value[1]["target"]), (&"hand-over".into(), &"side".into()));
         assert_eq!(json_schema::<DecisionRow>()["properties"]["action"]["enum"][2], "hand-over");
@@ -331,7 +392,7 @@ mod tests {
 
     #[test]
     fn json_has_the_names_of_the_table_and_null_for_nothing() {
-        let value = &serde_json::to_value(Json(&[link()], &access_points())).unwrap()[0];
+        let value = &serde_json::to_value(Json::whole(&[link()], &access_points())).unwrap()[0];
         assert_eq!(value["access_point"], "centre");
         assert_eq!(value["blocked_w3"], true);
         assert_eq!(value["onset_p50_s"], Value::Null);

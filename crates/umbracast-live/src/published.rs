@@ -11,13 +11,29 @@ use umbracast_io::results::Results;
 use umbracast_io::rows::{
     self, BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, ReportRow, TrackRow,
 };
-use umbracast_io::wire::Json;
+use umbracast_io::wire::{Asked, Json};
 
 use crate::advice::Advice;
 use crate::warnings::Event;
 
 /// Points beyond this are drawn by nobody: every n-th is kept.
 const POINTS_DRAWN: usize = 4000;
+
+/// What a client wants of a frame.
+#[derive(Debug, Clone)]
+pub struct Wanted {
+    /// The points to draw.
+    pub points: bool,
+    /// Of the rows.
+    pub rows: Asked,
+}
+
+impl Wanted {
+    /// All there is.
+    pub const WHOLE: Self = Self { points: true, rows: Asked::WHOLE };
+    /// All rows.
+    pub const WITHOUT_POINTS: Self = Self { points: false, ..Self::WHOLE };
+}
 
 /// One frame's results. Shared, never changed.
 #[derive(Debug, Clone, Default)]
@@ -108,7 +124,8 @@ impl Published {
     }
 
     /// As the page, `curl` and every client get it, so long after it was published. Names are those of the tables.
-    pub fn json(&self, with_points: bool, age: Option<Duration>) -> impl Serialize {
+    pub fn json<'a>(&'a self, wanted: &'a Wanted, age: Option<Duration>) -> impl Serialize + 'a {
+        let (names, asked) = (&*self.access_points, &wanted.rows);
         let ms = |time: Duration| (time.as_secs_f64() * 1e6).round() / 1e3;
         FrameJson {
             frame: self.frame,
@@ -121,13 +138,13 @@ impl Published {
             reloads: self.reloads,
             sensors: &self.sensors,
             health: &self.health,
-            tracks: Json(&self.tracks, &self.access_points),
-            blockages: Json(&self.links, &self.access_points),
-            losses: (!self.losses.is_empty()).then(|| Json(&self.losses, &self.access_points)),
-            bindings: (!self.bindings.is_empty()).then(|| Json(&self.bindings, &self.access_points)),
-            decisions: (!self.decisions.is_empty()).then(|| Json(&self.decisions, &self.access_points)),
+            tracks: Json::of(&self.tracks, names, asked),
+            blockages: Json::of(&self.links, names, asked),
+            losses: (!self.losses.is_empty()).then(|| Json::of(&self.losses, names, asked)),
+            bindings: (!self.bindings.is_empty()).then(|| Json::of(&self.bindings, names, asked)),
+            decisions: (!self.decisions.is_empty()).then(|| Json::of(&self.decisions, names, asked)),
             events: self.events.iter().map(Event::json).chain(self.advice.iter().map(Advice::json)).collect(),
-            points_cm: with_points.then(|| self.points_cm.as_flattened()),
+            points_cm: wanted.points.then(|| self.points_cm.as_flattened()),
         }
     }
 }

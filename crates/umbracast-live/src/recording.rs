@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use serde_json::{Value, json};
 use umbracast::Error;
 
-use crate::published::Published;
+use crate::published::{Published, Wanted};
 
 /// A whole scan is kept of every so many frames: the hall stands still.
 pub const SCAN_EVERY: u64 = 5;
@@ -65,7 +65,7 @@ impl Recording {
     /// Adds the next frame: what each mode says, the truth where there is one, and the whole scan of every
     /// [`SCAN_EVERY`]th. False where the disk holds no more; the reason is told to the page.
     pub fn add(&self, of_modes: &[Published], truth: Option<&Value>, scan: impl FnOnce() -> Vec<u8>) -> bool {
-        let frames: Vec<_> = of_modes.iter().map(|published| published.json(true, None)).collect();
+        let frames: Vec<_> = of_modes.iter().map(|published| published.json(&Wanted::WHOLE, None)).collect();
         let Ok(text) = serde_json::to_vec(&json!({ "frames": frames, "truth": truth })) else { return false };
         let mut kept = self.lock();
         let scanned = (kept.frames.len() as u64).is_multiple_of(SCAN_EVERY).then(scan);

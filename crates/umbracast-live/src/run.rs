@@ -159,7 +159,7 @@ impl Live {
             let (packets, frames, recorder) = (packets.clone(), frames.clone(), recorder.clone());
             let counters = counters.clone();
             std::thread::spawn(move || {
-                assemble(assembler, &packets, &frames, recorder.as_deref(), &counters);
+                assemble(assembler, &packets, &frames, recorder.as_deref(), &counters, clock);
                 frames.close();
             })
         };
@@ -278,6 +278,7 @@ fn assemble(
     frames: &Queue<Closed>,
     recorder: Option<&Recorder>,
     counters: &Counters,
+    clock: HostClock,
 ) {
     let mut health = Health::default();
     let mut before_ns = i64::MIN;
@@ -300,8 +301,10 @@ fn assemble(
         }
     }
     assembler.finish();
+    // That nothing more comes to them is known since now, however long the sensors have been silent.
+    let ended_ns = clock.now_ns();
     while let Some(frame) = assembler.pop() {
-        frames.push(Closed { frame, arrived_ns: before_ns, health });
+        frames.push(Closed { frame, arrived_ns: ended_ns, health });
     }
 }
 

@@ -17,6 +17,7 @@ use umbracast::Error;
 use umbracast_live::Published;
 use umbracast_live::advice::Advice;
 use umbracast_live::log::{self, Level};
+use umbracast_live::published::Wanted;
 use umbracast_live::warnings::Event;
 
 use crate::secrets;
@@ -159,7 +160,7 @@ impl Sender {
     /// Sends a frame as `/api/frame` of the page says it, where the settings ask for frames and the broker keeps up.
     pub fn frame(&self, frame: &Published) {
         if self.frames && self.state.open.load(Ordering::Acquire) < FRAMES_WAITING {
-            let json = serde_json::to_value(frame.json(false, None)).unwrap_or_default();
+            let json = serde_json::to_value(frame.json(&Wanted::WITHOUT_POINTS, None)).unwrap_or_default();
             self.publish(&format!("umbracast/{}/frames", self.hall), json, frame.term);
         }
     }

@@ -92,10 +92,10 @@ impl Outlets {
                 "frame": made.frame,
                 "time_ns": made.time_ns,
                 "term": term,
-                "tracks": wire::Json(&made.tracks, names),
-                "blockages": wire::Json(links, names),
-                "losses": wire::Json(&made.losses, names),
-                "decisions": wire::Json(&made.decisions, names),
+                "tracks": wire::Json::whole(&made.tracks, names),
+                "blockages": wire::Json::whole(links, names),
+                "losses": wire::Json::whole(&made.losses, names),
+                "decisions": wire::Json::whole(&made.decisions, names),
             });
             outlet.put_bytes(frame.to_string().into_bytes());
         }

@@ -64,7 +64,7 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>, watched: bool) -
         ),
         &[],
     );
-    let browser = if watched { " & nice -n 19 chromium --headless ..." } else { "" };
+    let browser = if watched { " & chrt --idle 0 chromium --headless ..." } else { "" };
     if !watched {
         book.line("Without a browser:");
     }
@@ -124,31 +124,37 @@ fn first_and_last(what: &str, kb: &[u64]) -> String {
     )
 }
 
-/// A browser with the page. Who looks has a computer of his own: here he takes what is left.
+/// A browser with the page, which it draws by software. Who looks has a computer of his own: here he takes what is left, and
+/// leaves at once what is wanted.
 fn look_on() -> Result<Child> {
-    let mut browser = Command::new("nice");
-    browser.args(["-n", "19", "chromium", "--headless", "--no-sandbox", "--disable-gpu"]);
+    let mut browser = Command::new("chrt");
+    browser.args(["--idle", "0", "chromium", "--headless", "--no-sandbox", "--disable-gpu"]);
     browser.args(["--remote-debugging-port=0", &format!("http://{PAGE}/")]);
     let browser = browser.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
     browser.map_err(|e| format!("expected chromium to look at the page, found none: {e}"))
 }
 
 /// How many pages and other readers of the stream the running program counts now.
-fn streams() -> Option<u32> {
-    let said = answered("GET /metrics HTTP/1.1\r\nConnection: close", Duration::from_secs(1))?;
-    let said = String::from_utf8_lossy(&said);
-    said.lines().find_map(|line| line.strip_prefix("umbracast_streams "))?.parse().ok()
+fn streams() -> Option<u64> {
+    counted("umbracast_streams")
 }
 
-/// What the page weighs on the wire, heads included: its one file, and what the stream behind it sends in ten seconds.
+/// What the running program counts under such a name.
+fn counted(name: &str) -> Option<u64> {
+    let said = answered("GET /metrics HTTP/1.1\r\nConnection: close", Duration::from_secs(1))?;
+    let said = String::from_utf8_lossy(&said);
+    said.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '))?.parse().ok()
+}
+
+/// What the page weighs: its one file on the wire, heads included, and the frames that the browser takes in ten seconds.
 fn weight() -> Result<String> {
     let page = answered("GET / HTTP/1.1\r\nConnection: close", LISTEN);
     let page = page.filter(|page| page.starts_with(b"HTTP/1.1 200"));
     let page = page.ok_or_else(|| format!("expected a page at {PAGE}, found none"))?.len();
-    let stream = "GET /api/live HTTP/1.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-                  Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
-    let sent = answered(stream, LISTEN).filter(|sent| sent.starts_with(b"HTTP/1.1 101"));
-    let sent = sent.ok_or("expected a stream behind the page, found none")?.len();
+    let streamed = || counted("umbracast_streamed_bytes_total").filter(|bytes| *bytes > 0);
+    let before = streamed().ok_or("expected the browser at the stream behind the page, found nobody")?;
+    sleep(LISTEN);
+    let sent = streamed().unwrap_or(before) - before;
     Ok(format!("page: {page} bytes once, then {:.1} kB a second", 1e-3 * sent as f64 / LISTEN.as_secs_f64()))
 }
 
@@ -171,7 +177,7 @@ fn answered(head: &str, within: Duration) -> Option<Vec<u8>> {
 
 /// In words, at how many of the looks somebody had the page open. Fails below nine of ten: a record of a run that nobody
 /// watched must not say what a page costs.
-fn seen_open(streams: &[u32]) -> Result<String> {
+fn seen_open(streams: &[u64]) -> Result<String> {
     let open = streams.iter().filter(|streams| **streams > 0).count();
     if open == 0 || 10 * open < 9 * streams.len() {
         return Err(format!(

@@ -77,6 +77,8 @@ struct State {
     streams: BTreeMap<IpAddr, usize>,
     count: u64,
     refused: u64,
+    /// Bytes of frames that streams have taken.
+    streamed: u64,
 }
 
 #[derive(Debug)]
@@ -110,6 +112,11 @@ impl Connections {
     /// Open WebSockets and event streams.
     pub fn streams(&self) -> usize {
         self.lock().streams.values().sum()
+    }
+
+    /// Bytes of frames that all streams together have taken.
+    pub fn streamed(&self) -> u64 {
+        self.lock().streamed
     }
 
     /// Connections that were closed unheard because there were too many.
@@ -177,6 +184,13 @@ impl Guest {
 impl Drop for Seat {
     fn drop(&mut self) {
         self.connections.lock().open.remove(&self.number);
+    }
+}
+
+impl Stream {
+    /// It has taken so many bytes more.
+    pub fn took(&self, bytes: usize) {
+        self.0.0.connections.lock().streamed += bytes as u64;
     }
 }
 

@@ -52,6 +52,8 @@ pub fn text(watched: &Watched, newest: &Published, connections: &Connections) ->
     let skipped = counters.heard.lost() + counters.reports_skipped.load(Ordering::Relaxed);
     counter(&mut out, "reports_skipped_total", what, skipped as f64);
     gauge(&mut out, "streams", "Open WebSockets and event streams.", connections.streams() as f64);
+    let streamed = connections.streamed() as f64;
+    counter(&mut out, "streamed_bytes_total", "Bytes of frames sent over WebSockets.", streamed);
     let what = "Connections closed unheard because there were too many.";
     counter(&mut out, "connections_refused_total", what, connections.refused() as f64);
     if let Ok(Value::Object(health)) = serde_json::to_value(newest.health) {

@@ -26,6 +26,7 @@ mod watched;
 mod tls;
 mod connections;
 mod doors;
+mod frames;
 mod looked_at;
 mod metrics;
 mod openapi;
@@ -36,9 +37,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Duration;
 
-use axum::extract::ws::rejection::WebSocketUpgradeRejection;
-use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{Path, Query, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
@@ -52,7 +51,7 @@ use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::wrappers::errors::BroadcastStreamRecvError;
 use umbracast::{Error, Site};
 
-use self::connections::{Connections, Guest, Limits, Stream};
+use self::connections::{Connections, Guest, Limits};
 use crate::published::Published;
 use doors::{Doors, Names};
 pub use planned::Planner;
@@ -63,10 +62,6 @@ pub use watched::Watched;
 const COOKIE: &str = "umbracast_token";
 /// Events that wait for a slow client; beyond it is told how many it missed.
 const EVENTS_WAITING: usize = 1024;
-/// What a client may say over a WebSocket at once.
-const SAID_BYTES: usize = 4096;
-/// A list of objects is no longer: a thousand people, each told at length.
-const LIST_BYTES: usize = 1 << 20;
 /// Without a frame for so long, something is wrong.
 const STALE: Duration = Duration::from_secs(1);
 
@@ -217,9 +212,9 @@ fn router(shared: Arc<Shared>) -> Router {
     Router::new()
         .route("/", get(page))
         .route("/api/site", get(site))
-        .route("/api/frame", get(frame))
-        .route("/api/live", get(live))
-        .route("/api/objects/{source}", get(objects))
+        .route("/api/frame", get(frames::newest))
+        .route("/api/live", get(frames::live))
+        .route("/api/objects/{source}", get(frames::objects))
         .route("/api/scan", get(looked_at::scan))
         .route("/api/recording", get(looked_at::about))
         .route("/api/recording/frames", get(looked_at::frames))
@@ -314,92 +309,6 @@ async fn site(State(shared): State<Arc<Shared>>) -> Json<Value> {
         "title": shared.watched.title, "fields_deg": looked_at::fields_deg(&site), "site": site,
         "recorded": shared.watched.recording.is_some(),
     }))
-}
-
-#[derive(serde::Deserialize)]
-struct FrameQuery {
-    /// 0 leaves the points out.
-    points: Option<u8>,
-}
-
-impl FrameQuery {
-    fn with_points(&self) -> bool {
-        self.points != Some(0)
-    }
-}
-
-async fn frame(State(shared): State<Arc<Shared>>, Query(query): Query<FrameQuery>) -> Response {
-    let newest = shared.newest.borrow().clone();
-    Json(newest.json(query.with_points(), shared.age(&newest))).into_response()
-}
-
-async fn live(
-    State(shared): State<Arc<Shared>>,
-    Extension(guest): Extension<Guest>,
-    Query(query): Query<FrameQuery>,
-    upgrade: WebSocketUpgrade,
-) -> Response {
-    let Some(place) = guest.stream() else { return full() };
-    // Nothing is expected from a client but that it closes. Room is made for a frame before it comes.
-    let upgrade = upgrade.max_message_size(SAID_BYTES).max_frame_size(SAID_BYTES);
-    upgrade.on_upgrade(move |socket| stream(socket, shared, place, query.with_points(), None))
-}
-
-/// Takes lists of objects, where somebody does, and answers with frames.
-async fn objects(
-    State(shared): State<Arc<Shared>>,
-    Extension(guest): Extension<Guest>,
-    Path(source): Path<String>,
-    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
-) -> Response {
-    if shared.watched.objects.is_none() {
-        let told = "expected a node that takes lists of objects: umbracast node ... --objects\n";
-        return (StatusCode::NOT_FOUND, told).into_response();
-    }
-    let upgrade = match upgrade {
-        Ok(upgrade) => upgrade,
-        Err(rejection) => return rejection.into_response(),
-    };
-    let Some(place) = guest.stream() else { return full() };
-    let upgrade = upgrade.max_message_size(LIST_BYTES).max_frame_size(LIST_BYTES);
-    upgrade.on_upgrade(move |socket| stream(socket, shared, place, false, Some(source)))
-}
-
-/// Every frame that the client can take. A watch holds the newest only, so a slow one skips frames, and the others
-/// notice nothing.
-async fn stream(
-    mut socket: WebSocket,
-    shared: Arc<Shared>,
-    _place: Stream,
-    with_points: bool,
-    source: Option<String>,
-) {
-    let mut newest = shared.newest.subscribe();
-    newest.mark_changed();
-    loop {
-        tokio::select! {
-            changed = newest.changed() => {
-                if changed.is_err() {
-                    return;
-                }
-                let frame = newest.borrow_and_update().clone();
-                let json = frame.json(with_points, shared.age(&frame));
-                let Ok(text) = serde_json::to_string(&json) else { continue };
-                // Fails where the other end takes nothing: see `connections`.
-                if socket.send(Message::Text(text.into())).await.is_err() {
-                    return;
-                }
-            }
-            said = socket.recv() => {
-                let Some(Ok(said)) = said else { return };
-                if let (Some(source), Some(take), Message::Text(_) | Message::Binary(_)) =
-                    (&source, &shared.watched.objects, &said)
-                {
-                    take(source, &said.into_data());
-                }
-            }
-        }
-    }
 }
 
 async fn events(State(shared): State<Arc<Shared>>, Extension(guest): Extension<Guest>) -> Response {

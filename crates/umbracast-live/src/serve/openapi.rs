@@ -20,8 +20,8 @@ pub fn document() -> Value {
         "info": { "title": "Umbracast", "version": env!("CARGO_PKG_VERSION") },
         "paths": {
             "/api/site": json_of("Hall, sensors, access points", json!({ "type": "object" })),
-            "/api/frame": json_of("The newest frame; ?points=0 leaves the points out", frame),
-            "/api/live": text_of("WebSocket: a Frame as JSON text, each time there is a newer one", "application/json"),
+            "/api/frame": json_of("The newest frame; ?points=0 leaves the points out, ?columns=track,x_m,p_w3 all other columns of rows, and ?decimals=4 rounds measures", frame),
+            "/api/live": text_of("WebSocket: a Frame as JSON text, each time there is a newer one; takes what /api/frame takes", "application/json"),
             "/api/objects/{source}": text_of("Of node --objects: WebSocket. Takes lists of objects of another perception as JSON, and answers as /api/live", "application/json"),
             "/api/scan": text_of("The whole scan of the newest frame while it is asked for: frame (u64), origin (3 f64, metres), then x, y, z (i16, centimetres), sensor and reflectivity (u8) of each point, little-endian; 204 without one", "application/octet-stream"),
             "/api/recording": json_of("Of view: how many frames are computed, and of what; 404 of other commands", json!({ "type": "object" })),

@@ -2,7 +2,8 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 
 use umbracast::Config;
-use umbracast_io::rows::{LinkRow, TrackRow};
+use umbracast_io::rows::{DecisionRow, LinkRow, LossRow, TrackRow};
+use umbracast_io::wire;
 
 use super::*;
 use crate::clock::HostClock;
@@ -187,7 +188,9 @@ fn a_planner_answers_and_says_what_is_wrong() {
 #[test]
 fn every_field_of_a_frame_is_in_the_interface() {
     let document = openapi::document();
-    let frame = serde_json::to_value(published(HostClock::start()).json(true, None)).unwrap();
+    let frame =
+        serde_json::to_value(published(HostClock::start()).json(&crate::published::Wanted::WHOLE, None))
+            .unwrap();
     let known = &document["components"]["schemas"]["Frame"]["properties"];
     frame.as_object().unwrap().keys().for_each(|name| assert!(known.get(name).is_some(), "{name}"));
     let known = &document["components"]["schemas"]["Event"]["properties"];
@@ -196,6 +199,51 @@ fn every_field_of_a_frame_is_in_the_interface() {
         .unwrap()
         .keys()
         .for_each(|name| assert!(known.get(name).is_some(), "{name}"));
+}
+
+#[test]
+fn a_client_gets_the_columns_that_it_names_rounded() {
+    let (server, clock) = server(None);
+    server.publisher().publish(&published(clock));
+    let frame = |query: &str| {
+        let (status, text) = get(&server, &format!("/api/frame?{query}"), "");
+        assert_eq!(status, 200, "{text}");
+        serde_json::from_str::<Value>(&text).unwrap()
+    };
+    let whole = frame("");
+    let part = frame("columns=track,x_m,p_w3&decimals=1");
+    let names = |row: &Value| row.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    assert!(names(&whole["tracks"][0]).len() > 100);
+    assert_eq!(names(&part["tracks"][0]), ["track", "x_m"]);
+    assert_eq!(names(&part["blockages"][0]), ["p_w3", "track"]);
+    let rounded = (whole["tracks"][0]["x_m"].as_f64().unwrap() * 10.0).round() / 10.0;
+    assert_eq!(part["tracks"][0]["x_m"].as_f64().unwrap(), rounded);
+    for (query, found) in [("columns=x_mm", "\"x_mm\""), ("decimals=16", "16")] {
+        let (status, text) = get(&server, &format!("/api/frame?{query}"), "");
+        assert!(status == 400 && text.contains("expected") && text.contains(found), "{text}");
+    }
+    server.stop();
+}
+
+#[test]
+fn the_page_asks_for_every_column_that_it_reads() {
+    let page = pages::WATCH;
+    let asked = &page[page.find("const DRAWN").unwrap()..];
+    let asked = &asked[..asked.find("function connect").unwrap()];
+    let columns = [
+        wire::columns::<TrackRow>(),
+        wire::columns::<LinkRow>(),
+        wire::columns::<LossRow>(),
+        wire::columns::<DecisionRow>(),
+    ];
+    let reads = |name: &str| {
+        page.match_indices(&format!(".{name}")).any(|(at, found)| {
+            !page[at + found.len()..].starts_with(|c: char| c.is_alphanumeric() || c == '_')
+        })
+    };
+    let read: Vec<String> = columns.into_iter().flatten().filter(|name| reads(name)).collect();
+    assert!(read.len() > 20, "{read:?}");
+    read.iter().for_each(|name| assert!(asked.contains(&format!("\"{name}\"")), "{name}"));
 }
 
 #[test]
