@@ -34,10 +34,9 @@ pub(super) struct FrameQuery {
 }
 
 impl FrameQuery {
-    fn wanted(self) -> Result<Wanted, Response> {
-        let refused = |told: String| (StatusCode::BAD_REQUEST, told + "\n").into_response();
+    fn wanted(self) -> Result<Wanted, String> {
         if let Some(decimals) = self.decimals.filter(|decimals| *decimals > MOST_DECIMALS) {
-            return Err(refused(format!("decimals: expected 0 to {MOST_DECIMALS}, found {decimals}")));
+            return Err(format!("decimals: expected 0 to {MOST_DECIMALS}, found {decimals}\n"));
         }
         let columns = self.columns.map(|columns| columns.split(',').map(str::to_owned).collect::<Vec<_>>());
         if let Some(columns) = &columns {
@@ -52,9 +51,11 @@ impl FrameQuery {
             .flatten()
             .collect();
             if let Some(unknown) = columns.iter().find(|name| !known.contains(*name)) {
-                let told =
-                    format!("columns: expected those of /api/openapi.json, found {:?}", unknown.as_str());
-                return Err(refused(told));
+                let found = unknown.as_str();
+                return Err(format!(
+                    "columns: expected those of /api/openapi.json, found {found:?}
+"
+                ));
             }
         }
         let rows = wire::Asked { columns, decimals: self.decimals };
@@ -65,7 +66,7 @@ impl FrameQuery {
 pub(super) async fn newest(State(shared): State<Arc<Shared>>, Query(query): Query<FrameQuery>) -> Response {
     let wanted = match query.wanted() {
         Ok(wanted) => wanted,
-        Err(refusal) => return refusal,
+        Err(told) => return (StatusCode::BAD_REQUEST, told).into_response(),
     };
     let newest = shared.newest.borrow().clone();
     Json(newest.json(&wanted, shared.age(&newest))).into_response()
@@ -79,7 +80,7 @@ pub(super) async fn live(
 ) -> Response {
     let wanted = match query.wanted() {
         Ok(wanted) => wanted,
-        Err(refusal) => return refusal,
+        Err(told) => return (StatusCode::BAD_REQUEST, told).into_response(),
     };
     let Some(place) = guest.stream() else { return full() };
     // Nothing is expected from a client but that it closes. Room is made for a frame before it comes.
