@@ -65,10 +65,10 @@ fn live_run(book: &mut Book, people: &str, site: Option<&Path>, watched: bool) -
         &[],
     );
     let browser = if watched { " & chrt --idle 0 chromium --headless ..." } else { "" };
+    book.command(&format!("umbracast {} & umbracast {}{browser}", spoken(&listen), spoken(&send)));
     if !watched {
         book.line("Without a browser:");
     }
-    book.command(&format!("umbracast {} & umbracast {}{browser}", spoken(&listen), spoken(&send)));
     let start = |words: &[OsString]| {
         let mut command = Command::new(book.umbracast());
         command.args(words).stdout(Stdio::piped()).stderr(Stdio::null());
