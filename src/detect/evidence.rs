@@ -2,6 +2,7 @@
 //! body, and parts nearer than two bodies can stand become one. Both thresholds change where people are expected.
 
 use super::arms::{ALONE_M, ARM_M, have_one_head, is_arm};
+use super::canopy::{is_overhead, without_canopy};
 use super::means::{PASSES, means, one_more, people_if};
 use super::memory::{Memory, PEOPLE_OF_CLUSTER};
 use super::part::Part;
@@ -44,11 +45,16 @@ pub(super) fn split(
     parts: &mut Vec<Part>,
     memory: &mut Memory,
 ) {
-    if cluster.len() < 2 * POINTS_MIN {
-        parts.push(Part::new(moved_m, cluster));
+    let mut all = Part::new(moved_m, cluster);
+    if is_overhead(moved_m, &all) {
+        memory.points.give(all.points);
         return;
     }
-    let all = Part::new(moved_m, cluster);
+    if all.points.len() < 2 * POINTS_MIN {
+        parts.push(all);
+        return;
+    }
+    without_canopy(moved_m, &mut all);
     let axis_m = all.axis_m(moved_m);
     let is_crowd = axis_m.length() > CROWD_M;
     // Most are one person alone, for whom nothing need be remembered.
@@ -137,6 +143,7 @@ fn among_known(
             continue;
         }
         whole.look(moved_m);
+        without_canopy(moved_m, &mut whole);
         let ends_m = whole.ends_m(whole.axis_m(moved_m));
         let are_two =
             |two: &[Part]| are_people(two, BESIDE_M) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M);

@@ -17,6 +17,7 @@ mod guided;
 mod part;
 mod memory;
 mod means;
+mod canopy;
 mod arms;
 mod evidence;
 mod split_merge;

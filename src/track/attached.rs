@@ -5,9 +5,15 @@ use super::remembered::{Remembered, Words};
 use crate::geometry::DVec2;
 
 /// Its longest side in plan view is more than this share of its height: of people who walk, children among them, it is 0.35 to
-/// 0.5, of prams and frames 0.6 and more. It is lower than this share of the body.
+/// 0.5, of prams and frames that are seen whole 0.6 and more. It is lower than this share of the body.
 const LONG_SHARE: f64 = 0.55;
-const HEIGHT_SHARE: f64 = 0.75;
+const HEIGHT_SHARE: f64 = 0.68;
+/// Of a thing right before somebody who walks less need be seen, and of one so near that nobody could walk there nothing at all.
+const LONG_SHARE_AHEAD: f64 = 0.5;
+const NOBODY_AHEAD_M: f64 = 0.45;
+/// What is so far to the side at most, and more ahead than aside, is right before somebody who walks at least so fast.
+const ASIDE_M: f64 = 0.4;
+const WALKS_MPS: f64 = 0.4;
 /// It is no farther from the body's axis: arms, a handle, half a pram. And as fast.
 const REACH_M: f64 = 1.35;
 const APART_MPS: f64 = 0.6;
@@ -23,14 +29,30 @@ pub(super) struct Beside {
     pub(super) velocity_mps: DVec2,
     /// As its track knows it: what others leave to see of a body is lower.
     pub(super) height_m: f64,
+    /// The highest that it showed lately where a head would have been seen.
+    pub(super) shown_top_m: f64,
     /// Of the box around it in plan view.
     pub(super) diagonal_m: f64,
 }
 
 impl Beside {
+    /// How long a thing must be for its height to be one that this body pushes or pulls.
+    fn long_share(&self, thing: &Self) -> f64 {
+        let (off_m, speed_mps) = (thing.position_m - self.position_m, self.velocity_mps.length());
+        let [ahead_m, aside_m] =
+            [off_m.dot(self.velocity_mps) / speed_mps, off_m.perp_dot(self.velocity_mps) / speed_mps];
+        let is_before = speed_mps > WALKS_MPS && aside_m.abs() < ahead_m.min(ASIDE_M);
+        match is_before {
+            true if ahead_m < NOBODY_AHEAD_M => 0.0,
+            true => LONG_SHARE_AHEAD,
+            false => LONG_SHARE,
+        }
+    }
+
     /// Whether `thing` may be something that this body moves.
     fn may_move(&self, thing: &Self) -> bool {
-        thing.height_m < HEIGHT_SHARE * self.height_m
+        self.position_m != thing.position_m // Nobody pushes himself.
+            && thing.shown_top_m < HEIGHT_SHARE * self.height_m
             && thing.position_m.distance_squared(self.position_m) < REACH_M * REACH_M
             && thing.velocity_mps.distance_squared(self.velocity_mps) < APART_MPS * APART_MPS
     }
@@ -58,10 +80,39 @@ impl Attached {
 
     /// Looks at everybody, `step_s` later.
     pub(super) fn look(&mut self, thing: &Beside, all: &[Beside], step_s: f64) {
-        let goes_with =
-            thing.diagonal_m > LONG_SHARE * thing.height_m && all.iter().any(|body| body.may_move(thing));
+        let is_long = |body: &Beside| thing.diagonal_m > body.long_share(thing) * thing.shown_top_m;
+        let goes_with = all.iter().any(|body| body.may_move(thing) && is_long(body));
         self.lasted_s =
             if goes_with { (self.lasted_s + step_s).min(LASTS_S) } else { (self.lasted_s - step_s).max(0.0) };
         self.is_thing = self.lasted_s > if self.is_thing { 0.0 } else { THING_AFTER_S };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beside(x: f64, y: f64, shown_top_m: f64, diagonal_m: f64) -> Beside {
+        let (position_m, velocity_mps) = (DVec2::new(x, y), DVec2::X);
+        Beside { position_m, velocity_mps, height_m: 1.75, shown_top_m, diagonal_m }
+    }
+
+    /// Whether it is a thing after a second beside somebody at the origin who walks along x.
+    fn is_thing(thing: Beside) -> bool {
+        let mut attached = Attached::default();
+        (0..10).for_each(|_| attached.look(&thing, &[thing, beside(0.0, 0.0, 1.75, 0.6)], 0.1));
+        attached.is_thing()
+    }
+
+    #[test]
+    fn what_is_pushed_is_a_thing_and_who_walks_along_is_none() {
+        assert!(is_thing(beside(1.0, 0.0, 1.0, 0.7)), "a pram");
+        assert!(is_thing(beside(1.0, 0.1, 1.1, 0.57)), "a pram of which others hide a part");
+        assert!(is_thing(beside(0.42, 0.2, 0.95, 0.35)), "a leg of a walking frame");
+        assert!(is_thing(beside(0.1, -0.6, 0.9, 0.8)), "a trolley at the side");
+        assert!(!is_thing(beside(0.1, 0.45, 1.1, 0.5)), "a child at the hand");
+        assert!(!is_thing(beside(0.7, 0.0, 1.1, 0.45)), "a child before its parents");
+        assert!(!is_thing(beside(0.7, 0.0, 1.6, 0.9)), "an adult with a bag");
+        assert!(!is_thing(beside(2.0, 0.0, 1.0, 0.7)), "too far away");
     }
 }

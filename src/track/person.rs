@@ -61,6 +61,8 @@ const FACING_BEHIND: f64 = 0.05;
 const FREE_SHARE: f64 = 0.9;
 /// Mean standing height of adults in shoes.
 pub(super) const HEIGHT_MEAN_M: f64 = 1.72;
+/// A top tells of the body's height where beams meet it up to this share of that.
+const SHOWN_SHARE: f64 = 0.6;
 /// Time over which the width of a box is averaged.
 const BOX_AVERAGE_S: f64 = 1.0;
 /// The width of a box until one was seen.
@@ -92,6 +94,8 @@ pub(super) struct Person {
     pub(super) attached: Attached,
     /// Averaged extent along x and y.
     extent_m: DVec2,
+    /// Averaged highest point of frames in which a head would have been seen.
+    shown_top_m: f64,
     observed: Observations,
 }
 
@@ -114,6 +118,7 @@ impl Remembered for Person {
         self.outline.visit(words);
         self.attached.visit(words);
         words.vec2(&mut self.extent_m);
+        words.f64(&mut self.shown_top_m);
         self.observed.visit(words);
     }
 }
@@ -161,6 +166,7 @@ impl Person {
             outline: Outline::new(&numbers.usual),
             attached: Attached::default(),
             extent_m: DVec2::splat(WIDTH_M),
+            shown_top_m: HEIGHT_MEAN_M,
             observed: Observations::default(),
         }
     }
@@ -244,6 +250,7 @@ impl Person {
             position_m: self.filter.position_m(),
             velocity_mps: self.filter.velocity_mps(),
             height_m: self.height.mean_m(),
+            shown_top_m: self.shown_top_m,
             diagonal_m: self.extent_m.length(),
         }
     }
@@ -344,6 +351,14 @@ impl Person {
         }
         let new = 1.0 - (-step_s / BOX_AVERAGE_S).exp();
         self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
+        // What shows no more than the part of a body that beams meet may be a body.
+        let height_m = self.height.mean_m();
+        if !view.beams_known {
+            self.shown_top_m = height_m;
+        } else if view.top_m > SHOWN_SHARE * height_m {
+            let new = new.max(1.0 / f64::from(self.matches));
+            self.shown_top_m += (detection.top_m * height_m / view.top_m - self.shown_top_m) * new;
+        }
     }
 
     /// Learns the outline from a detection in free sight, where it is known which way the body faces.
