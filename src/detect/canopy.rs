@@ -2,7 +2,7 @@
 
 use super::evidence::POINTS_MIN;
 use super::part::Part;
-use crate::geometry::{DVec2, DVec3};
+use crate::geometry::{Aabb, DVec3};
 
 /// An open umbrella is so high from the rim to the top, and somewhat less than a hand is higher than the head.
 const CANOPY_M: f64 = 0.25;
@@ -12,7 +12,6 @@ const WIDE_M: f64 = 0.9;
 const TRUNK_M: f64 = 0.7;
 /// A trunk begins and ends at these shares of the highest point.
 const TRUNK_SHARES: [f64; 2] = [0.37, 0.75];
-
 /// Nobody's head begins so high above the floor.
 const OVERHEAD_M: f64 = 1.75;
 
@@ -24,13 +23,10 @@ pub(super) fn is_overhead(moved_m: &[DVec3], part: &Part) -> bool {
 /// Takes away what is wide at the top alone, over one trunk.
 pub(super) fn without_canopy(moved_m: &[DVec3], part: &mut Part) {
     let diagonal_m = |low_m: f64, high_m: f64| {
-        let within =
-            part.points.iter().map(|&i| moved_m[i as usize]).filter(|p| p.z >= low_m && p.z <= high_m);
-        let (mut least_m, mut most_m, mut points) = (DVec2::INFINITY, DVec2::NEG_INFINITY, 0);
-        for point_m in within.map(|p| p.truncate()) {
-            (least_m, most_m, points) = (least_m.min(point_m), most_m.max(point_m), points + 1);
-        }
-        (points >= POINTS_MIN).then(|| (most_m - least_m).length())
+        let points_m = part.points.iter().map(|&i| moved_m[i as usize]);
+        let within_m = points_m.filter(|p| p.z >= low_m && p.z <= high_m);
+        let is_enough = within_m.clone().nth(POINTS_MIN - 1).is_some();
+        is_enough.then(|| Aabb::around(within_m).size_m().truncate().length())
     };
     let rim_m = part.top_m - CANOPY_M;
     let [hips_m, shoulders_m] = TRUNK_SHARES.map(|share| share * part.top_m);
@@ -45,6 +41,7 @@ pub(super) fn without_canopy(moved_m: &[DVec3], part: &mut Part) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::DVec2;
 
     /// Somebody of 1.7 m: 40 points from the floor to the head.
     fn body(x: f64) -> Vec<DVec3> {
