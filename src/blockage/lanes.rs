@@ -19,7 +19,7 @@ pub(crate) fn larger(a: f32, b: f32) -> f32 {
 
 /// A bit for each number that is not negative.
 #[inline(always)]
-pub(super) fn bits_of(numbers: &[f32; WORD]) -> u32 {
+pub(crate) fn bits_of(numbers: &[f32; WORD]) -> u32 {
     let mut bits = [0; WORD];
     for k in 0..WORD {
         bits[k] = if numbers[k] >= 0.0 { 1_u32 << k } else { 0 };

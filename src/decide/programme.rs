@@ -3,7 +3,8 @@
 //! What is decided now is decided for all samples alike, for nobody knows yet which of them will come true. What is decided
 //! later is decided for each sample by itself: frames come every 100 ms and tell more, so a later decision knows its future far
 //! better than one of now. This is hindsight optimisation (Chong, Givan and Chang 2000): it bounds the cost from below, and waits
-//! where waiting costs nothing. Access points behind one person fail together, for their samples are the same.
+//! where waiting costs nothing. After the last step everybody is taken to walk straight on for a second: whose link is cut then
+//! will have to change once more. Access points behind one person fail together, for their samples are the same.
 
 use crate::STEP_S;
 use crate::blockage::lanes::WORD;
@@ -28,7 +29,7 @@ pub(super) struct Values {
 /// Its working memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Programme {
-    /// By step, way and sample: the cost from that step on, and after the last step none.
+    /// By step, way and sample: the cost from that step on; after the last step that of one more change where the way is cut soon.
     value_s: Vec<f32>,
     /// By sample: that of the best way.
     least_s: Vec<f32>,
@@ -65,6 +66,12 @@ impl Programme {
         let of_step = ways.len() * samples;
         self.value_s.clear();
         self.value_s.resize((MOMENTS + 1) * of_step, 0.0);
+        let after_s = self.value_s[MOMENTS * of_step..].chunks_exact_mut(samples);
+        for (after_s, &ap) in after_s.zip(ways) {
+            let soon = outages.beyond(ap, person);
+            let cut = (0..samples).filter(|k| has(soon, *k));
+            cut.for_each(|k| after_s[k] = numbers.change_s);
+        }
         for step in (0..MOMENTS).rev() {
             self.find_least(&numbers, ways, person, outages, step);
             let (here_s, next_s) = self.value_s[step * of_step..].split_at_mut(of_step);

@@ -54,6 +54,18 @@ fn a_link_that_will_surely_be_out_is_left_for_one_that_will_not() {
 }
 
 #[test]
+fn of_two_that_are_in_sight_the_one_that_stays_so_longer_is_taken() {
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    out(&mut outages, 0, 1..=5, SAMPLES);
+    let target =
+        |outages: &Outages| decider(commands()).advise(0, &loss(0.0, 1.0), 0, outages).unwrap().target;
+    assert_eq!(target(&outages), Some(1));
+    // Somebody is about to walk between the first of them and the device, after the last step.
+    (0..SAMPLES / 4).for_each(|sample| outages.set_beyond(1, 0, sample));
+    assert_eq!(target(&outages), Some(2));
+}
+
+#[test]
 fn who_can_wait_waits_for_a_better_forecast() {
     let mut outages = Outages::new(3, 1, SAMPLES);
     // In half of the samples, and not soon.

@@ -6,6 +6,7 @@ pub mod models;
 mod table;
 mod body;
 mod outages;
+mod beyond;
 mod links;
 mod bindings;
 

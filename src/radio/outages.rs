@@ -11,6 +11,8 @@ pub struct Outages {
     samples: usize,
     words: usize,
     bits: Vec<u32>,
+    /// By link.
+    beyond: Vec<u32>,
 }
 
 impl Outages {
@@ -27,11 +29,18 @@ impl Outages {
         self.bits[first + sample / WORD] |= 1 << (sample % WORD);
     }
 
+    /// Somebody cuts a link of a sample soon after the last step.
+    pub fn set_beyond(&mut self, access_point: usize, person: usize, sample: usize) {
+        self.beyond_mut(access_point, person)[sample / WORD] |= 1 << (sample % WORD);
+    }
+
     /// No link is out.
     pub(super) fn begin(&mut self, access_points: usize, people: usize, samples: usize) {
         (self.people, self.samples, self.words) = (people, samples, samples.div_ceil(WORD));
         self.bits.clear();
         self.bits.resize(access_points * people * MOMENTS * self.words, 0);
+        self.beyond.clear();
+        self.beyond.resize(access_points * people * self.words, 0);
     }
 
     /// Notes the samples of a link that lose the margin or more.
@@ -48,6 +57,19 @@ impl Outages {
             let bits = losses_db.iter().enumerate();
             self.bits[first + word] = bits.fold(0, |all, (k, db)| all | u32::from(*db >= margin_db) << k);
         }
+    }
+
+    /// To note the samples in which a link is cut soon after the last step.
+    pub(super) fn beyond_mut(&mut self, access_point: usize, person: usize) -> &mut [u32] {
+        let first = (access_point * self.people + person) * self.words;
+        &mut self.beyond[first..first + self.words]
+    }
+
+    /// The samples in which somebody cuts a link within a second after the last step, if everybody walks straight on from there; in
+    /// words of 32.
+    pub fn beyond(&self, access_point: usize, person: usize) -> &[u32] {
+        let first = (access_point * self.people + person) * self.words;
+        &self.beyond[first..first + self.words]
     }
 
     /// How many people the links end at, in order of confirmed tracks.

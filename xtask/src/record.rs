@@ -59,7 +59,7 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 50] = [
+const JOBS: [Job; 52] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
@@ -87,7 +87,9 @@ const JOBS: [Job; 50] = [
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", 5, Needs::Nothing, glass::glass),
     job("gestures", "people who talk with their hands beside a sensor", 10, Needs::Nothing, gestures::gestures),
     job("cut", "what a frame gains that closes as soon as the part with people has", 3, Needs::Nothing, crowds::cut),
-    job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", 30, Needs::Data, crowds::network),
+    job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", 20, Needs::Nothing, crowds::network),
+    job("network-sweeps", "the same over margins, procedures, crowds, access points and models", 10, Needs::Nothing, crowds::network_sweeps),
+    job("network-losses", "the dB told about fades, and the shape of real ones", 8, Needs::Data, crowds::network_losses),
     job("bindings", "which device is carried by whom, from the power heard", 4, Needs::Nothing, crowds::bindings),
     job("live", "ten minutes live, four times over, the page open or not", 44, Needs::Asking, live::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", 25, Needs::Asking, nodes::nodes),

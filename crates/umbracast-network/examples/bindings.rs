@@ -17,7 +17,7 @@ use umbracast::track::Track;
 use umbracast::{Config, Health, Mode, Pipeline};
 use umbracast_eval::run::chain::{empty_frames, push};
 use umbracast_network::reports::{self, LATE_NS};
-use umbracast_network::truth::{Air, TICK_NS, Traces, TruthModel};
+use umbracast_network::truth::{Air, Counted, TICK_NS, Traces, TruthModel};
 use umbracast_sim::crowd::{Preset, strolling};
 use umbracast_sim::scene::Scene;
 use umbracast_sim::sensor::Sensors;
@@ -89,7 +89,8 @@ fn scene(people: usize, seed: u64) -> Result<(Vec<Share>, Share), String> {
         Scene::in_hall(strolling(Preset::Orca03, people, RADIUS_M, seed, SECONDS), site, &sensors, seed);
     let ticks = (SECONDS * 100) as usize;
     let airs = [Air::of(site, TruthModel::ModelB)];
-    let [traces] = &Traces::of_scene(site, scene.walkers(), ticks, &airs, false)[..] else {
+    let counted = Counted { own_body: false, reflections: false };
+    let [traces] = &Traces::of_scene(site, scene.walkers(), ticks, &airs, counted)[..] else {
         return Err("one air has one truth".to_owned());
     };
     let device_of = |person: usize| FIRST_DEVICE + (person * 7 + 3) as u64 % people as u64;

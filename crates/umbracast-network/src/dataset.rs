@@ -21,7 +21,7 @@ use umbracast_sim::sensor::Sensors;
 
 use crate::hall::Crowd;
 use crate::reports::{self, LATE_NS};
-use crate::truth::{Air, TICK_NS, TICK_S, Traces, TruthModel};
+use crate::truth::{Air, Counted, TICK_NS, TICK_S, Traces, TruthModel};
 
 /// The seed of the empty hall's noise, and how many frames are recorded of it.
 const EMPTY_SEED: u64 = 200_000;
@@ -95,7 +95,13 @@ impl<'a> DataSet<'a> {
         recording.finish()?;
         let own_body = site.ue.forward_m != 0.0 || site.ue.left_m != 0.0;
         let airs = [Air::of(site, model)];
-        let traces = Traces::of_scene(site, simulated.walkers(), ticks, &airs, own_body);
+        let traces = Traces::of_scene(
+            site,
+            simulated.walkers(),
+            ticks,
+            &airs,
+            Counted { own_body, reflections: false },
+        );
         for traces in &traces {
             self.radio.write(&radio_of(scene, site, traces))?;
             self.labels.write(&labels_of(scene, site, traces))?;

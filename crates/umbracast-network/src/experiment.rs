@@ -12,7 +12,7 @@ use crate::foreseen::{Followed, Foreseen, Foreteller};
 use crate::hall::{Crowd, Hall, Seen};
 use crate::oracle::{best_of_all, oracle};
 use crate::policy::{Advised, Policy, Reactive};
-use crate::truth::{Air, Traces};
+use crate::truth::{Air, Counted, Traces};
 
 /// Policies begin when everybody has been followed for so long.
 pub(crate) const BEGIN_TICKS: usize = 150;
@@ -73,7 +73,8 @@ impl Spec<'_> {
     /// One tally a case and policy, in the order of rows.
     fn scene(&self, seed: u64) -> Result<Vec<Tally>, Error> {
         let seen = self.hall.see(self.crowd, seed)?;
-        let truths = Truths::of(self.hall.config(), &self.cases, &seen)?;
+        let reflections = self.policies.contains(&Policy::Beams);
+        let truths = Truths::of(self.hall.config(), &self.cases, &seen, reflections)?;
         let mut forecasts: Option<(Case, Forecasts)> = None;
         let mut tallies = Vec::new();
         for case in &self.cases {
@@ -136,11 +137,11 @@ struct Forecasts {
 pub(crate) struct Truths(Vec<(Air, usize, Traces)>);
 
 impl Truths {
-    /// Of a scene that was seen.
+    /// Of a scene that was seen, with the ways by walls where somebody asks for `reflections`.
     ///
     /// # Errors
     /// More access points than the site has.
-    pub(crate) fn of(hall: &Config, cases: &[Case], seen: &Seen) -> Result<Self, Error> {
+    pub(crate) fn of(hall: &Config, cases: &[Case], seen: &Seen, reflections: bool) -> Result<Self, Error> {
         let mut airs: Vec<(Config, Vec<Air>)> = Vec::new();
         for case in cases {
             let config = case.config(hall)?;
@@ -157,7 +158,8 @@ impl Truths {
         for (config, airs) in airs {
             let site = &config.site;
             let own_body = site.ue.forward_m != 0.0 || site.ue.left_m != 0.0;
-            let traces = Traces::of_scene(site, &seen.walkers, seen.ticks, &airs, own_body);
+            let counted = Counted { own_body, reflections };
+            let traces = Traces::of_scene(site, &seen.walkers, seen.ticks, &airs, counted);
             let count = site.access_points.len();
             truths.extend(airs.into_iter().zip(traces).map(|(air, traces)| (air, count, traces)));
         }

@@ -15,7 +15,7 @@ use crate::case::Case;
 use crate::experiment::{BEGIN_TICKS, Spec, Truths};
 use crate::foreseen::Foreteller;
 use crate::hall::Seen;
-use crate::truth::{TICK_NS, Traces};
+use crate::truth::{TICK_NS, Traces, TruthModel};
 
 /// A fade is deeper.
 const FADE_DB: f64 = 10.0;
@@ -44,6 +44,8 @@ pub struct Compared {
     /// The first of these again: sum of squared differences of what the trunk and head lose that stand at everybody's true
     /// place, dB^2. No forecast can do better with such bodies.
     pub placed_db2: f64,
+    /// By other model of the truth: sum of squared differences to this one on the same meshes, dB^2, and of how many.
+    pub apart: Vec<(TruthModel, f64, u64)>,
     /// How long the losses of each frame took.
     pub took: Vec<Duration>,
 }
@@ -64,6 +66,11 @@ impl Compared {
         (self.placed_db2 / self.count[0].max(1) as f64).sqrt()
     }
 
+    /// By other model of the truth that was asked for: how far it is from this one on the same meshes, dB (root mean square).
+    pub fn rmse_apart_db(&self) -> impl Iterator<Item = (TruthModel, f64)> {
+        self.apart.iter().map(|(model, db2, count)| (*model, (db2 / *count.max(&1) as f64).sqrt()))
+    }
+
     /// How long the losses of a frame took at this share of frames, milliseconds.
     pub fn took_ms(&self, share: f64) -> f64 {
         let mut took = self.took.clone();
@@ -80,6 +87,9 @@ impl Compared {
             self.count[ahead] += other.count[ahead];
         }
         self.placed_db2 += other.placed_db2;
+        for (sum, of) in self.apart.iter_mut().zip(other.apart) {
+            (sum.1, sum.2) = (sum.1 + of.1, sum.2 + of.2);
+        }
         self.took.extend(other.took);
     }
 }
@@ -91,15 +101,20 @@ impl Compared {
 pub fn compare(spec: &Spec, progress: impl Fn() + Sync) -> Result<Vec<Compared>, Error> {
     let scene = |seed: u64| -> Result<Vec<Compared>, Error> {
         let seen = spec.hall.see(spec.crowd, seed)?;
-        let truths = Truths::of(spec.hall.config(), &spec.cases, &seen)?;
+        let truths = Truths::of(spec.hall.config(), &spec.cases, &seen, false)?;
         let mut all = Vec::new();
         for case in &spec.cases {
             for spread in [false, true] {
                 let mut config = case.config(spec.hall.config())?;
                 let radios = config.site.access_points.iter_mut().filter_map(|ap| ap.radio.as_mut());
                 radios.for_each(|radio| radio.fade_spread = spread);
-                let traces = truths.of_case(&config, case);
-                all.push(Compared { case: Some(*case), ..of_scene(&config, &seen, traces, seed, spread)? });
+                let others =
+                    spec.cases.iter().filter(|other| other.foresees_as(case) && other.truth != case.truth);
+                let others: Vec<_> =
+                    others.map(|other| (other.truth, truths.of_case(&config, other))).collect();
+                let compared =
+                    of_scene(&config, &seen, truths.of_case(&config, case), &others, seed, spread)?;
+                all.push(Compared { case: Some(*case), ..compared });
             }
         }
         progress();
@@ -117,11 +132,15 @@ fn of_scene(
     config: &Config,
     seen: &Seen,
     traces: &Traces,
+    others: &[(TruthModel, &Traces)],
     seed: u64,
     spread: bool,
 ) -> Result<Compared, Error> {
     let mut compared = Compared { spread, ..Compared::default() };
     let truth_db = about_fades(traces, seed, spread, &mut compared.fades);
+    if !spread {
+        compared.apart = others.iter().map(|(model, other)| apart(*model, &truth_db, other)).collect();
+    }
     let at =
         |tick, access_point, person| (tick * traces.access_points + access_point) * traces.people + person;
     let mut foreteller = Foreteller::new(config, None)?;
@@ -156,6 +175,17 @@ fn of_scene(
         }
     }
     Ok(compared)
+}
+
+/// How far another model of the truth is from this one about its fades.
+fn apart(model: TruthModel, truth_db: &[f32], other: &Traces) -> (TruthModel, f64, u64) {
+    let (people, links) = (other.people, other.access_points * other.people);
+    let about = truth_db.iter().enumerate().filter(|(_, db)| db.is_finite());
+    let squares = about.map(|(at, db)| {
+        let other_db = other.loss_db(at / links, at % links / people, at % people);
+        (f64::from(*db) - other_db).powi(2)
+    });
+    squares.fold((model, 0.0, 0), |(model, sum, count), square| (model, sum + square, count + 1))
 }
 
 /// Everybody where they are, as a trunk and a head.

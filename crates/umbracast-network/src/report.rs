@@ -161,6 +161,7 @@ pub fn to_text(rows: &[Row]) -> String {
 pub fn fades_to_text(all: &[Compared]) -> String {
     let mut text = "about fades of 10 dB and more, 400 ms to each side: RMSE of the median told, share of truths within 10 to 90 %\n\
                     true places: RMSE of a trunk and a head by the same integral where everybody is in truth\n\
+                    same meshes: RMSE of the other models of the truth, which see every arm and leg where it is\n\
                     spread: that of real fades about a model is in what is told and in the truth\n"
         .to_owned();
     for of in all {
@@ -173,8 +174,12 @@ pub fn fades_to_text(all: &[Compared]) -> String {
         }
         let (placed_db, median_ms, most_ms) = (of.rmse_placed_db(), of.took_ms(0.5), of.took_ms(0.99));
         text += &format!(
-            "; true places {placed_db:.2} dB; {median_ms:.2} ms a frame (median), {most_ms:.2} ms (99 %)\n"
+            "; true places {placed_db:.2} dB; {median_ms:.2} ms a frame (median), {most_ms:.2} ms (99 %)"
         );
+        for (model, apart_db) in of.rmse_apart_db() {
+            text += &format!("; same meshes by {} {apart_db:.2} dB", model.name());
+        }
+        text.push('\n');
     }
     text
 }
@@ -190,6 +195,9 @@ pub fn fades_to_json(all: &[Compared]) -> Value {
             value[format!("coverage_{}_ms", 100 * steps)] = of.coverage(ahead).into();
         }
         value["rmse_true_places_db"] = of.rmse_placed_db().into();
+        for (model, apart_db) in of.rmse_apart_db() {
+            value[format!("rmse_same_meshes_by_{}_db", model.name().replace('-', "_"))] = apart_db.into();
+        }
         value["losses_ms_median"] = of.took_ms(0.5).into();
         value["losses_ms_p99"] = of.took_ms(0.99).into();
         value

@@ -50,44 +50,59 @@ pub(crate) struct Outline {
     extents: Vec<[f64; 2]>,
 }
 
+/// The mesh of a body at an instant, with what does not depend on the path that it is looked at along.
+#[derive(Debug, Clone)]
+pub(crate) struct Body {
+    vertices_m: Vec<DVec3>,
+    middle_m: DVec2,
+    bottom_m: f64,
+    top_m: f64,
+}
+
+impl Body {
+    /// `None` of a mesh without vertices: who is not there.
+    pub(crate) fn new(vertices_m: Vec<DVec3>) -> Option<Self> {
+        let first = *vertices_m.first()?;
+        let sum_m: DVec3 = vertices_m.iter().sum();
+        let [bottom_m, top_m] =
+            vertices_m.iter().fold([first.z; 2], |[low, high], v| [low.min(v.z), high.max(v.z)]);
+        let middle_m = sum_m.truncate() / vertices_m.len() as f64;
+        Some(Self { vertices_m, middle_m, bottom_m, top_m })
+    }
+}
+
 impl Outline {
-    /// Looks at a mesh along the path from `tx_m` to `rx_m`. False where it is not between both, or too far aside to matter.
-    pub(crate) fn look(&mut self, tx_m: DVec3, rx_m: DVec3, vertices: &[DVec3], aside_m: f64) -> bool {
-        let Some(first) = vertices.first() else { return false };
+    /// Looks at a body along the path from `tx_m` to `rx_m`. False where it is not between both, or too far aside to matter.
+    pub(crate) fn look(&mut self, tx_m: DVec3, rx_m: DVec3, body: &Body, aside_m: f64) -> bool {
         let way_m = (tx_m - rx_m).truncate();
-        let (length_m, slope) = (way_m.length(), (tx_m.z - rx_m.z) / way_m.length());
+        let length_m = way_m.length();
+        let slope = (tx_m.z - rx_m.z) / length_m;
         let along = way_m / length_m;
-        let off_m = |v: DVec3| v.truncate() - rx_m.truncate();
-        // A quick look at one vertex: no body is wider than a metre and a half.
-        let rough_m = off_m(*first);
-        if along.perp_dot(rough_m).abs() > aside_m + 1.5 {
-            return false;
-        }
-        let mean_m = vertices.iter().map(|v| off_m(*v)).sum::<DVec2>() / vertices.len() as f64;
-        let at_m = along.dot(mean_m);
-        if at_m < NEAREST_M || at_m > length_m - NEAREST_M || along.perp_dot(mean_m).abs() > aside_m {
+        let off_m = body.middle_m - rx_m.truncate();
+        let at_m = along.dot(off_m);
+        if at_m < NEAREST_M || at_m > length_m - NEAREST_M || along.perp_dot(off_m).abs() > aside_m {
             return false;
         }
         let slant = slope.hypot(1.0);
         (self.to_rx_m, self.to_tx_m) = (at_m * slant, (length_m - at_m) * slant);
         let path_m = rx_m.z + slope * at_m;
-        let bottom_m = vertices.iter().map(|v| v.z).fold(f64::MAX, f64::min);
-        let top_m = vertices.iter().map(|v| v.z).fold(f64::MIN, f64::max);
+        let [bottom_m, top_m] = [body.bottom_m, body.top_m];
         if path_m > top_m + 1.0 {
             return false;
         }
         let count = ((top_m - bottom_m) / STRIPE_M).ceil().max(1.0) as usize;
         self.extents.clear();
         self.extents.resize(count, [f64::MAX, f64::MIN]);
-        for v in vertices {
-            let across_m = along.perp_dot(off_m(*v));
+        let of_rx_m = along.perp_dot(rx_m.truncate());
+        for v in &body.vertices_m {
+            let across_m = along.x * v.y - along.y * v.x - of_rx_m;
             let extent = &mut self.extents[(((v.z - bottom_m) / STRIPE_M) as usize).min(count - 1)];
             *extent = [extent[0].min(across_m), extent[1].max(across_m)];
         }
         self.stripes.clear();
         for (i, [right_m, left_m]) in self.extents.iter().enumerate().filter(|(_, [r, l])| r < l) {
-            let low_m = bottom_m + i as f64 * STRIPE_M - path_m;
-            self.stripes.push([*right_m, *left_m, low_m, (low_m + STRIPE_M).min(top_m - path_m)]);
+            let at_m = |edge: usize| (bottom_m + edge as f64 * STRIPE_M).min(top_m) - path_m;
+            self.stripes.push([*right_m, *left_m, at_m(i), at_m(i + 1)]);
         }
         !self.stripes.is_empty()
     }
@@ -108,13 +123,14 @@ impl Outline {
             let detour_m = round(self.to_tx_m) + round(self.to_rx_m);
             (FRAC_PI_2 * (PI / wavelength_m * detour_m).sqrt()).atan().copysign(off_m) / PI
         };
-        let share: f64 = self
-            .stripes
-            .iter()
-            .map(|[right_m, left_m, low_m, high_m]| {
-                (signed(*left_m) - signed(*right_m)) * (signed(*high_m) - signed(*low_m))
-            })
-            .sum();
+        // Most stripes begin where the one below ends.
+        let mut below = (f64::NAN, 0.0);
+        let mut share = 0.0;
+        for [right_m, left_m, low_m, high_m] in &self.stripes {
+            let low = if below.0 == *low_m { below.1 } else { signed(*low_m) };
+            below = (*high_m, signed(*high_m));
+            share += (signed(*left_m) - signed(*right_m)) * (below.1 - low);
+        }
         (-20.0 * (1.0 - share).max(1e-6).log10()).max(0.0)
     }
 
@@ -166,9 +182,10 @@ mod tests {
     use super::*;
 
     /// Corners of a thin board across the x axis, dense enough for every stripe.
-    fn board(at_m: DVec2, half_m: f64, top_m: f64) -> Vec<DVec3> {
+    fn board(at_m: DVec2, half_m: f64, top_m: f64) -> Body {
         let heights = (0..=(top_m / 0.02) as usize).map(|i| i as f64 * 0.02);
-        heights.flat_map(|z| [-half_m, half_m].map(|y| DVec3::new(at_m.x, at_m.y + y, z))).collect()
+        let corners = heights.flat_map(|z| [-half_m, half_m].map(|y| DVec3::new(at_m.x, at_m.y + y, z)));
+        Body::new(corners.collect()).unwrap()
     }
 
     #[test]

@@ -22,7 +22,7 @@ const WINDOW: usize = 3;
 pub fn csv(spec: &Spec, case: &Case, seed: u64) -> Result<String, Error> {
     let seen = spec.hall.see(spec.crowd, seed)?;
     let config = case.config(spec.hall.config())?;
-    let truths = Truths::of(spec.hall.config(), std::slice::from_ref(case), &seen)?;
+    let truths = Truths::of(spec.hall.config(), std::slice::from_ref(case), &seen, false)?;
     let traces = truths.of_case(&config, case);
     let mut foreteller = Foreteller::new(&config, None)?;
     let mut frames = seen.ours.iter().peekable();

@@ -7,8 +7,8 @@ use umbracast_sim::body::Walker;
 
 use crate::fresnel::Fresnel;
 use crate::reflection::Wall;
-use crate::silhouette::Outline;
 pub use crate::silhouette::TruthModel;
+use crate::silhouette::{Body, Outline};
 
 /// Between two instants of the truth.
 pub const TICK_NS: i64 = 10_000_000;
@@ -37,6 +37,15 @@ impl Air {
     }
 }
 
+/// What else than others' bodies between both ends counts.
+#[derive(Debug, Clone, Copy)]
+pub struct Counted {
+    /// The owner's own body.
+    pub own_body: bool,
+    /// The ways by a wall. Without them [`Traces::reflected_db`] is infinite.
+    pub reflections: bool,
+}
+
 /// Losses of all links of a scene.
 #[derive(Debug, Clone)]
 pub struct Traces {
@@ -58,16 +67,16 @@ pub struct Traces {
 
 impl Traces {
     /// Of a scene's bodies, for `ticks` instants, one for each of `airs` (access points without a radio lose nothing).
-    /// `own_body` says whether the owner's own body counts.
     pub fn of_scene(
         site: &Site,
         walkers: &[Walker],
         ticks: usize,
         airs: &[Air],
-        own_body: bool,
+        counted: Counted,
     ) -> Vec<Self> {
         let fresnel = Fresnel::new();
-        let view = View { site, airs, own_body, fresnel: &fresnel, walls: Wall::of_hall(&site.hall) };
+        let walls = if counted.reflections { Wall::of_hall(&site.hall) } else { Vec::new() };
+        let view = View { site, airs, own_body: counted.own_body, fresnel: &fresnel, walls };
         let instants: Vec<Instant> =
             (0..ticks).into_par_iter().map(|tick| view.at(walkers, tick as i64 * TICK_NS)).collect();
         let of_air = |air: usize| {
@@ -135,10 +144,12 @@ struct View<'a> {
 impl View<'_> {
     fn at(&self, walkers: &[Walker], time_ns: i64) -> Instant {
         let states: Vec<_> = walkers.iter().map(|walker| walker.state_at(time_ns)).collect();
-        let mut meshes = vec![Vec::new(); walkers.len()];
-        for (mesh, walker) in meshes.iter_mut().zip(walkers) {
-            walker.mesh_at(time_ns, mesh);
-        }
+        let body = |walker: &Walker| {
+            let mut mesh = Vec::new();
+            walker.mesh_at(time_ns, &mut mesh);
+            Body::new(mesh)
+        };
+        let bodies: Vec<Option<Body>> = walkers.iter().map(body).collect();
         let ue = &self.site.ue;
         let ue_m = |person: usize| {
             states[person].map(|state| {
@@ -165,7 +176,7 @@ impl View<'_> {
                         [ap_m, ue_m],
                         access_point,
                         person,
-                        &meshes,
+                        &bodies,
                         &mut losses_db,
                     );
                 }
@@ -181,7 +192,7 @@ impl View<'_> {
                                 ends_m,
                                 access_point,
                                 person,
-                                &meshes,
+                                &bodies,
                                 &mut ways_db,
                             );
                         }
@@ -204,11 +215,12 @@ impl View<'_> {
         [tx_m, rx_m]: [DVec3; 2],
         access_point: usize,
         person: usize,
-        meshes: &[Vec<DVec3>],
+        bodies: &[Option<Body>],
         losses_db: &mut [f64],
     ) {
-        for (body, mesh) in meshes.iter().enumerate() {
-            if (body == person && !self.own_body) || !outline.look(tx_m, rx_m, mesh, ASIDE_M) {
+        for (of, body) in bodies.iter().enumerate() {
+            let Some(body) = body.as_ref().filter(|_| of != person || self.own_body) else { continue };
+            if !outline.look(tx_m, rx_m, body, ASIDE_M) {
                 continue;
             }
             for (air, loss_db) in self.airs.iter().zip(losses_db.iter_mut()) {

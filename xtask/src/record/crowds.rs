@@ -214,10 +214,16 @@ fn losses(report: &str) -> Vec<(String, [String; 3])> {
     rows
 }
 
-/// Policies of changing access points, in closed loop; then sweeps, each model as truth and as predictor, and the dB told.
+/// Seeds of the closed loop.
+const NETWORK_SEED: &str = "220000";
+
+/// Policies of changing access points, in closed loop.
 pub fn network(book: &mut Book) -> Result<()> {
-    let first = "220000";
-    book.umbracast_says(["network", "--scenes", "20", "--seed", first])?;
+    book.umbracast_says(["network", "--scenes", "20", "--seed", NETWORK_SEED])
+}
+
+/// The same over margins, procedures, crowds and access points, devices in the hand, and each model as truth and as predictor.
+pub fn network_sweeps(book: &mut Book) -> Result<()> {
     let few = "--policies a3-60-40,conditional-60-40,forecast,oracle --carrier 28 --seed 220100 --scenes 4";
     for sweep in [
         "--truth edges --margin 5,10,15,20",
@@ -231,9 +237,14 @@ pub fn network(book: &mut Book) -> Result<()> {
             ["network"].into_iter().chain([sweep, few].into_iter().flat_map(str::split_whitespace)),
         )?;
     }
-    book.umbracast_says(["network", "--losses", "--scenes", "6", "--seed", first])?;
+    Ok(())
+}
+
+/// The dB told about fades, and the shape of real ones.
+pub fn network_losses(book: &mut Book) -> Result<()> {
+    book.umbracast_says(["network", "--losses", "--scenes", "6", "--seed", NETWORK_SEED])?;
     let many = "--people 50 --access-points 8 --carrier 28 --truth edges";
-    let losses = ["network", "--losses", "--scenes", "1", "--seed", first];
+    let losses = ["network", "--losses", "--scenes", "1", "--seed", NETWORK_SEED];
     book.umbracast_says(losses.into_iter().chain(many.split_whitespace()))?;
     let traces = book.data("immerse/traces.csv")?;
     book.umbracast_says(["network".into(), "--shape".into(), traces])
