@@ -222,7 +222,7 @@ pub struct Run {
     /// Weights of the LSTM in place of the embedded ones.
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
-    /// What access points heard of devices, CSV or Parquet with the columns `time_ns`, `access_point`, `device`, `power_dbm`, and
+    /// The power that access points received from devices, CSV or Parquet with the columns `time_ns`, `access_point`, `device`, `power_dbm`, and
     /// `scene` where there are several. Default: what the recordings hold. The table `bindings` says who carries which device.
     #[arg(long, value_name = "FILE")]
     pub reports: Option<PathBuf>,

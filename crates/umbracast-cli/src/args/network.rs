@@ -59,7 +59,7 @@ pub struct Network {
     /// Devices are 0.3 m ahead of their owners, whose own bodies then block too.
     #[arg(long)]
     pub own_body: bool,
-    /// Compare the dB told with those that came, about fades, instead of playing policies.
+    /// Instead of playing policies, compare the predicted losses with the true ones about fades.
     #[arg(long, conflicts_with = "policies")]
     pub losses: bool,
     /// Write the losses of every scene over time, of the first case alone, instead of playing policies: trace-SEED.csv in
@@ -73,13 +73,13 @@ pub struct Network {
     /// With --dataset: every table as CSV too.
     #[arg(long, requires = "dataset")]
     pub csv: bool,
-    /// Compare the losses told with measured ones instead: recordings, or captures, of a site whose access points have radios.
-    /// Power comes from --reports, or from the recordings.
+    /// Instead of playing policies, compare the predicted losses with measured ones: recordings or captures of a site
+    /// whose access points have radios. Power comes from --reports, or from the recordings.
     #[arg(long, value_name = "INPUT", num_args = 1.., conflicts_with_all = ["policies", "losses", "trace", "out", "dataset"])]
     pub measured: Vec<PathBuf>,
     #[command(flatten)]
     pub captures: CaptureArgs,
-    /// With --measured: what access points heard of devices, as for `run`.
+    /// With --measured: the power that access points received from devices, as for `run`.
     #[arg(long, value_name = "FILE", requires = "measured")]
     pub reports: Option<PathBuf>,
     /// With --measured: the hall without people. Default: empty.mcap beside the recordings.
