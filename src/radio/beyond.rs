@@ -9,6 +9,7 @@ use crate::geometry::{DVec2, DVec3};
 /// The last step, and one before, which tell the velocity.
 const LAST: usize = MOMENTS - 1;
 const BEFORE: usize = LAST - 3;
+const BETWEEN: f64 = (LAST - BEFORE) as f64;
 /// Instants that are looked at, so many steps apart: between two of them nobody crosses a path.
 const INSTANTS: usize = 5;
 const STEPS_APART: f64 = 2.0;
@@ -70,19 +71,18 @@ impl Beyond {
 
 impl Straight {
     fn take(&mut self, p: &Trajectories, ue_share: f32) {
-        let a_step = |last: f64, before: f64| (last - before) / (LAST - BEFORE) as f64;
-        let velocity_m = (p.mean_m[LAST] - p.mean_m[BEFORE]) / (LAST - BEFORE) as f64;
+        let velocity_m = (p.mean_m[LAST] - p.mean_m[BEFORE]) / BETWEEN;
         self.mean_m = std::array::from_fn(|instant| p.mean_m[LAST] + steps_on(instant) * velocity_m);
         let [last_m, before_m] = [LAST, BEFORE].map(|step| p.spread[step].radius_m);
-        let grows_m = a_step(last_m, before_m).max(0.0);
+        let grows_m = (last_m - before_m).max(0.0) / BETWEEN;
         self.radius_m = std::array::from_fn(|instant| last_m + steps_on(instant) * grows_m);
-        let row = |step: usize| step * p.samples..(step + 1) * p.samples;
         for (axis, (off_m, drift_m)) in self.off_m.iter_mut().zip(&mut self.drift_m).enumerate() {
-            let [last, before] = [LAST, BEFORE].map(|step| &p.off_m[axis][row(step)]);
+            let [last, before] =
+                [LAST, BEFORE].map(|step| &p.off_m[axis][step * p.samples..(step + 1) * p.samples]);
             off_m.clear();
             off_m.extend_from_slice(last);
             drift_m.clear();
-            drift_m.extend(last.iter().zip(before).map(|(a, b)| (a - b) / (LAST - BEFORE) as f32));
+            drift_m.extend(last.iter().zip(before).map(|(a, b)| (a - b) / BETWEEN as f32));
         }
         let floor_m = p.floor_m[LAST] as f32;
         self.top_m.clear();
@@ -100,9 +100,10 @@ impl Straight {
         let along = way_m / length_m;
         let room_m = HALF_WIDTH_M + self.radius_m[instant] + q.radius_m[instant];
         let from_m = along.dot(off_m);
-        // The path comes down to a head's height on its last part.
-        let rises_m = ap_m.z - f64::from(q.ue_m.first().copied().unwrap_or_default());
-        let clear_m = ((ap_m.z - self.highest_m) / rises_m).clamp(0.0, 1.0) * length_m;
+        // A path from above comes down to a head's height on its last part; one from below is never clear.
+        let comes_down_m = ap_m.z - f64::from(q.ue_m.first().copied().unwrap_or_default());
+        let above_m = (ap_m.z - self.highest_m).max(0.0);
+        let clear_m = (above_m / comes_down_m.max(1e-3)).min(1.0) * length_m;
         along.perp_dot(off_m).abs() < room_m && from_m > clear_m - room_m && from_m < length_m + room_m
     }
 
@@ -127,7 +128,7 @@ impl Straight {
             for k in 0..WORD {
                 let (x, y) = (body_m[0] + bx[k] + on * dx[k], body_m[1] + by[k] + on * dy[k]);
                 let (to_x, to_y) = (aim_m[0] + ax[k] + on * ex[k], aim_m[1] + ay[k] + on * ey[k]);
-                // Everything is asked of what is a square of the path's length longer, or once its length.
+                // Each of these is not negative where it holds, in units of its own: no division, and one root.
                 let square = to_x * to_x + to_y * to_y;
                 let (along, aside) = (to_x * x + to_y * y, to_y * x - to_x * y);
                 let beside = half_m * square.sqrt() - aside.abs();
@@ -149,8 +150,9 @@ mod tests {
     use crate::radio::links::tests::somebody;
     use crate::{Config, STEP_S};
 
-    /// Who is on the line between (14, 0, 2) and somebody at (2, 0) so long after now.
-    fn marked(cuts_after_s: f64, at_x_m: f64) -> u32 {
+    /// The share of samples, in per cent, of which it is noted that somebody cuts the line between (14, 0) and somebody at (2, 0):
+    /// he is on it so long after now.
+    fn marked_from(ap_z: f64, cuts_after_s: f64, at_x_m: f64) -> u32 {
         let speed_mps = 1.5;
         let walks = somebody(0, DVec2::new(at_x_m, -speed_mps * cuts_after_s), DVec2::new(0.0, speed_mps));
         let stands = somebody(1, DVec2::new(2.0, 0.0), DVec2::ZERO);
@@ -162,8 +164,23 @@ mod tests {
         let (people, samples) = caster.drawn().unwrap();
         let (mut beyond, mut bits) = (Beyond::default(), vec![0; samples / WORD]);
         beyond.take(people, config.site.ue.height_share);
-        beyond.mark(DVec3::new(14.0, 0.0, 2.0), 1, &mut bits);
+        beyond.mark(DVec3::new(14.0, 0.0, ap_z), 1, &mut bits);
         bits.iter().map(|word| word.count_ones()).sum::<u32>() * 100 / samples as u32
+    }
+
+    fn marked(cuts_after_s: f64, at_x_m: f64) -> u32 {
+        marked_from(2.0, cuts_after_s, at_x_m)
+    }
+
+    #[test]
+    fn an_access_point_lower_than_the_device_is_cut_everywhere() {
+        let then_s = LAST as f64 * STEP_S + 0.6;
+        for ap_z in [0.5, 1.75 * Config::default().site.ue.height_share] {
+            for at_x_m in [4.0, 8.0, 12.0] {
+                let found = marked_from(ap_z, then_s, at_x_m);
+                assert!(found > 80, "{ap_z} m, {at_x_m} m: {found} %");
+            }
+        }
     }
 
     #[test]

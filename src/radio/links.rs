@@ -94,7 +94,8 @@ pub struct Fader {
     powers: Vec<f32>,
     losses_db: Vec<f32>,
     sorted_db: Vec<f32>,
-    beyond: Beyond,
+    /// Only where decisions are made of it.
+    beyond: Option<Beyond>,
     outages: Outages,
 }
 
@@ -138,7 +139,7 @@ impl Fader {
             powers: Vec::new(),
             losses_db: Vec::new(),
             sorted_db: Vec::new(),
-            beyond: Beyond::default(),
+            beyond: site.handover.map(|_| Beyond::default()),
             outages: Outages::default(),
         }
     }
@@ -161,13 +162,17 @@ impl Fader {
             self.turns.resize(people.len(), Default::default());
         }
         self.turns.iter_mut().for_each(|[cos, _]| cos.clear());
-        self.beyond.take(people, self.ue.height_share);
+        if let Some(beyond) = &mut self.beyond {
+            beyond.take(people, self.ue.height_share);
+        }
         let mut begin = 0;
         let mut link = 0;
         for access_point in 0..self.radios.len() {
             let Some(Antenna { place_m, .. }) = self.radios[access_point] else { continue };
             for person in 0..people.len() {
-                self.beyond.mark(place_m, person, self.outages.beyond_mut(access_point, person));
+                if let Some(beyond) = &self.beyond {
+                    beyond.mark(place_m, person, self.outages.beyond_mut(access_point, person));
+                }
                 let end = self.ends[link];
                 losses.push(self.of_link(access_point, person, people, begin..end, [samples, asked]));
                 (begin, link) = (end, link + 1);
@@ -358,7 +363,7 @@ impl Antenna {
 
 /// One standard deviation of the loss about a model that loses so much. A trunk and a head are not the body that walks there, and
 /// models of one body differ: in simulation two models of walking meshes scatter by 5 to 6 dB about ours at the bodies' true
-/// places, deep in the shadow (`umbracast network --losses`). Chosen on seeds from 132700 so that eight of ten losses lie within
+/// places, about fades (`umbracast network --losses`). Chosen on seeds from 132700 so that eight of ten losses lie within
 /// the 10 and 90 % told. With `fades` the spread of real fades is added: residuals of 1001 passages past a 5G
 /// millimetre-wave cell (IMMERSE, TU Dortmund 2024). Where a body costs next to nothing, so does the spread.
 fn spread_db(model_db: f64, fades: bool) -> f64 {

@@ -66,7 +66,7 @@ impl Outages {
     }
 
     /// The samples in which somebody cuts a link within a second after the last step, if everybody walks straight on from there; in
-    /// words of 32.
+    /// words of 32. None where the site does not say what changes cost, for nobody asks.
     pub fn beyond(&self, access_point: usize, person: usize) -> &[u32] {
         let first = (access_point * self.people + person) * self.words;
         &self.beyond[first..first + self.words]

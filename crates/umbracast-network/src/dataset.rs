@@ -95,13 +95,8 @@ impl<'a> DataSet<'a> {
         recording.finish()?;
         let own_body = site.ue.forward_m != 0.0 || site.ue.left_m != 0.0;
         let airs = [Air::of(site, model)];
-        let traces = Traces::of_scene(
-            site,
-            simulated.walkers(),
-            ticks,
-            &airs,
-            Counted { own_body, reflections: false },
-        );
+        let counted = Counted { own_body, reflections: false };
+        let traces = Traces::of_scene(site, simulated.walkers(), ticks, &airs, counted);
         for traces in &traces {
             self.radio.write(&radio_of(scene, site, traces))?;
             self.labels.write(&labels_of(scene, site, traces))?;

@@ -108,8 +108,10 @@ pub fn compare(spec: &Spec, progress: impl Fn() + Sync) -> Result<Vec<Compared>,
                 let mut config = case.config(spec.hall.config())?;
                 let radios = config.site.access_points.iter_mut().filter_map(|ap| ap.radio.as_mut());
                 radios.for_each(|radio| radio.fade_spread = spread);
-                let others =
-                    spec.cases.iter().filter(|other| other.foresees_as(case) && other.truth != case.truth);
+                // Those that differ from this case in nothing but the truth.
+                let others = spec.cases.iter().filter(|other| {
+                    other.truth != case.truth && Case { truth: case.truth, ..**other } == *case
+                });
                 let others: Vec<_> =
                     others.map(|other| (other.truth, truths.of_case(&config, other))).collect();
                 let compared =
