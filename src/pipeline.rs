@@ -6,7 +6,7 @@ use crate::detect::{Background, Clocks, Cluster, Clusterer, Detection, Measurer,
 use crate::forecast::{Forecast, Forecaster, Weights};
 use crate::lidar::{Views, is_time};
 use crate::mounting::Mountings;
-use crate::radio::{Binder, Binding, Fader, Loss, Outages, Report};
+use crate::radio::{Binder, Binding, Fader, Listener, Loss, Outages, Report};
 use crate::track::{Track, Tracker, Windows};
 use crate::{Config, Error, Frame, Health};
 
@@ -104,6 +104,7 @@ pub struct Pipeline {
     caster: Caster,
     fader: Fader,
     binder: Binder,
+    listener: Listener,
     decider: Decider,
     outcome: Outcome,
 }
@@ -135,6 +136,7 @@ impl Pipeline {
             caster: Caster::new(&config.blockage, &config.site),
             fader: Fader::new(&config.site),
             binder: Binder::new(&config.site),
+            listener: Listener::new(&config.site),
             decider: Decider::new(&config.site),
             outcome: Outcome::default(),
         })
@@ -284,6 +286,7 @@ impl Pipeline {
         self.caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
         self.fader.fade(&self.caster, &mut o.losses);
         self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
+        self.listener.sharpen(o.time_ns, &o.tracks, &self.caster, &self.binder, &mut o.blockages);
         self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
         o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());
         o
@@ -326,6 +329,7 @@ impl Pipeline {
         self.caster = Caster::new(&config.blockage, &config.site);
         self.fader = Fader::new(&config.site);
         self.binder = Binder::new(&config.site);
+        self.listener = Listener::new(&config.site);
         self.decider = Decider::new(&config.site);
     }
 }

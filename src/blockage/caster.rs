@@ -2,6 +2,7 @@
 
 use super::Blockage;
 use super::algorithm1::{self, PersonBox};
+use super::counts::Chances;
 use super::numbers::Numbers;
 use super::probability::Sampler;
 use super::steps::{heading_at, position_at};
@@ -121,6 +122,23 @@ impl Caster {
         (self.method == BlockageMethod::Probability).then(|| self.sampler.drawn())
     }
 
+    /// In which samples any cause blocks a link now, by its place among those of the last cast; in words, and nothing where no access
+    /// point has a radio.
+    pub(crate) fn blocked_now(&self, link: usize) -> impl Iterator<Item = u32> {
+        self.sampler.blocked_now(link)
+    }
+
+    /// From which probability on a link counts as blocked.
+    pub(crate) fn threshold(&self) -> f64 {
+        self.threshold
+    }
+
+    /// Tells a link anew, by its place among those of the last cast, as if its samples weighed so much.
+    pub(crate) fn weigh(&self, link: usize, weights: &[f32], blockage: &mut Blockage) {
+        let Some(chances) = self.sampler.weighed(link, weights, self.threshold) else { return };
+        *blockage = told(blockage.access_point, blockage.track, &chances, self.threshold);
+    }
+
     /// How many samples the configuration asks for.
     pub(crate) fn samples_asked(&self) -> usize {
         self.numbers.samples
@@ -183,20 +201,25 @@ impl Caster {
         for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
             for (person, (track, _)) in people.clone().enumerate() {
                 let chances = self.sampler.chances(ue, access_point, ap_m, person, self.threshold);
-                blockages.push(Blockage {
-                    access_point,
-                    track: track.id,
-                    blocked_now: chances.blocked_now,
-                    p_now: chances.p_now,
-                    blocked: chances.p.map(|p| p >= self.threshold),
-                    p: chances.p,
-                    onset_s: chances.onset_s,
-                    duration_s: chances.duration_s,
-                    own: chances.own,
-                    hall: chances.hall,
-                    any: chances.any,
-                });
+                blockages.push(told(access_point, track.id, &chances, self.threshold));
             }
         }
+    }
+}
+
+/// What is told of a link.
+fn told(access_point: usize, track: u64, chances: &Chances, threshold: f64) -> Blockage {
+    Blockage {
+        access_point,
+        track,
+        blocked_now: chances.blocked_now,
+        p_now: chances.p_now,
+        blocked: chances.p.map(|p| p >= threshold),
+        p: chances.p,
+        onset_s: chances.onset_s,
+        duration_s: chances.duration_s,
+        own: chances.own,
+        hall: chances.hall,
+        any: chances.any,
     }
 }

@@ -46,33 +46,94 @@ impl Firsts {
         (1..step).fold(0, |met, step| met | self.new[step * self.words + word])
     }
 
+    /// What of a word is blocked at a step for the first time.
+    #[inline(always)]
+    pub(super) fn first_at(&self, step: usize, word: usize) -> u32 {
+        self.new[step * self.words + word]
+    }
+
     fn chance(&self, samples: usize) -> Chance {
         self.chance_with(&[], samples)
     }
 
     /// Of a sample that is blocked in this or in one of the others.
     fn chance_with(&self, others: &[&Self], samples: usize) -> Chance {
-        let mut counts = [0; MOMENTS];
-        for word in 0..self.words {
+        let count = |word: usize, bits: u32| {
             let all = match samples - word * WORD {
                 left if left < WORD => (1_u32 << left) - 1,
                 _ => !0,
             };
+            f64::from((bits & all).count_ones())
+        };
+        self.weighed_with(others, count, samples as f64)
+    }
+
+    /// The same of samples that do not weigh alike: `weigh` says what those of a word weigh whose bits are set, and `total` what all
+    /// do.
+    fn weighed_with(&self, others: &[&Self], weigh: impl Fn(usize, u32) -> f64, total: f64) -> Chance {
+        let mut weights = [0.0; MOMENTS];
+        for word in 0..self.words {
             let mut met = 0;
-            for (step, count) in counts.iter_mut().enumerate() {
-                let at = step * self.words + word;
-                let new = others.iter().fold(self.new[at], |bits, other| bits | other.new[at]) & all;
-                *count += (new & !met).count_ones();
+            for (step, weight) in weights.iter_mut().enumerate() {
+                let new = others
+                    .iter()
+                    .fold(self.first_at(step, word), |bits, other| bits | other.first_at(step, word));
+                *weight += weigh(word, new & !met);
                 met = if step == 0 { 0 } else { met | new };
             }
         }
-        let share = |count: u32| f64::from(count) / samples as f64;
-        let mut sum = 0;
+        let mut sum = 0.0;
         let p: [f64; STEPS] = std::array::from_fn(|w| {
-            sum += counts[w + 1];
-            share(sum)
+            sum += weights[w + 1];
+            sum / total
         });
-        Chance { p_now: share(counts[0]), p }
+        Chance { p_now: weights[0] / total, p }
+    }
+}
+
+/// What the samples of one link said, for who weighs them by what else is known.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Kept {
+    /// When others block it first.
+    pub(super) others: Firsts,
+    /// When the time comes that `duration_s` tells.
+    pub(super) overs: Firsts,
+    own: Firsts,
+    hall: Firsts,
+    asks_own: bool,
+    /// It counted as blocked now.
+    pub(super) blocked_now: bool,
+}
+
+impl Kept {
+    /// Takes what was asked last.
+    pub(super) fn keep(
+        &mut self,
+        others: &Firsts,
+        overs: &Firsts,
+        causes: &Causes,
+        asks_own: bool,
+        blocked_now: bool,
+    ) {
+        self.others.clone_from(others);
+        self.overs.clone_from(overs);
+        self.own.clone_from(&causes.own);
+        self.hall.clone_from(&causes.hall);
+        (self.asks_own, self.blocked_now) = (asks_own, blocked_now);
+    }
+
+    /// In which samples any cause blocks it now, in words.
+    pub(super) fn any_now(&self) -> impl Iterator<Item = u32> {
+        let causes = [&self.others, &self.own, &self.hall];
+        (0..self.others.words).map(move |word| causes.iter().fold(0, |bits, of| bits | of.first_at(0, word)))
+    }
+
+    /// The chances of the owner's body, of the hall and of any cause.
+    pub(super) fn causes(&self, weigh: impl Fn(usize, u32) -> f64, total: f64) -> [Option<Chance>; 3] {
+        let own = self.asks_own.then(|| self.own.weighed_with(&[], &weigh, total));
+        let hall = self.hall.weighed_with(&[], &weigh, total);
+        let any = self.others.weighed_with(&[&self.own, &self.hall], &weigh, total);
+        [own, Some(hall), Some(any)]
     }
 }
 
@@ -110,12 +171,12 @@ impl Causes {
         aim: impl Fn(&mut Rays, usize),
     ) -> [Option<Chance>; 3] {
         let Known { others, samples, person, number } = *known;
-        if things.is_none() && !asks_own {
-            return [None, Some(Chance::NONE), Some(others.chance(samples))];
-        }
         let words = others.words;
         self.own.begin(words);
         self.hall.begin(words);
+        if things.is_none() && !asks_own {
+            return [None, Some(Chance::NONE), Some(others.chance(samples))];
+        }
         for step in 0..MOMENTS {
             aim(rays, step);
             if let Some(things) = things {

@@ -21,6 +21,7 @@ mod rays;
 mod crossing;
 mod things;
 mod causes;
+mod counts;
 #[doc(hidden)] // Phases of a gait, for the fit of the body.
 pub mod probability;
 mod caster;

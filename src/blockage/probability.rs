@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::Chance;
-use super::causes::{Causes, Firsts, Known};
+use super::causes::{Causes, Firsts, Kept, Known};
+use super::counts::{Chances, Counts};
 use super::crossing::{Crossing, Part};
 use super::draws::{Draws, Quantiles};
 use super::figure::Figure;
@@ -18,15 +19,12 @@ use super::rays::{Near, Rays};
 use super::shadows::{Meeting, Shadows};
 use super::things::Things;
 use super::trajectories::{Disc, MOMENTS, Trajectories};
+use crate::Site;
 use crate::elementary::wide;
 use crate::forecast::Forecast;
 use crate::geometry::DVec3;
 use crate::site::{Hall, Ue};
 use crate::track::Track;
-use crate::{STEP_S, STEPS, Site};
-
-/// Quantiles of times that are reported.
-const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 
 /// Most body-ray tests of a frame: everybody who may stand in the way of somebody at a step, a meeting, times samples. Ten people
 /// with two access points have a thousand meetings at most, and all samples.
@@ -38,29 +36,6 @@ const TESTS_PER_PERSON: usize = 6000;
 const MEETINGS: usize = 1 << 10;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
 const SAMPLES_MIN: usize = WORD;
-
-/// What the samples say of one link.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Chances {
-    /// That it is blocked now.
-    pub p_now: f64,
-    /// Whether that is likely enough to count as blocked now.
-    pub blocked_now: bool,
-    /// Index w - 1: that it is blocked at any of steps 1..=w.
-    pub p: [f64; STEPS],
-    /// Quantiles of the time until it is blocked, over the samples in which it is in sight now; of a link that does not
-    /// count as blocked now.
-    pub onset_s: [Option<f64>; 3],
-    /// Quantiles of the time until it is clear. Of a link that counts as blocked now over the samples in which it is;
-    /// else, where there is an onset, over those in which it is in sight now and will be blocked.
-    pub duration_s: [Option<f64>; 3],
-    /// That the owner's own body blocks it; `None` where the UE is on the axis.
-    pub own: Option<Chance>,
-    /// That the hall does.
-    pub hall: Option<Chance>,
-    /// That others, the owner or the hall do.
-    pub any: Option<Chance>,
-}
 
 /// Samples of all people in one frame.
 #[derive(Debug, Clone)]
@@ -88,6 +63,11 @@ pub struct Sampler {
     hall: Hall,
     things: Things,
     causes: Causes,
+    /// What the samples of every link said since the draw; of no link where nobody weighs them anew.
+    kept: Vec<Kept>,
+    keeps: bool,
+    /// How many of `kept` are of this draw.
+    kept_links: usize,
 }
 
 /// From which access point to whose UE.
@@ -114,6 +94,8 @@ struct Link {
     arms: Vec<u32>,
     /// Blocked for the first time.
     firsts: Firsts,
+    /// The time that `duration_s` tells comes.
+    overs: Firsts,
 }
 
 impl Sampler {
@@ -136,6 +118,9 @@ impl Sampler {
             hall: site.hall.clone(),
             things: Things::new(site),
             causes: Causes::default(),
+            kept: Vec::new(),
+            keeps: site.access_points.iter().any(|ap| ap.radio.is_some()),
+            kept_links: 0,
         }
     }
 
@@ -163,7 +148,7 @@ impl Sampler {
         let tests = TESTS_MAX.saturating_sub(TESTS_PER_PERSON * self.present);
         let affordable = (tests / self.asked.max(1)).max(SAMPLES_MIN) / WORD * WORD;
         self.samples = numbers.samples.min(affordable);
-        (self.present, self.asked, self.seen_from) = (0, 0, None);
+        (self.present, self.asked, self.seen_from, self.kept_links) = (0, 0, None, 0);
         for (track, forecast) in people {
             if self.people.len() == self.present {
                 self.people.push(Trajectories::default());
@@ -220,7 +205,7 @@ impl Sampler {
         let mut counts = Counts::default();
         let aim = Aim { ue, ap_m, person };
         let later = self.take_step(aim, 0, 0..self.meetings.len(), 0..words, &mut counts);
-        counts.blocked_now = counts.now as f64 / samples as f64 >= threshold;
+        counts.blocked_now = counts.now / samples as f64 >= threshold;
         // Where nothing stands in the way of any sample now, nor of the first half of them later, that is taken for the rest
         // as well: some chance below a few per cent then counts as none.
         let half = words.div_ceil(2);
@@ -229,12 +214,64 @@ impl Sampler {
             for step in 1..MOMENTS {
                 rest = self.take_step(aim, step, rest, words.clone(), &mut counts);
             }
-            if counts.now == 0 && counts.met == [0; MOMENTS] {
+            if counts.now == 0.0 && counts.met == [0.0; MOMENTS] {
                 break;
             }
         }
         let [own, hall, any] = self.ask_causes(ap, aim, words);
-        Chances { own, hall, any, ..counts.chances(samples) }
+        let chances = Chances { own, hall, any, ..counts.chances(samples as f64) };
+        if self.keeps {
+            self.keep(&chances);
+        }
+        chances
+    }
+
+    /// Keeps what the samples of the link that was just asked said.
+    fn keep(&mut self, chances: &Chances) {
+        if self.kept.len() == self.kept_links {
+            self.kept.push(Kept::default());
+        }
+        let Link { firsts, overs, .. } = &self.link;
+        self.kept[self.kept_links].keep(
+            firsts,
+            overs,
+            &self.causes,
+            chances.own.is_some(),
+            chances.blocked_now,
+        );
+        self.kept_links += 1;
+    }
+
+    /// In which samples any cause blocks a link of the last draw now, by its place among the links asked; in words. Nothing where
+    /// there is no radio.
+    pub(super) fn blocked_now(&self, link: usize) -> impl Iterator<Item = u32> {
+        self.kept[..self.kept_links].get(link).into_iter().flat_map(Kept::any_now)
+    }
+
+    /// What becomes of such a link if its samples weigh so much: as [`Self::chances`]. `None` where there is no radio.
+    pub(super) fn weighed(&self, link: usize, weights: &[f32], threshold: f64) -> Option<Chances> {
+        let kept = self.kept[..self.kept_links].get(link)?;
+        let weigh = |word: usize, bits: u32| weight_of(&weights[word * WORD..], bits);
+        let mut counts = Counts::default();
+        for word in 0..self.samples.div_ceil(WORD) {
+            let now = kept.others.first_at(0, word);
+            counts.now += weigh(word, now);
+            for step in 1..MOMENTS {
+                let new = kept.others.first_at(step, word);
+                counts.met[step] += weigh(word, new);
+                counts.onset[step] += weigh(word, new & !now);
+                counts.over[step] += weigh(word, kept.overs.first_at(step, word));
+            }
+        }
+        let total = f64::from(weights[..self.samples].iter().sum::<f32>());
+        counts.blocked_now = counts.now / total >= threshold;
+        let [own, hall, any] = kept.causes(weigh, total);
+        let mut chances = Chances { own, hall, any, ..counts.chances(total) };
+        if counts.blocked_now != kept.blocked_now {
+            // When a sample is in sight again was asked of the other kind of samples.
+            chances.duration_s = [None; 3];
+        }
+        Some(chances)
     }
 
     /// The same by the owner's body, by the hall, and by any cause.
@@ -326,16 +363,27 @@ pub(crate) fn chances_of<'a>(lost: impl Fn(usize) -> &'a [u32], samples: usize, 
         link.blocked.copy_from_slice(lost(step));
         link.count(step, samples, words.clone(), &mut counts);
         if step == 0 {
-            counts.blocked_now = counts.now as f64 / samples as f64 >= threshold;
+            counts.blocked_now = counts.now / samples as f64 >= threshold;
         }
     }
-    counts.chances(samples)
+    counts.chances(samples as f64)
+}
+
+/// What the samples weigh whose bits are set.
+fn weight_of(weights: &[f32], mut bits: u32) -> f64 {
+    let mut sum = 0.0;
+    while bits != 0 {
+        sum += f64::from(weights[bits.trailing_zeros() as usize]);
+        bits &= bits - 1;
+    }
+    sum
 }
 
 impl Link {
     fn begin(&mut self, samples: usize) {
-        let Self { blocked, now, met, over, trunk, arms, firsts } = self;
+        let Self { blocked, now, met, over, trunk, arms, firsts, overs } = self;
         firsts.begin(samples.div_ceil(WORD));
+        overs.begin(samples.div_ceil(WORD));
         for words in [blocked, now, met, over, trunk, arms] {
             words.clear();
             words.resize(samples.div_ceil(WORD), 0);
@@ -368,7 +416,7 @@ impl Link {
                 _ => !0,
             };
             let blocked = self.blocked[word] & all;
-            let ones = |bits: u32| bits.count_ones() as usize;
+            let ones = |bits: u32| f64::from(bits.count_ones());
             if step == 0 {
                 self.now[word] = blocked;
                 self.firsts.note(step, word, blocked);
@@ -382,6 +430,7 @@ impl Link {
             };
             let new = blocked & !met;
             self.firsts.note(step, word, new);
+            self.overs.note(step, word, over);
             self.over[word] |= over;
             self.met[word] |= new;
             counts.met[step] += ones(new);
@@ -389,55 +438,6 @@ impl Link {
             counts.over[step] += ones(over);
         }
     }
-}
-
-/// Of how many samples what first happens at each step.
-#[derive(Debug, Clone, Copy, Default)]
-struct Counts {
-    /// Blocked now, step 0.
-    now: usize,
-    blocked_now: bool,
-    /// Blocked for the first time after now.
-    met: [usize; MOMENTS],
-    /// The same of those in sight now.
-    onset: [usize; MOMENTS],
-    /// In sight again.
-    over: [usize; MOMENTS],
-}
-
-impl Counts {
-    fn chances(&self, samples: usize) -> Chances {
-        let share = |count: usize| count as f64 / samples as f64;
-        let coming: usize = self.onset.iter().sum();
-        let onset_s = quantiles_s(&self.onset, samples - self.now);
-        let over_s = |of: usize| quantiles_s(&self.over, of);
-        Chances {
-            p_now: share(self.now),
-            blocked_now: self.blocked_now,
-            p: std::array::from_fn(|w| share(self.met[1..=w + 1].iter().sum())),
-            onset_s: if self.blocked_now { [None; 3] } else { onset_s },
-            duration_s: match (self.blocked_now, onset_s[0]) {
-                (true, _) => over_s(self.now),
-                (false, Some(_)) => over_s(coming),
-                (false, None) => [None; 3],
-            },
-            own: None,
-            hall: None,
-            any: None,
-        }
-    }
-}
-
-/// Of times given by how many come at each step; `None` where a quantile lies beyond the last step, or over nothing.
-fn quantiles_s(counts: &[usize; MOMENTS], total: usize) -> [Option<f64>; 3] {
-    LEVELS.map(|level| {
-        let mut sum = 0;
-        let reached = |step: &usize| {
-            sum += counts[*step];
-            sum > 0 && sum as f64 >= level * total as f64
-        };
-        (0..MOMENTS).find(reached).map(|step| step as f64 * STEP_S)
-    })
 }
 
 #[cfg(test)]

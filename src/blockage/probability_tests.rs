@@ -4,6 +4,7 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::Config;
 use crate::blockage::body::blocks;
+use crate::blockage::counts::quantiles_s;
 use crate::forecast::constant_velocity;
 use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
@@ -14,8 +15,8 @@ fn quantiles_count_those_who_come_later_than_the_last_step() {
     // Of ten, one at step 2, five at step 4, the rest never.
     let mut counts = [0; MOMENTS];
     (counts[2], counts[4]) = (1, 5);
-    assert_eq!(quantiles_s(&counts, 10), [Some(0.2), Some(0.4), None]);
-    assert_eq!(quantiles_s(&[0; MOMENTS], 0), [None; 3]);
+    assert_eq!(quantiles_s(&counts.map(f64::from), 10.0), [Some(0.2), Some(0.4), None]);
+    assert_eq!(quantiles_s(&[0.0; MOMENTS], 0.0), [None; 3]);
 }
 
 /// Somebody anywhere within 8 m of the middle, who walks, stands or hurries.
@@ -103,10 +104,10 @@ fn chances_of(bits: &[u16], threshold: f64) -> Chances {
     let share = |steps: u16| bits.iter().filter(|&&at| at & steps != 0).count() as f64 / bits.len() as f64;
     let all = (1_u16 << MOMENTS) - 1;
     let of = |chosen: &dyn Fn(u16) -> bool, first: &dyn Fn(u16) -> u32| {
-        let (mut counts, mut total) = ([0; MOMENTS], 0);
+        let (mut counts, mut total) = ([0.0; MOMENTS], 0.0);
         for &at in bits.iter().filter(|&&at| chosen(at)) {
-            total += 1;
-            counts.get_mut(first(at) as usize).into_iter().for_each(|count| *count += 1);
+            total += 1.0;
+            counts.get_mut(first(at) as usize).into_iter().for_each(|count| *count += 1.0);
         }
         quantiles_s(&counts, total)
     };

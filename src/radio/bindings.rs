@@ -8,6 +8,7 @@
 
 use std::collections::BTreeMap;
 
+use super::level::Level;
 use crate::Site;
 use crate::geometry::DVec2;
 use crate::radio::Loss;
@@ -38,8 +39,30 @@ pub struct Binding {
     pub p: f64,
 }
 
+/// What a link lost as it was heard, if the device is carried by the person.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Heard {
+    pub(super) access_point: usize,
+    pub(super) track: u64,
+    pub(super) time_ns: i64,
+    /// Less than the device's own level in sight, dB, and the variance of that.
+    pub(super) lost_db: f64,
+    pub(super) variance: f64,
+    /// How likely the person carries the device.
+    pub(super) p: f64,
+}
+
+impl Heard {
+    /// Whether both are of one access point and one person.
+    pub(super) fn is_of_same_link(&self, other: &Self) -> bool {
+        (self.access_point, self.track) == (other.access_point, other.track)
+    }
+}
+
 /// Less likely bindings are not told.
 const LEAST_P: f64 = 0.01;
+/// Who carries a device at least so likely is heard with it.
+const MAY_P: f64 = 0.2;
 /// Devices that are followed at most; reports of others are skipped.
 const DEVICES_MAX: usize = 4096;
 /// Reports that wait for a frame at most: half a second of every device and eight access points, every 20 ms, would be more, but no
@@ -48,31 +71,29 @@ const WAITING_MAX: usize = 1 << 18;
 /// A device that was not heard for so long is forgotten.
 const FORGOTTEN_NS: i64 = 60_000_000_000;
 /// Reports may come so late, and be so far ahead of the frames. Frames of that time are kept.
-const LATE_NS: i64 = 500_000_000;
-/// Standard deviation of a device's level about Friis' equation, dB: gains of antennas and hands that nobody knows.
-const LEVEL_DB: f64 = 5.0;
+pub(super) const LATE_NS: i64 = 500_000_000;
 /// How far a level wanders, dB in the root of a second.
 const WANDERS_DB: f64 = 0.3;
-/// Standard deviation of a report in sight, dB: noise, steps of 1 dB, and small fades (IMMERSE: 0.45 to 0.7).
-const REPORT_DB: f64 = 1.2;
 /// Shares of a loss's three quantiles.
 const SHARES: [f64; 3] = [0.3, 0.4, 0.3];
-/// A report is worth nothing with this probability, and may then be anywhere within so many dB.
-const STRAY: f64 = 0.02;
-const STRAY_DB: f64 = 60.0;
 /// Of a person who is not followed nothing is foreseen but that the power stays about what it was. It wanders so far, dB in the root of
 /// a second; before the first report it is anywhere.
 const UNSEEN_DB: f64 = 20.0;
 const ANYWHERE: Level = Level { mean_db: -80.0, variance: 900.0 };
-/// Errors of successive frames are alike, so that a frame counts for this share of an independent one. This and [`UNSEEN_DB`] were chosen
-/// on the scenes of seeds 130000 and 130001.
-const COUNTS: f64 = 0.3;
+/// Errors go on for seconds (a hand at the ear, a bag), so that a frame counts for this share of an independent one. Chosen on the scenes
+/// of seeds 132900 to 132903; [`UNSEEN_DB`] on those of 130000 and 130001.
+const COUNTS: f64 = 0.05;
 /// Two tracks that are this near (one standard deviation, metres) may be swapped, so often a second.
 const SWAP_M: f64 = 0.5;
 const SWAP_HZ: f64 = 0.2;
 /// Elsewhere a device changes hands, or its person is lost, so often a second; and it is found again so often.
 const CHANGE_HZ: f64 = 1.0 / 300.0;
 const FOUND_HZ: f64 = 1.0 / 3.0;
+/// How likely a device that is heard is carried by somebody who is followed.
+const CARRIED: f64 = 0.8;
+/// How likely a person carries no second device: an assumption. So many rounds bring what devices leave each other to rest.
+const ONE_DEVICE: f64 = 0.99;
+const ROUNDS: usize = 12;
 
 /// Finds out who carries which device.
 #[derive(Debug, Clone)]
@@ -84,6 +105,8 @@ pub struct Binder {
     devices: BTreeMap<u64, Device>,
     /// Heard, and not yet compared: a frame of their time is awaited.
     reports: Vec<Report>,
+    /// Of the last frame: what devices lost, by access point and track.
+    heard: Vec<Heard>,
     skipped: u64,
 }
 
@@ -102,21 +125,14 @@ struct Device {
     heard_ns: i64,
     /// State 0 is nobody; the others are the tracks of `tracks`.
     p: Vec<f64>,
+    /// The same, given that most people carry one device.
+    told: Vec<f64>,
     tracks: Vec<u64>,
     /// By state and access point.
     levels: Vec<Level>,
     /// By access point: the power itself, as far as nothing but the last reports foretells it.
     powers: Vec<Level>,
 }
-
-/// By how much a device is heard louder than its distance says, dB: mean and variance.
-#[derive(Debug, Clone, Copy)]
-struct Level {
-    mean_db: f64,
-    variance: f64,
-}
-
-const UNKNOWN: Level = Level { mean_db: 0.0, variance: LEVEL_DB * LEVEL_DB };
 
 impl Binder {
     /// Needs the site's access points, their radios and where devices are on a body.
@@ -127,6 +143,7 @@ impl Binder {
             frames: Vec::new(),
             devices: BTreeMap::new(),
             reports: Vec::new(),
+            heard: Vec::new(),
             skipped: 0,
         }
     }
@@ -162,9 +179,20 @@ impl Binder {
         self.skipped
     }
 
+    /// Whether no device is known.
+    pub(super) fn is_idle(&self) -> bool {
+        self.devices.is_empty()
+    }
+
+    /// What was compared at the last frame, by access point and track, of devices that are likely with somebody.
+    pub(super) fn heard(&self) -> &[Heard] {
+        &self.heard
+    }
+
     /// Compares what was heard with a frame's tracks and its losses, in the order of [`Fader::fade`](super::Fader::fade), and tells who may carry what, devices in order, likeliest first.
     pub fn bind(&mut self, time_ns: i64, tracks: &[Track], losses: &[Loss], bindings: &mut Vec<Binding>) {
         bindings.clear();
+        self.heard.clear();
         if self.radios.iter().all(Option::is_none) {
             return;
         }
@@ -186,21 +214,23 @@ impl Binder {
         self.devices.retain(|_, device| time_ns - device.heard_ns < FORGOTTEN_NS);
         let Some(now) = self.frames.last() else { return };
         let moves = moves(now, seconds);
-        let mut of_device = heard.as_slice();
         for (name, device) in &mut self.devices {
             device.follow(&now.tracks, self.radios.len());
             device.exchange(&moves, seconds);
-            // Both are in the order of devices; reports of devices too many stand between.
-            of_device = &of_device[of_device.partition_point(|report| report.device < *name)..];
-            let own = &of_device[..of_device.partition_point(|report| report.device == *name)];
-            for of_access_point in own.chunk_by(|a, b| a.access_point == b.access_point) {
+            for of_access_point in of_device(&heard, *name).chunk_by(|a, b| a.access_point == b.access_point)
+            {
                 device.weigh(of_access_point, &self.frames, self.radios.len());
             }
-            let told = device.tracks.iter().zip(&device.p[1..]).filter(|(_, p)| **p >= LEAST_P);
+        }
+        share_out(&mut self.devices, now.tracks.len());
+        for (name, device) in &self.devices {
+            let told = device.tracks.iter().zip(&device.told[1..]).filter(|(_, p)| **p >= LEAST_P);
             let from = bindings.len();
             bindings.extend(told.map(|(&track, &p)| Binding { device: *name, track, p }));
             bindings[from..].sort_by(|a, b| b.p.total_cmp(&a.p).then(a.track.cmp(&b.track)));
+            device.note(of_device(&heard, *name), &self.frames, self.radios.len(), &mut self.heard);
         }
+        self.heard.sort_by_key(|heard| (heard.access_point, heard.track));
     }
 
     /// Keeps what a frame says, and of the frames before as many as late reports may ask for.
@@ -250,6 +280,33 @@ impl Binder {
     }
 }
 
+/// What was heard of one device. Reports are in the order of devices.
+fn of_device(reports: &[Report], device: u64) -> &[Report] {
+    let from = reports.partition_point(|report| report.device < device);
+    &reports[from..from + reports[from..].partition_point(|report| report.device == device)]
+}
+
+/// Most people carry one device: a track that is likely another device's is less likely this one's (mean field, a few rounds).
+fn share_out(devices: &mut BTreeMap<u64, Device>, tracks: usize) {
+    devices.values_mut().for_each(|device| device.told.clone_from(&device.p));
+    let mut told = vec![0.0; tracks + 1];
+    for _ in 0..ROUNDS {
+        let mut free = vec![1.0; tracks + 1];
+        for device in devices.values() {
+            (1..=tracks).for_each(|state| free[state] *= 1.0 - ONE_DEVICE * device.told[state]);
+        }
+        for device in devices.values_mut() {
+            told[0] = device.p[0];
+            (1..=tracks).for_each(|s| told[s] = device.p[s] * free[s] / (1.0 - ONE_DEVICE * device.told[s]));
+            let sum: f64 = told.iter().sum();
+            // Half way, in logarithms: else two devices of one track leave it together and come back together.
+            device.told.iter_mut().zip(&told).for_each(|(old, new)| *old = (*old * new / sum).sqrt());
+            let sum: f64 = device.told.iter().sum();
+            device.told.iter_mut().for_each(|p| *p /= sum);
+        }
+    }
+}
+
 /// How likely a device comes from one track to another within a frame, as (from, to, probability): only of tracks that are near.
 fn moves(now: &Seen, seconds: f64) -> Vec<(usize, usize, f64)> {
     let mut moves = Vec::new();
@@ -269,8 +326,9 @@ impl Device {
         Self {
             heard_ns,
             p: vec![1.0],
+            told: vec![1.0],
             tracks: Vec::new(),
-            levels: vec![UNKNOWN; access_points],
+            levels: vec![Level::UNKNOWN; access_points],
             powers: vec![ANYWHERE; access_points],
         }
     }
@@ -297,6 +355,12 @@ impl Device {
             self.p.push(before.map_or(0.0, |state| old_p[state]));
             let from = before.unwrap_or(0) * access_points;
             self.levels.extend_from_slice(&old_levels[from..from + access_points]);
+        }
+        if self.tracks.is_empty() && !tracks.is_empty() {
+            // A device that is heard for the first time, or whose hall was empty, is with anybody.
+            let each = self.p[0] * CARRIED / tracks.len() as f64;
+            self.p[1..].iter_mut().for_each(|p| *p += each);
+            self.p[0] *= 1.0 - CARRIED;
         }
         self.tracks.clear();
         self.tracks.extend_from_slice(tracks);
@@ -328,7 +392,30 @@ impl Device {
                 let of = |&(p, from): &(f64, usize)| (p, levels[from * access_points + access_point]);
                 let level = &mut self.levels[state * access_points + access_point];
                 *level = Level::mixed(parts.iter().map(of));
-                level.variance = (level.variance + WANDERS_DB * WANDERS_DB * seconds).min(UNKNOWN.variance);
+                level.variance =
+                    (level.variance + WANDERS_DB * WANDERS_DB * seconds).min(Level::UNKNOWN.variance);
+            }
+        }
+    }
+
+    /// Notes what the links of those lost who may well carry the device.
+    fn note(&self, reports: &[Report], frames: &[Seen], access_points: usize, heard: &mut Vec<Heard>) {
+        for report in reports {
+            let Some(around) = Around::new(frames, report.time_ns) else { continue };
+            let access_point = report.access_point;
+            for (state, &track) in (1..).zip(&self.tracks).filter(|(state, _)| self.told[*state] >= MAY_P) {
+                let link_of = |at: usize| at * access_points + access_point;
+                let Some([early, late]) = around.links(track, link_of) else { continue };
+                let in_sight_dbm = (1.0 - around.share) * early.0 + around.share * late.0;
+                let level = self.levels[state * access_points + access_point];
+                heard.push(Heard {
+                    access_point,
+                    track,
+                    time_ns: report.time_ns,
+                    lost_db: in_sight_dbm + level.mean_db - report.power_dbm,
+                    variance: level.variance,
+                    p: self.told[state],
+                });
             }
         }
     }
@@ -376,15 +463,20 @@ impl<'a> Around<'a> {
         Some(Self { before, after, share })
     }
 
-    /// What a track's device of the usual level would be heard with, as (share, dBm, standard deviation): quantiles of the frame
-    /// before and of that after. `link_of` gives the link of the track at a place of a frame. `None` where the track is in neither.
-    fn expected(&self, track: u64, link_of: impl Fn(usize) -> usize) -> Option<[(f64, f64, f64); 6]> {
+    /// A track's link in the frame before and in that after.
+    fn links(&self, track: u64, link_of: impl Fn(usize) -> usize) -> Option<[(f64, [f64; 3]); 2]> {
         let of = |frame: &Seen| {
             let at = frame.tracks.iter().position(|id| *id == track)?;
             Some(frame.links[link_of(at)])
         };
         let (early, late) = (of(self.before), of(self.after));
-        let (early, late) = (early.or(late)?, late.or(early)?);
+        Some([early.or(late)?, late.or(early)?])
+    }
+
+    /// What a track's device of the usual level would be heard with, as (share, dBm, standard deviation): quantiles of the frame
+    /// before and of that after. `link_of` gives the link of the track at a place of a frame. `None` where the track is in neither.
+    fn expected(&self, track: u64, link_of: impl Fn(usize) -> usize) -> Option<[(f64, f64, f64); 6]> {
+        let [early, late] = self.links(track, link_of)?;
         let mut parts = [(0.0, 0.0, 0.0); 6];
         for (frame, (weight, (in_sight_dbm, losses_db))) in
             [(1.0 - self.share, early), (self.share, late)].into_iter().enumerate()
@@ -395,42 +487,6 @@ impl<'a> Around<'a> {
             }
         }
         Some(parts)
-    }
-}
-
-impl Level {
-    /// Mean and variance of several levels, each with its share.
-    fn mixed(parts: impl Iterator<Item = (f64, Self)> + Clone) -> Self {
-        let sum: f64 = parts.clone().map(|(p, _)| p).sum();
-        if sum <= f64::MIN_POSITIVE {
-            return UNKNOWN;
-        }
-        let mean_db = parts.clone().map(|(p, level)| p * level.mean_db).sum::<f64>() / sum;
-        let square = |(p, level): (f64, Self)| p * (level.variance + (level.mean_db - mean_db).powi(2));
-        Self { mean_db, variance: parts.map(square).sum::<f64>() / sum }
-    }
-
-    /// The likelihood of a power, 1/dB. The level learns from it, as a Kalman filter does, as far as the power is no stray.
-    fn weigh<const N: usize>(&mut self, power_dbm: f64, expected: &[(f64, f64, f64); N]) -> f64 {
-        let mut parts = [(0.0, 0.0, 0.0); N];
-        for (part, &(share, dbm, spread_db)) in parts.iter_mut().zip(expected) {
-            let noise = REPORT_DB * REPORT_DB + spread_db * spread_db;
-            let (off_db, variance) = (power_dbm - dbm - self.mean_db, self.variance + noise);
-            let density =
-                (-0.5 * off_db * off_db / variance).exp() / (std::f64::consts::TAU * variance).sqrt();
-            *part = ((1.0 - STRAY) * share * density, off_db, noise);
-        }
-        let fits: f64 = parts.iter().map(|part| part.0).sum();
-        let likelihood = fits + STRAY / STRAY_DB;
-        if fits > 0.0 {
-            let off_db = parts.iter().map(|(w, off_db, _)| w * off_db).sum::<f64>() / fits;
-            let noise =
-                parts.iter().map(|(w, off, noise)| w * (noise + (off - off_db).powi(2))).sum::<f64>() / fits;
-            let gain = self.variance / (self.variance + noise) * fits / likelihood;
-            self.mean_db += gain * off_db;
-            self.variance *= 1.0 - gain;
-        }
-        likelihood
     }
 }
 

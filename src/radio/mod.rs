@@ -8,9 +8,12 @@ mod body;
 mod outages;
 mod beyond;
 mod links;
+mod level;
 mod bindings;
+mod listener;
 
 pub use bindings::{Binder, Binding, Report};
 pub use links::{Fader, Loss};
+pub use listener::Listener;
 pub use outages::Outages;
 pub use passage::{Passage, Rectangle};

@@ -59,7 +59,7 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 52] = [
+const JOBS: [Job; 53] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
@@ -91,6 +91,7 @@ const JOBS: [Job; 52] = [
     job("network-sweeps", "the same over margins, procedures, crowds, access points and models", 10, Needs::Nothing, crowds::network_sweeps),
     job("network-losses", "the dB told about fades, and the shape of real ones", 8, Needs::Data, crowds::network_losses),
     job("bindings", "which device is carried by whom, from the power heard", 4, Needs::Nothing, crowds::bindings),
+    job("heard", "what power that is heard adds to the probabilities of links", 8, Needs::Nothing, crowds::heard),
     job("live", "ten minutes live, four times over, the page open or not", 44, Needs::Asking, live::live),
     job("nodes", "stages on three hosts: the same bytes, what the wire adds, what fails", 25, Needs::Asking, nodes::nodes),
     job("halls", "1 to 96 halls on one host", 8, Needs::Asking, nodes::halls),

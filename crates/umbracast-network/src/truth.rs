@@ -150,12 +150,7 @@ impl View<'_> {
             Body::new(mesh)
         };
         let bodies: Vec<Option<Body>> = walkers.iter().map(body).collect();
-        let ue = &self.site.ue;
-        let ue_m = |person: usize| {
-            states[person].map(|state| {
-                ue.on_body(state.position_m, state.heading_rad, state.height_m) + DVec3::Z * state.floor_m
-            })
-        };
+        let ue_m = |person: usize| walkers[person].ue_m_at(&self.site.ue, time_ns);
         let mut instant = Instant {
             loss_db: vec![Vec::new(); self.airs.len()],
             reflected_db: vec![Vec::new(); self.airs.len()],

@@ -6,7 +6,7 @@ use umbracast::blockage::Caster;
 use umbracast::decide::Decider;
 use umbracast::detect::{self, Clocks, Clusterer, Measurer, Prior};
 use umbracast::forecast::{Forecaster, Weights};
-use umbracast::radio::{Binder, Fader, Report};
+use umbracast::radio::{Binder, Fader, Listener, Report};
 use umbracast::track::{Tracker, Windows};
 use umbracast::{Config, Error, Outcome, STEP_NS};
 use umbracast_io::nodes::{Followed, Priors, TrackerState, Warning};
@@ -60,6 +60,7 @@ pub struct Chain {
     caster: Option<Caster>,
     fader: Fader,
     binder: Binder,
+    listener: Listener,
     decider: Decider,
     access_points: Vec<String>,
     warnings: Warnings,
@@ -147,6 +148,7 @@ impl Chain {
             caster: row.cast.then(|| Caster::new(&config.blockage, &config.site)),
             fader: Fader::new(&config.site),
             binder: Binder::new(&config.site),
+            listener: Listener::new(&config.site),
             decider: Decider::new(&config.site),
             access_points: config.site.access_points.iter().map(|ap| ap.name.clone()).collect(),
             warnings: Warnings::default(),
@@ -283,6 +285,7 @@ impl Chain {
             tracker.renumber(&number, next);
         }
         self.binder.renumber(&number);
+        self.listener.renumber(&number);
         self.decider.renumber(&number);
         self.warnings.renumber(number);
     }
@@ -333,6 +336,7 @@ impl Chain {
             caster.cast(&o.tracks, &o.forecasts, &mut o.blockages);
             self.fader.fade(caster, &mut o.losses);
             self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
+            self.listener.sharpen(o.time_ns, &o.tracks, caster, &self.binder, &mut o.blockages);
             self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
             self.fewer_samples += u64::from(caster.took_fewer_samples());
             o.health.frames_with_fewer_samples =

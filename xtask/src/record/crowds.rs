@@ -255,3 +255,9 @@ pub fn bindings(book: &mut Book) -> Result<()> {
     let line = "cargo run --release --quiet --package umbracast-network --example bindings -- 231000 10 20";
     super::house::script(book, line, line)
 }
+
+/// What power that is heard adds to the probabilities of links.
+pub fn heard(book: &mut Book) -> Result<()> {
+    let line = "cargo run --release --quiet --package umbracast-network --example heard -- 232000 20 10";
+    super::house::script(book, line, line)
+}
