@@ -18,7 +18,7 @@ pub struct Normal {
     /// Information whose errors are each their own.
     independent: DMatrix<f64>,
     /// Gradients of residuals that err together.
-    together: BTreeMap<[usize; 5], DVector<f64>>,
+    together: BTreeMap<[usize; 4], DVector<f64>>,
 }
 
 impl Normal {
@@ -34,7 +34,7 @@ impl Normal {
 
     /// A residual in standard deviations with its derivatives (unknown, slope), weighed by `weight`. Those of one `group`
     /// err together; those without one each for itself.
-    pub fn add(&mut self, residual: f64, slopes: &[(usize, f64)], weight: f64, group: Option<[usize; 5]>) {
+    pub fn add(&mut self, residual: f64, slopes: &[(usize, f64)], weight: f64, group: Option<[usize; 4]>) {
         let mut own = group
             .map(|group| self.together.entry(group).or_insert_with(|| DVector::zeros(self.gradient.len())));
         for &(i, a) in slopes {
@@ -65,11 +65,13 @@ impl Normal {
 
     /// Covariance of the unknowns: H^-1 M H^-1 with M the spread of the gradients as it is, group by group (the sandwich of
     /// Huber and White). A walker's errors at one moment and at the next are much the same, so H^-1 alone would promise
-    /// too much.
+    /// too much. The fit lies nearer to its few groups than the truth does, so their spread counts for G / (G - 1) of it.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let mut middle = self.independent.clone();
+        let groups = self.together.len() as f64;
+        let few = if groups > 1.0 { groups / (groups - 1.0) } else { 1.0 };
         for gradient in self.together.values() {
-            middle += gradient * gradient.transpose();
+            middle += few * gradient * gradient.transpose();
         }
         let inverse = self.matrix.clone().cholesky()?.inverse();
         Some(&inverse * middle * &inverse)
@@ -92,10 +94,10 @@ mod tests {
         for k in 0..400 {
             let group = k / 10;
             let value = if group % 2 == 0 { 1.0 } else { -1.0 };
-            normal.add(0.0 - value, &[(0, 1.0)], 1.0, Some([group, 0, 0, 0, 0]));
+            normal.add(0.0 - value, &[(0, 1.0)], 1.0, Some([group, 0, 0, 0]));
         }
         assert!(normal.step().unwrap()[0].abs() < 1e-12);
         let sigma = normal.covariance().unwrap()[(0, 0)].sqrt();
-        assert!((sigma - 1.0 / 40.0_f64.sqrt()).abs() < 1e-9, "{sigma}");
+        assert!((sigma - 1.0 / 39.0_f64.sqrt()).abs() < 1e-9, "{sigma}");
     }
 }

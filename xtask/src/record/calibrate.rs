@@ -7,7 +7,7 @@ use super::book::Book;
 use super::keep;
 use crate::tools::{Result, argument, root};
 
-const EXAMPLE: &str = "cargo run --release --quiet --package umbracast-calibrate --example hung -- 200000 20";
+const EXAMPLE: &str = "cargo run --release --quiet --package umbracast-calibrate --example hung -- 201800 20";
 const ROOMS: &str = "cargo run --release --quiet --package umbracast-calibrate --example rooms -- 200000 400";
 const BY_EYE: &str = "config/sites/hand-mounted.toml";
 
