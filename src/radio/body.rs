@@ -3,8 +3,9 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
+use super::fresnel::integrals_f32;
 use super::passage;
-use super::table::Table;
+use crate::elementary::wide;
 use crate::site::{LossModel, Radio};
 
 /// The body of [`super::Passage::trunk_and_head`].
@@ -47,6 +48,61 @@ pub(super) struct Across {
     pub(super) height_m: f32,
     /// How much wider than a usual body: [`Wave::scale`].
     pub(super) scale: f32,
+}
+
+/// Bodies across one link, by sample: numbers of [`Across`] side by side, for loops in vector registers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Crossings {
+    /// Which power a body takes its share of.
+    at: Vec<u32>,
+    numbers: [Vec<f32>; NUMBERS],
+    passes: Vec<f32>,
+}
+
+const NUMBERS: usize = 9;
+
+impl Crossings {
+    /// None yet.
+    pub(super) fn clear(&mut self) {
+        self.at.clear();
+        self.numbers.iter_mut().for_each(Vec::clear);
+    }
+
+    /// One more body, which takes its share of the power at this place.
+    #[inline(always)]
+    pub(super) fn push(&mut self, at: usize, across: &Across) {
+        let Across { from_tx_m, to_rx_m, aside_m, path_m, slope, turned, height_m, scale } = *across;
+        self.at.push(at as u32);
+        let all = [from_tx_m, to_rx_m, aside_m, path_m, slope, turned[0], turned[1], height_m, scale];
+        self.numbers.iter_mut().zip(all).for_each(|(numbers, number)| numbers.push(number));
+    }
+
+    /// Works out the share of the power that passes each body: a trunk and a head, as half widths, bottoms and tops.
+    #[inline(always)]
+    fn work_out(&mut self, power: impl Fn(&Across, &[[f32; 3]; 2]) -> f32) {
+        let count = self.at.len();
+        self.passes.clear();
+        self.passes.resize(count, 1.0);
+        let of = self.numbers.each_ref().map(|numbers| &numbers[..count]);
+        for (k, passes) in self.passes.iter_mut().enumerate() {
+            let [from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale] =
+                of.map(|n| n[k]);
+            let across = Across {
+                from_tx_m,
+                to_rx_m,
+                aside_m,
+                path_m,
+                slope,
+                turned: [depth, width],
+                height_m,
+                scale,
+            };
+            let shoulders_m = SHOULDERS * height_m;
+            let trunk = [half_trunk_m(scale, depth, width), 0.0, shoulders_m];
+            let power = power(&across, &[trunk, [HEAD_M * scale, shoulders_m, height_m]]);
+            *passes = held(power, from_tx_m, to_rx_m);
+        }
+    }
 }
 
 /// A radio's numbers.
@@ -93,28 +149,49 @@ impl Wave {
                 > CLEAR_NU * CLEAR_NU * from_tx_m * to_rx_m
     }
 
-    /// The share of the power that passes.
+    wide! {
+        /// Takes from powers what bodies cost.
+        pub(super) fn pass(&self, crossings: &mut Crossings, powers: &mut [f32]) = pass_avx2 or pass_portably
+    }
+
     #[inline(always)]
-    pub(super) fn passing(&self, table: &Table, across: &Across) -> f32 {
-        if across.from_tx_m < NEAREST_M || across.to_rx_m < NEAREST_M {
-            return 1.0;
-        }
-        let scale = across.scale;
-        let [depth, width] = across.turned;
-        let half_m = scale
-            * (TRUNK_M[0] * TRUNK_M[0] * depth * depth + TRUNK_M[1] * TRUNK_M[1] * width * width).sqrt();
-        let shoulders_m = SHOULDERS * across.height_m;
-        let body = [[half_m, 0.0, shoulders_m], [HEAD_M * scale, shoulders_m, across.height_m]];
+    fn pass_portably(&self, crossings: &mut Crossings, powers: &mut [f32]) {
         let screen = |[width_m, top_m]: [f32; 2]| [[0.5 * width_m, 0.0, top_m]];
-        let power = match self.model {
-            LossModel::Kirchhoff => self.kirchhoff(table, across, &body),
-            LossModel::ModelB => self.model_b(across, &screen(HUMAN_M)),
-            LossModel::ModelBAdult => self.model_b(across, &screen(ADULT_M)),
-            LossModel::ModelBBody => self.model_b(across, &body),
-            LossModel::KnifeEdges => self.edges(table, across, half_m, None),
-            LossModel::ThreeEdges => self.edges(table, across, half_m, Some(across.height_m)),
-        };
-        power.clamp(LEAST_POWER, 2.0)
+        match self.model {
+            LossModel::Kirchhoff => self.pass_lanes(crossings),
+            LossModel::ModelB => crossings.work_out(|across, _| self.model_b(across, &screen(HUMAN_M))),
+            LossModel::ModelBAdult => crossings.work_out(|across, _| self.model_b(across, &screen(ADULT_M))),
+            LossModel::ModelBBody => crossings.work_out(|across, body| self.model_b(across, body)),
+            LossModel::KnifeEdges => crossings.work_out(|across, body| self.edges(across, body[0][0], None)),
+            LossModel::ThreeEdges => {
+                crossings.work_out(|across, body| self.edges(across, body[0][0], Some(across.height_m)));
+            }
+        }
+        for (at, passes) in crossings.at.iter().zip(&crossings.passes) {
+            powers[*at as usize] *= passes;
+        }
+    }
+
+    /// Works out Kirchhoff's integral for several bodies at a time. No closure stands between here and the arithmetic: a closure is
+    /// not compiled for the wider registers.
+    #[inline(always)]
+    fn pass_lanes(&self, crossings: &mut Crossings) {
+        let Crossings { at, numbers, passes } = crossings;
+        let whole = at.len().next_multiple_of(LANES);
+        passes.clear();
+        passes.resize(whole, 1.0);
+        // What fills the last of them is worked out and left.
+        numbers.iter_mut().for_each(|numbers| numbers.resize(whole, 1.0));
+        for first in (0..whole).step_by(LANES) {
+            let mut of = [[0.0; LANES]; NUMBERS];
+            for (of, numbers) in of.iter_mut().zip(&*numbers) {
+                of.copy_from_slice(&numbers[first..first + LANES]);
+            }
+            let power = self.kirchhoff(&of);
+            for k in 0..LANES {
+                passes[first + k] = held(power[k], of[0][k], of[1][k]);
+            }
+        }
     }
 
     /// Fresnel's parameter for a metre across the path.
@@ -124,26 +201,38 @@ impl Wave {
         (2.0 * self.per_wavelength * near / slant).sqrt()
     }
 
+    /// Kirchhoff's integral, so many samples at a time: each line is a loop over them.
     #[inline(always)]
-    fn kirchhoff(&self, table: &Table, across: &Across, parts: &[[f32; 3]; 2]) -> f32 {
-        let per_m = self.nu_per_m(across, slant(across));
-        let edge = |height_m: f32| table.integrals(per_m * (height_m - across.path_m));
+    fn kirchhoff(&self, of: &[Lanes; NUMBERS]) -> Lanes {
+        let [from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale] = of;
+        let per_m = each(|k| {
+            let near = 1.0 / from_tx_m[k] + 1.0 / to_rx_m[k];
+            (2.0 * self.per_wavelength * near / (1.0 + slope[k] * slope[k]).sqrt()).sqrt()
+        });
+        let trunk_m = each(|k| half_trunk_m(scale[k], depth[k], width[k]));
+        let head_m = each(|k| HEAD_M * scale[k]);
         // The trunk ends where the head begins.
-        let [foot, shoulders, top] = [parts[0][1], parts[1][1], parts[1][2]].map(edge);
-        let up = [between(foot, shoulders), between(shoulders, top)];
-        let mut power = 0.0;
+        let foot = integrals(&each(|k| -per_m[k] * path_m[k]));
+        let shoulders = integrals(&each(|k| per_m[k] * (SHOULDERS * height_m[k] - path_m[k])));
+        let top = integrals(&each(|k| per_m[k] * (height_m[k] - path_m[k])));
+        let up = [between(&foot, &shoulders), between(&shoulders, &top)];
+        let mut power = [0.0; LANES];
         for (off_m, weight) in PLACES_M {
-            let at_m = across.aside_m + off_m;
-            let mut through = [0.0; 2];
-            for ([half_m, ..], up) in parts.iter().zip(&up) {
-                let [right, left] = [at_m - half_m, at_m + half_m].map(|m| table.integrals(per_m * m));
-                let side = between(right, left);
-                through[0] += side[0] * up[0] - side[1] * up[1];
-                through[1] += side[0] * up[1] + side[1] * up[0];
+            let mut through = [[0.0; LANES]; 2];
+            for (half_m, up) in [&trunk_m, &head_m].into_iter().zip(&up) {
+                let right = integrals(&each(|k| per_m[k] * (aside_m[k] + off_m - half_m[k])));
+                let left = integrals(&each(|k| per_m[k] * (aside_m[k] + off_m + half_m[k])));
+                let side = between(&right, &left);
+                for k in 0..LANES {
+                    through[0][k] += side[0][k] * up[0][k] - side[1][k] * up[1][k];
+                    through[1][k] += side[0][k] * up[1][k] + side[1][k] * up[0][k];
+                }
             }
-            // E / E0 = 1 - (j / 2) times the sum.
-            let (re, im) = (1.0 + 0.5 * through[1], -0.5 * through[0]);
-            power += weight * (re * re + im * im);
+            for k in 0..LANES {
+                // E / E0 = 1 - (j / 2) times the sum.
+                let (re, im) = (1.0 + 0.5 * through[1][k], -0.5 * through[0][k]);
+                power[k] += weight * (re * re + im * im);
+            }
         }
         power
     }
@@ -175,10 +264,10 @@ impl Wave {
 
     /// Round both sides, and over the top where there is one: powers.
     #[inline(always)]
-    fn edges(&self, table: &Table, across: &Across, half_m: f32, top_m: Option<f32>) -> f32 {
+    fn edges(&self, across: &Across, half_m: f32, top_m: Option<f32>) -> f32 {
         let per_m = self.nu_per_m(across, if top_m.is_some() { slant(across) } else { 1.0 });
         let round = |covered_m: f32| {
-            let [c, s] = table.integrals(per_m * covered_m);
+            let [c, s] = integrals_f32(per_m * covered_m);
             let (re, im) = (0.5 - c, 0.5 - s);
             0.5 * (re * re + im * im)
         };
@@ -188,10 +277,47 @@ impl Wave {
     }
 }
 
+/// A share of the power as it may be; all of it past a body that stands at an end of the path.
+#[inline(always)]
+fn held(power: f32, from_tx_m: f32, to_rx_m: f32) -> f32 {
+    let is_near = smaller(from_tx_m, to_rx_m) < NEAREST_M;
+    if is_near { 1.0 } else { smaller(larger(power, LEAST_POWER), 2.0) }
+}
+
+/// So many samples are worked out at a time.
+const LANES: usize = 16;
+type Lanes = [f32; LANES];
+
+#[inline(always)]
+fn each(number: impl Fn(usize) -> f32) -> Lanes {
+    let mut all = [0.0; LANES];
+    for (k, of) in all.iter_mut().enumerate() {
+        *of = number(k);
+    }
+    all
+}
+
+/// C and S.
+#[inline(always)]
+fn integrals(x: &Lanes) -> [Lanes; 2] {
+    let mut all = [[0.0; LANES]; 2];
+    for k in 0..LANES {
+        let [c, s] = integrals_f32(x[k]);
+        (all[0][k], all[1][k]) = (c, s);
+    }
+    all
+}
+
 /// K(a, b) = C(b) - C(a) - j (S(b) - S(a)) of the integrals at a and b: what comes through between two edges, but for a factor.
 #[inline(always)]
-fn between([c0, s0]: [f32; 2], [c1, s1]: [f32; 2]) -> [f32; 2] {
-    [c1 - c0, s0 - s1]
+fn between(a: &[Lanes; 2], b: &[Lanes; 2]) -> [Lanes; 2] {
+    [each(|k| b[0][k] - a[0][k]), each(|k| a[1][k] - b[1][k])]
+}
+
+/// Half of what a trunk shows across the path.
+#[inline(always)]
+fn half_trunk_m(scale: f32, depth: f32, width: f32) -> f32 {
+    scale * (TRUNK_M[0] * TRUNK_M[0] * depth * depth + TRUNK_M[1] * TRUNK_M[1] * width * width).sqrt()
 }
 
 #[inline(always)]

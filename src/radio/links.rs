@@ -4,9 +4,8 @@
 use std::collections::BTreeMap;
 
 use super::beyond::Beyond;
-use super::body::{Across, Wave};
+use super::body::{Across, Crossings, Wave};
 use super::outages::Outages;
-use super::table::Table;
 use crate::blockage::Caster;
 use crate::blockage::draws::Quantiles;
 use crate::blockage::lanes::{WORD, cos_sin};
@@ -82,7 +81,7 @@ pub struct Fader {
     /// By access point; `None` without a radio.
     radios: Vec<Option<Antenna>>,
     ue: Ue,
-    table: Table,
+    crossings: Crossings,
     quantiles: Option<Quantiles>,
     /// By access point and track: by how much each sample's fades are deeper than the model's, standard normal. One draw a fade.
     spreads: BTreeMap<(usize, u64), Vec<f32>>,
@@ -130,7 +129,7 @@ impl Fader {
         Self {
             radios: site.access_points.iter().map(antenna).collect(),
             ue: site.ue,
-            table: Table::new(),
+            crossings: Crossings::default(),
             quantiles: None,
             spreads: BTreeMap::new(),
             meetings: Vec::new(),
@@ -232,14 +231,14 @@ impl Fader {
         }
         self.powers.clear();
         self.powers.resize(MOMENTS * samples, 1.0);
+        self.crossings.clear();
+        self.turn(people, owner);
         for meeting in meetings {
-            let Meeting { body, step } = self.meetings[meeting];
-            self.turn(people, body);
-            self.turn(people, owner);
-            self.pass(access_point, owner, people, self.meetings[meeting], samples);
-            debug_assert!(step < MOMENTS && body < people.len());
+            self.turn(people, self.meetings[meeting].body);
+            self.cross(access_point, owner, people, self.meetings[meeting], samples);
         }
         let Some(antenna) = &self.radios[access_point] else { return loss };
+        antenna.wave.pass(&mut self.crossings, &mut self.powers);
         if !self.spreads.contains_key(&(access_point, track)) {
             let quantiles = self.quantiles.get_or_insert_with(|| Quantiles::new(asked));
             let key = track.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (access_point as u64 + 1) << 32;
@@ -279,8 +278,8 @@ impl Fader {
         }
     }
 
-    /// Takes from a link's powers what a body costs at a step.
-    fn pass(
+    /// Notes in which samples a body stands across a link at a step.
+    fn cross(
         &mut self,
         access_point: usize,
         owner: usize,
@@ -333,7 +332,7 @@ impl Fader {
                 height_m: p.height_m[k],
                 scale,
             };
-            self.powers[step * samples + k] *= antenna.wave.passing(&self.table, &across);
+            self.crossings.push(step * samples + k, &across);
         }
     }
 }

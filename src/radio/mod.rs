@@ -3,7 +3,6 @@
 pub mod fresnel;
 mod passage;
 pub mod models;
-mod table;
 mod body;
 mod outages;
 mod beyond;
