@@ -34,7 +34,7 @@ pub fn integrals(x: f64) -> Complex {
 #[inline(always)]
 pub(super) fn integrals_f32(x: f32) -> [f32; 2] {
     const F: [f32; 8] = [
-        0.251_457_98,
+        0.251_458,
         0.300_926_3,
         0.260_458_65,
         -2.138_432_3,
