@@ -5,6 +5,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use super::fresnel::integrals_f32;
 use super::passage;
+use crate::blockage::lanes::{larger, smaller};
 use crate::elementary::wide;
 use crate::site::{LossModel, Radio};
 
@@ -34,23 +35,22 @@ const NEAREST_M: f32 = 0.05;
 
 /// A body across a link, of one sample.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Across {
-    /// Along the path in plan view, from its ends.
-    pub(super) from_tx_m: f32,
-    pub(super) to_rx_m: f32,
-    /// The body's axis to the left of the path.
-    pub(super) aside_m: f32,
-    /// The path above the floor that the body stands on, and how much it rises toward the transmitter in a metre.
-    pub(super) path_m: f32,
-    pub(super) slope: f32,
-    /// How much of the body's depth and of its width lie across the path: sine and cosine between its heading and the path.
-    pub(super) turned: [f32; 2],
-    pub(super) height_m: f32,
-    /// How much wider than a usual body: [`Wave::scale`].
-    pub(super) scale: f32,
+struct Across {
+    from_tx_m: f32,
+    to_rx_m: f32,
+    aside_m: f32,
+    path_m: f32,
+    slope: f32,
+    height_m: f32,
 }
 
-/// Bodies across one link, by sample: numbers of [`Across`] side by side, for loops in vector registers.
+/// What is known of a body across a link: how far along the path it is from both ends, in plan view; how far its axis is to the left of
+/// the path; how high the path is above the floor that the body stands on, and how much it rises toward the transmitter in a metre; how
+/// much of the body's depth and of its width lie across the path, as sine and cosine between its heading and the path; its height; and
+/// how much wider it is than a usual body ([`Wave::scale`]).
+pub(super) const NUMBERS: usize = 9;
+
+/// Bodies across one link, by sample, each number beside those of others, for loops in vector registers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Crossings {
     /// Which power a body takes its share of.
@@ -58,8 +58,6 @@ pub(super) struct Crossings {
     numbers: [Vec<f32>; NUMBERS],
     passes: Vec<f32>,
 }
-
-const NUMBERS: usize = 9;
 
 impl Crossings {
     /// None yet.
@@ -70,11 +68,9 @@ impl Crossings {
 
     /// One more body, which takes its share of the power at this place.
     #[inline(always)]
-    pub(super) fn push(&mut self, at: usize, across: &Across) {
-        let Across { from_tx_m, to_rx_m, aside_m, path_m, slope, turned, height_m, scale } = *across;
+    pub(super) fn push(&mut self, at: usize, across: [f32; NUMBERS]) {
         self.at.push(at as u32);
-        let all = [from_tx_m, to_rx_m, aside_m, path_m, slope, turned[0], turned[1], height_m, scale];
-        self.numbers.iter_mut().zip(all).for_each(|(numbers, number)| numbers.push(number));
+        self.numbers.iter_mut().zip(across).for_each(|(numbers, number)| numbers.push(number));
     }
 
     /// Works out the share of the power that passes each body: a trunk and a head, as half widths, bottoms and tops.
@@ -87,16 +83,7 @@ impl Crossings {
         for (k, passes) in self.passes.iter_mut().enumerate() {
             let [from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale] =
                 of.map(|n| n[k]);
-            let across = Across {
-                from_tx_m,
-                to_rx_m,
-                aside_m,
-                path_m,
-                slope,
-                turned: [depth, width],
-                height_m,
-                scale,
-            };
+            let across = Across { from_tx_m, to_rx_m, aside_m, path_m, slope, height_m };
             let shoulders_m = SHOULDERS * height_m;
             let trunk = [half_trunk_m(scale, depth, width), 0.0, shoulders_m];
             let power = power(&across, &[trunk, [HEAD_M * scale, shoulders_m, height_m]]);
@@ -144,9 +131,9 @@ impl Wave {
         // Beyond the trunk's edge by CLEAR_NU of Fresnel's parameter, sqrt(2 / lambda (1 / d1 + 1 / d2)), squared.
         let beyond_m = aside_m.abs() - larger(TRUNK_M[1], 0.5 * ADULT_M[0]) * scale;
         let lengths_m = from_tx_m + to_rx_m;
-        beyond_m > 0.0
-            && 2.0 * self.per_wavelength * lengths_m * beyond_m * beyond_m
-                > CLEAR_NU * CLEAR_NU * from_tx_m * to_rx_m
+        (beyond_m > 0.0)
+            & (2.0 * self.per_wavelength * lengths_m * beyond_m * beyond_m
+                > CLEAR_NU * CLEAR_NU * from_tx_m * to_rx_m)
     }
 
     wide! {
@@ -323,14 +310,6 @@ fn half_trunk_m(scale: f32, depth: f32, width: f32) -> f32 {
 #[inline(always)]
 fn slant(across: &Across) -> f32 {
     (1.0 + across.slope * across.slope).sqrt()
-}
-
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }
 
 /// The angle whose tangent a number from 0 on is, to 1e-5: a polynomial of Abramowitz and Stegun, 4.4.49, which runs alike on

@@ -38,16 +38,11 @@ struct Case {
 fn compare(case: &Case) -> f64 {
     let (ap_m, ue_m) = (DVec3::new(case.length_m, 0.0, case.ap_z), DVec3::new(0.0, 0.0, 0.86));
     let passage = Passage::new(ap_m, ue_m, DVec2::new(case.at_m, case.aside_m), 0.0).unwrap();
-    let across = Across {
-        from_tx_m: passage.from_tx_m as f32,
-        to_rx_m: passage.to_rx_m as f32,
-        aside_m: passage.aside_m as f32,
-        path_m: passage.height_m as f32,
-        slope: passage.slope as f32,
-        turned: case.turned,
-        height_m: USUAL_M,
-        scale: 1.0,
-    };
+    let numbers = [passage.from_tx_m, passage.to_rx_m, passage.aside_m, passage.height_m, passage.slope]
+        .map(|x| x as f32);
+    let [from_tx_m, to_rx_m, aside_m, path_m, slope] = numbers;
+    let [depth, width] = case.turned;
+    let across = [from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, USUAL_M, 1.0];
     let [depth, width] = case.turned.map(f64::from);
     let half_m = (0.13 * depth).hypot(0.28 * width);
     let (shoulders_m, height_m) = (0.82 * 1.72, 1.72);
@@ -56,7 +51,7 @@ fn compare(case: &Case) -> f64 {
     let fast = |loss_model| {
         let radio = Radio { carrier_ghz: case.carrier_ghz, loss_model, ..Radio::default() };
         let (mut crossings, mut powers) = (Crossings::default(), [1.0]);
-        crossings.push(0, &across);
+        crossings.push(0, across);
         Wave::new(&radio, 20.0).pass(&mut crossings, &mut powers);
         -10.0 * f64::from(powers[0]).log10()
     };

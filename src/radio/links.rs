@@ -4,14 +4,14 @@
 use std::collections::BTreeMap;
 
 use super::beyond::Beyond;
-use super::body::{Across, Crossings, Wave};
+use super::body::{Crossings, NUMBERS, Wave};
 use super::outages::Outages;
 use crate::blockage::Caster;
 use crate::blockage::draws::Quantiles;
-use crate::blockage::lanes::{WORD, cos_sin};
+use crate::blockage::lanes::{WORD, cos_sin, larger};
 use crate::blockage::probability::chances_of;
 use crate::blockage::trajectories::{Disc, MOMENTS, Trajectories};
-use crate::elementary::ln;
+use crate::elementary::{ln, wide};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
 use crate::{STEPS, Site};
@@ -278,8 +278,15 @@ impl Fader {
         }
     }
 
-    /// Notes in which samples a body stands across a link at a step.
-    fn cross(
+    wide! {
+        /// Notes in which samples a body stands across a link at a step.
+        fn cross(
+            &mut self, access_point: usize, owner: usize, people: &[Trajectories], meeting: Meeting, samples: usize,
+        ) = cross_avx2 or cross_portably
+    }
+
+    #[inline(always)]
+    fn cross_portably(
         &mut self,
         access_point: usize,
         owner: usize,
@@ -289,50 +296,66 @@ impl Fader {
     ) {
         let Some(antenna) = &self.radios[access_point] else { return };
         let Meeting { body, step } = meeting;
-        let (q, p, ap_m) = (&people[owner], &people[body], antenna.place_m);
-        let place = |of: &Trajectories, k: usize| {
-            let base = of.mean_m[step] - ap_m.truncate();
-            let at = step * of.samples + k;
-            [base.x as f32 + of.off_m[0][at], base.y as f32 + of.off_m[1][at]]
-        };
-        let ahead = |of: usize, k: usize| {
-            let [x, y] = people[of].ahead[step].to_array().map(|part| part as f32);
-            let [cos, sin] = [self.turns[of][0][k], self.turns[of][1][k]];
-            [x * cos - y * sin, x * sin + y * cos]
-        };
-        let (share, ap_z) = (self.ue.height_share as f32, ap_m.z as f32);
+        let (q, p, wave) = (&people[owner], &people[body], &antenna.wave);
+        let [ap_x, ap_y, ap_z] = antenna.place_m.to_array();
+        let from_ap =
+            |of: &Trajectories| [of.mean_m[step].x - ap_x, of.mean_m[step].y - ap_y].map(|m| m as f32);
+        let ahead = |of: &Trajectories| of.ahead[step].to_array().map(|part| part as f32);
+        let ([aim_x, aim_y], [base_x, base_y]) = (from_ap(q), from_ap(p));
+        let ([owner_x, owner_y], [body_x, body_y]) = (ahead(q), ahead(p));
+        let (share, ap_z) = (self.ue.height_share as f32, ap_z as f32);
         let floors_m = [q.floor_m[step] as f32, p.floor_m[step] as f32];
-        for k in 0..samples {
-            let mut end_m = place(q, k);
-            let mut end_z = share * q.height_m[k] + floors_m[0];
-            if !self.ue.is_on_axis() {
-                let [x, y] = ahead(owner, k);
-                let [forward_m, left_m, up_m] = [0, 1, 2].map(|i| q.device_m[i][k]);
-                end_m = [end_m[0] + forward_m * x - left_m * y, end_m[1] + forward_m * y + left_m * x];
-                end_z += up_m;
-            }
-            let length_m = (end_m[0] * end_m[0] + end_m[1] * end_m[1]).sqrt().max(1e-3);
-            let to = [end_m[0] / length_m, end_m[1] / length_m];
-            let foot_m = place(p, k);
-            let from_tx_m = to[0] * foot_m[0] + to[1] * foot_m[1];
-            let slope = (ap_z - end_z) / length_m;
-            let scale = Wave::scale(p.height_m[k], p.width_scale[k]);
-            let aside_m = to[1] * foot_m[0] - to[0] * foot_m[1];
-            if antenna.wave.is_clear(scale, aside_m, from_tx_m, length_m - from_tx_m) {
-                continue;
-            }
-            let facing = ahead(body, k);
-            let across = Across {
-                from_tx_m,
-                to_rx_m: length_m - from_tx_m,
-                aside_m,
-                path_m: ap_z - slope * from_tx_m - floors_m[1],
-                slope,
-                turned: [to[0] * facing[1] - to[1] * facing[0], to[0] * facing[0] + to[1] * facing[1]],
-                height_m: p.height_m[k],
-                scale,
+        for first in (0..samples).step_by(WORD) {
+            let n = WORD.min(samples - first);
+            let of = |numbers: &'_ [f32], at: usize| -> [f32; WORD] {
+                let mut of = [0.0; WORD];
+                of[..n].copy_from_slice(&numbers[at + first..at + first + n]);
+                of
             };
-            self.crossings.push(step * samples + k, &across);
+            let [mut end_x, mut end_y] = [0, 1].map(|i| of(&q.off_m[i], step * q.samples));
+            let [foot_x, foot_y] = [0, 1].map(|i| of(&p.off_m[i], step * p.samples));
+            let (mut end_z, height_m) = (of(&q.height_m, 0), of(&p.height_m, 0));
+            let width_scale = of(&p.width_scale, 0);
+            let [cos, sin] = [0, 1].map(|i| of(&self.turns[body][i], 0));
+            for k in 0..WORD {
+                (end_x[k], end_y[k]) = (aim_x + end_x[k], aim_y + end_y[k]);
+                end_z[k] = share * end_z[k] + floors_m[0];
+            }
+            if !self.ue.is_on_axis() {
+                let [cos, sin] = [0, 1].map(|i| of(&self.turns[owner][i], 0));
+                let [forward_m, left_m, up_m] = [0, 1, 2].map(|i| of(&q.device_m[i], 0));
+                for k in 0..WORD {
+                    let (x, y) = (owner_x * cos[k] - owner_y * sin[k], owner_x * sin[k] + owner_y * cos[k]);
+                    end_x[k] += forward_m[k] * x - left_m[k] * y;
+                    end_y[k] += forward_m[k] * y + left_m[k] * x;
+                    end_z[k] += up_m[k];
+                }
+            }
+            let mut all = [[0.0; WORD]; NUMBERS];
+            let mut is_clear = [false; WORD];
+            for k in 0..WORD {
+                let length_m = larger((end_x[k] * end_x[k] + end_y[k] * end_y[k]).sqrt(), 1e-3);
+                let (to_x, to_y) = (end_x[k] / length_m, end_y[k] / length_m);
+                let (foot_x, foot_y) = (base_x + foot_x[k], base_y + foot_y[k]);
+                let from_tx_m = to_x * foot_x + to_y * foot_y;
+                let slope = (ap_z - end_z[k]) / length_m;
+                let scale = Wave::scale(height_m[k], width_scale[k]);
+                let aside_m = to_y * foot_x - to_x * foot_y;
+                let (x, y) = (body_x * cos[k] - body_y * sin[k], body_x * sin[k] + body_y * cos[k]);
+                is_clear[k] = wave.is_clear(scale, aside_m, from_tx_m, length_m - from_tx_m);
+                all[0][k] = from_tx_m;
+                all[1][k] = length_m - from_tx_m;
+                all[2][k] = aside_m;
+                all[3][k] = ap_z - slope * from_tx_m - floors_m[1];
+                all[4][k] = slope;
+                all[5][k] = to_x * y - to_y * x;
+                all[6][k] = to_x * x + to_y * y;
+                all[7][k] = height_m[k];
+                all[8][k] = scale;
+            }
+            for k in (0..n).filter(|&k| !is_clear[k]) {
+                self.crossings.push(step * samples + first + k, all.each_ref().map(|numbers| numbers[k]));
+            }
         }
     }
 }
