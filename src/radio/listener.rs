@@ -41,7 +41,7 @@ const ALIKE_S: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub struct Listener {
     misses: f64,
-    /// The last frames, oldest newest.
+    /// The last frames, oldest first.
     frames: Vec<Seen>,
     /// By access point and track.
     links: BTreeMap<(usize, u64), Link>,
