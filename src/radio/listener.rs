@@ -142,7 +142,9 @@ impl Listener {
         let heard_ns = newest.time_ns;
         let apart_ns = |seen: &&Seen| (seen.time_ns - heard_ns).abs();
         let Some(seen) = self.frames.iter().min_by_key(apart_ns) else { return };
-        let Some(blocked) = seen.of(newest.access_point, newest.track) else { return };
+        // A method without samples is the authors': nothing is told beside it.
+        let blocked = seen.of(newest.access_point, newest.track).filter(|words| !words.is_empty());
+        let Some(blocked) = blocked else { return };
         let misses = self.misses;
         let unheard =
             || Link { heard_ns, states: [1.0 - misses, 0.5 * misses, 0.5 * misses], fits: vec![0.0; asked] };

@@ -1,4 +1,5 @@
 use super::*;
+use crate::config::BlockageMethod;
 use crate::geometry::DVec2;
 use crate::radio::Report;
 use crate::site::{Radio, Ue};
@@ -110,6 +111,18 @@ fn any_cause_is_as_likely_as_each_of_them_and_windows_never_fall() {
             }
             assert!(any.p_now <= 1.0 && any.p.is_sorted() && any.p[8] <= 1.0, "{frame}: {any:?}");
         }
+    }
+}
+
+#[test]
+fn the_authors_method_says_the_same_whatever_is_heard() {
+    let mut config = config();
+    config.blockage.method = BlockageMethod::Algorithm1;
+    let [mut deaf, mut hears] = [(); 2].map(|()| Pipeline::new(&config, None).expect("a site that works"));
+    for frame in 1..40 {
+        let ways = [walks(frame, DVec2::new(0.0, 0.2)), walks(frame, DVec2::new(1.0, 0.0))];
+        let unheard = step(&mut deaf, frame, &ways, &[None, None]).to_vec();
+        assert_eq!(step(&mut hears, frame, &ways, &[Some(20.0), Some(0.0)]), unheard);
     }
 }
 
