@@ -123,7 +123,7 @@ impl Caster {
     }
 
     /// In which samples any cause blocks a link now, by its place among those of the last cast; in words, and nothing where no access
-    /// point has a radio.
+    /// point has a radio, or where the place of devices is known.
     pub(crate) fn blocked_now(&self, link: usize) -> impl Iterator<Item = u32> {
         self.sampler.blocked_now(link)
     }

@@ -43,7 +43,7 @@ impl Firsts {
     /// Blocked at a step after now and before this one.
     #[inline(always)]
     fn met(&self, step: usize, word: usize) -> u32 {
-        (1..step).fold(0, |met, step| met | self.new[step * self.words + word])
+        (1..step).fold(0, |met, step| met | self.first_at(step, word))
     }
 
     /// What of a word is blocked at a step for the first time.

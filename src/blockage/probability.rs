@@ -119,7 +119,8 @@ impl Sampler {
             things: Things::new(site),
             causes: Causes::default(),
             kept: Vec::new(),
-            keeps: site.access_points.iter().any(|ap| ap.radio.is_some()),
+            // Nobody weighs the samples of devices whose place is known (`radio::Listener`).
+            keeps: site.has_radio() && site.ue.spread_m > 0.0,
             kept_links: 0,
         }
     }
@@ -243,12 +244,12 @@ impl Sampler {
     }
 
     /// In which samples any cause blocks a link of the last draw now, by its place among the links asked; in words. Nothing where
-    /// there is no radio.
+    /// nothing is kept.
     pub(super) fn blocked_now(&self, link: usize) -> impl Iterator<Item = u32> {
         self.kept[..self.kept_links].get(link).into_iter().flat_map(Kept::any_now)
     }
 
-    /// What becomes of such a link if its samples weigh so much: as [`Self::chances`]. `None` where there is no radio.
+    /// What becomes of such a link if its samples weigh so much: as [`Self::chances`]. `None` where nothing is kept.
     pub(super) fn weighed(&self, link: usize, weights: &[f32], threshold: f64) -> Option<Chances> {
         let kept = self.kept[..self.kept_links].get(link)?;
         let weigh = |word: usize, bits: u32| weight_of(&weights[word * WORD..], bits);
