@@ -16,6 +16,8 @@ use umbracast::site::{AccessPoint, Radio, Ue};
 use umbracast::track::Track;
 use umbracast::{Config, Health, Mode, Pipeline, STEPS};
 use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast_eval::score::bootstrap::Pooled;
+use umbracast_eval::score::counts::Counts;
 use umbracast_network::reports::{self, LATE_NS};
 use umbracast_network::truth::{Air, Counted, Traces, TruthModel};
 use umbracast_sim::crowd::{Preset, strolling};
@@ -35,33 +37,27 @@ const PARTS: usize = 10;
 
 /// Instances of one window: what came of those told with a probability of each part, and of those not blocked now alone.
 #[derive(Debug, Clone, Copy, Default)]
-struct Counts {
+struct Window {
     parts: [(f64, f64, f64); PARTS],
-    /// True positives, false positives, false negatives.
-    all: [f64; 3],
-    onset: [f64; 3],
+    all: Counts,
+    onset: Counts,
 }
 
-impl Counts {
+impl Window {
     fn note(&mut self, p: f64, comes: bool, is_blocked: bool) {
         let (number, sum, came) = &mut self.parts[((p * PARTS as f64) as usize).min(PARTS - 1)];
         (*number, *sum, *came) = (*number + 1.0, *sum + p, *came + f64::from(u8::from(comes)));
-        let kind = match (p >= 0.5, comes) {
-            (true, true) => 0,
-            (true, false) => 1,
-            (false, true) => 2,
-            (false, false) => return,
-        };
-        self.all[kind] += 1.0;
-        self.onset[kind] += f64::from(u8::from(!is_blocked));
+        self.all.count(comes, p >= 0.5);
+        if !is_blocked {
+            self.onset.count(comes, p >= 0.5);
+        }
     }
 
     fn plus(mut self, other: &Self) -> Self {
         for (a, b) in self.parts.iter_mut().zip(&other.parts) {
             *a = (a.0 + b.0, a.1 + b.1, a.2 + b.2);
         }
-        self.all.iter_mut().zip(&other.all).for_each(|(a, b)| *a += b);
-        self.onset.iter_mut().zip(&other.onset).for_each(|(a, b)| *a += b);
+        (self.all, self.onset) = (self.all.plus(&other.all, 1), self.onset.plus(&other.onset, 1));
         self
     }
 
@@ -71,12 +67,12 @@ impl Counts {
     }
 }
 
-fn f1([hit, amiss, missed]: [f64; 3]) -> f64 {
-    2.0 * hit / (2.0 * hit + amiss + missed).max(1.0)
+fn f1(counts: Counts) -> f64 {
+    counts.f1().unwrap_or_default()
 }
 
 /// By whether reports were heard, and by window.
-type Scored = [[Counts; WINDOWS.len()]; 2];
+type Scored = [[Window; WINDOWS.len()]; 2];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let number = |n: usize, usual: u64| std::env::args().nth(n).and_then(|a| a.parse().ok()).unwrap_or(usual);
@@ -97,10 +93,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .collect::<Result<_, _>>()?;
             for (at, window) in WINDOWS.iter().enumerate() {
                 let of = |heard: usize| {
-                    scored.iter().fold(Counts::default(), |sum, scene| sum.plus(&scene[heard][at]))
+                    scored.iter().fold(Window::default(), |sum, scene| sum.plus(&scene[heard][at]))
                 };
                 let [without, with] = [of(0), of(1)];
-                let more = |pick: fn(&Counts) -> [f64; 3]| {
+                let more = |pick: fn(&Window) -> Counts| {
                     let more: Vec<f64> =
                         scored.iter().map(|s| f1(pick(&s[1][at])) - f1(pick(&s[0][at]))).collect();
                     let mean = more.iter().sum::<f64>() / more.len() as f64;
