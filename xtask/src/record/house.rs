@@ -148,11 +148,12 @@ pub fn tests(book: &mut Book) -> Result<()> {
     all_passed(&said)
 }
 
-/// What CI does apart from `.ci/run`: other formats, the training framework, licences and advisories, benchmarks.
+/// What CI does apart from `.ci/run`: nodes, the Python package, other formats, the training framework, licences and advisories,
+/// benchmarks.
 pub fn chores(book: &mut Book) -> Result<()> {
     let bench = "cargo bench --manifest-path bench/Cargo.toml -- --test";
     let mut failed = Vec::new();
-    for line in [".ci/formats", ".ci/train", "cargo deny check", bench] {
+    for line in [".ci/nodes", ".ci/python", ".ci/formats", ".ci/train", "cargo deny check", bench] {
         book.command(&format!("time {line}"));
         if line.starts_with("cargo deny") && book.bash(&root(), "command -v cargo-deny")?.is_empty() {
             book.line("not run: cargo-deny is not on this machine");
