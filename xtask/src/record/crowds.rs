@@ -219,7 +219,7 @@ const NETWORK_SEED: &str = "220000";
 
 /// Policies of changing access points, in closed loop.
 pub fn network(book: &mut Book) -> Result<()> {
-    book.umbracast_says(["network", "--scenes", "20", "--seed", NETWORK_SEED])
+    book.umbracast_says(["network", "--scenes", "40", "--seed", NETWORK_SEED])
 }
 
 /// The same over margins, procedures, crowds and access points, devices in the hand, and each model as truth and as predictor.
