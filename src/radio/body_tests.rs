@@ -21,7 +21,7 @@ fn fast_losses_are_the_exact_ones() {
     }
     assert_eq!(off_db.len(), 270);
     let mean_square = off_db.iter().map(|db| db * db).sum::<f64>() / off_db.len() as f64;
-    assert!(mean_square.sqrt() < 0.95, "{}", mean_square.sqrt());
+    assert!(mean_square.sqrt() < 0.75, "{}", mean_square.sqrt());
 }
 
 #[derive(Debug)]
@@ -50,10 +50,7 @@ fn compare(case: &Case) -> f64 {
         [passage.rectangle(half_m, 0.0, shoulders_m), passage.rectangle(0.1, shoulders_m, height_m)];
     let fast = |loss_model| {
         let radio = Radio { carrier_ghz: case.carrier_ghz, loss_model, ..Radio::default() };
-        let (mut crossings, mut powers) = (Crossings::default(), [1.0]);
-        crossings.push(0, across);
-        Wave::new(&radio, 20.0).pass(&mut crossings, &mut powers);
-        -10.0 * f64::from(powers[0]).log10()
+        f64::from(Wave::new(&radio, 20.0).losses_db(&across.map(|number| [number; WORD]), 1)[0])
     };
     let wavelength_m = Radio { carrier_ghz: case.carrier_ghz, ..Radio::default() }.wavelength_m();
     let near = |model, exact: f64, within_db: f64| {
@@ -72,8 +69,8 @@ fn compare(case: &Case) -> f64 {
     near(LossModel::ThreeEdges, three, 0.6);
     let mean = models::kirchhoff_mean(wavelength_m, &passage, &body, 0.04);
     let off_db = fast(LossModel::Kirchhoff) - mean;
-    // In a deep shadow five places do not average every fringe out.
-    assert!(mean > 15.0 || off_db.abs() < 1.5, "{case:?}: {off_db} off {mean}");
+    // In a deep shadow the grid does not hold every fringe.
+    assert!(mean > 8.0 || off_db.abs() < 1.0, "{case:?}: {off_db} off {mean}");
     off_db
 }
 

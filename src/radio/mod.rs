@@ -3,6 +3,7 @@
 pub mod fresnel;
 mod passage;
 pub mod models;
+mod kirchhoff;
 mod body;
 mod outages;
 mod beyond;
