@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use super::fresnel::integrals_f32;
 use super::kirchhoff::{
-    HEAD_M, NUMBERS, SHOULDERS, TRUNK_M, Table, USUAL_M, Word, WordOf, half_trunk_m, loss_db,
+    CLEAR_NU, HEAD_M, NEAREST_M, NUMBERS, SHOULDERS, TRUNK_M, Table, USUAL_M, Word, WordOf, half_trunk_m,
+    loss_db,
 };
 use crate::blockage::lanes::{WORD, larger, smaller};
 use crate::site::{LossModel, Radio};
@@ -14,10 +15,6 @@ use crate::site::{LossModel, Radio};
 /// 3GPP TR 38.901: the human that blocks, and the adult of the sensing channel; width and height.
 const HUMAN_M: [f32; 2] = [0.3, 1.7];
 const ADULT_M: [f32; 2] = [0.5, 1.75];
-/// So far beyond an edge, in Fresnel's parameter, a path is as free as any: its loss swings by .4 dB about nothing.
-const CLEAR_NU: f32 = 3.0;
-/// What stands nearer to an end of the path cannot be told from who holds it: it costs nothing.
-const NEAREST_M: f32 = 0.05;
 
 /// A body across a link, of one sample.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +40,14 @@ pub(super) struct Wave {
 #[derive(Debug, Clone)]
 enum Model {
     Kirchhoff(Arc<Table>),
-    Formula(LossModel),
+    /// Model B on a screen of this width and height.
+    Screen([f32; 2]),
+    /// Model B on a trunk and a head.
+    Body,
+    /// Round both sides.
+    KnifeEdges,
+    /// And over the top.
+    ThreeEdges,
 }
 
 /// No trunk that carries nothing reaches farther from its axis, whatever its width scale.
@@ -58,7 +62,11 @@ impl Wave {
         let per_wavelength = (1.0 / wavelength_m) as f32;
         let model = match radio.loss_model {
             LossModel::Kirchhoff => Model::Kirchhoff(Arc::new(Table::new(per_wavelength, longest_m as f32))),
-            other => Model::Formula(other),
+            LossModel::ModelB => Model::Screen(HUMAN_M),
+            LossModel::ModelBAdult => Model::Screen(ADULT_M),
+            LossModel::ModelBBody => Model::Body,
+            LossModel::KnifeEdges => Model::KnifeEdges,
+            LossModel::ThreeEdges => Model::ThreeEdges,
         };
         Self { per_wavelength, model, beside_m: WIDEST_M + 1.5 * zone_m, above_m: 1.5 * zone_m }
     }
@@ -85,19 +93,17 @@ impl Wave {
     pub(super) fn losses_db(&self, of: &WordOf<NUMBERS>, open: u32) -> Word {
         let near = |k: usize| smaller(of[0][k], of[1][k]) < NEAREST_M;
         let open = (0..WORD).fold(open, |open, k| if near(k) { open & !(1 << k) } else { open });
-        let screen = |[width_m, top_m]: [f32; 2]| [[0.5 * width_m, 0.0, top_m]];
-        let model = match &self.model {
-            Model::Kirchhoff(table) => return table.losses_db(of, open),
-            Model::Formula(model) => *model,
-        };
-        work_out(of, open, |across, body| match model {
-            LossModel::Kirchhoff => 1.0, // it has its table
-            LossModel::ModelB => self.model_b(across, &screen(HUMAN_M)),
-            LossModel::ModelBAdult => self.model_b(across, &screen(ADULT_M)),
-            LossModel::ModelBBody => self.model_b(across, body),
-            LossModel::KnifeEdges => self.edges(across, body[0][0], None),
-            LossModel::ThreeEdges => self.edges(across, body[0][0], Some(across.height_m)),
-        })
+        match &self.model {
+            Model::Kirchhoff(table) => table.losses_db(of, open),
+            Model::Screen([width_m, top_m]) => {
+                work_out(of, open, |across, _| self.model_b(across, &[[0.5 * width_m, 0.0, *top_m]]))
+            }
+            Model::Body => work_out(of, open, |across, body| self.model_b(across, body)),
+            Model::KnifeEdges => work_out(of, open, |across, body| self.edges(across, body[0][0], None)),
+            Model::ThreeEdges => {
+                work_out(of, open, |across, body| self.edges(across, body[0][0], Some(across.height_m)))
+            }
+        }
     }
 
     /// Fresnel's parameter for a metre across the path.

@@ -8,12 +8,15 @@ use crate::radio::{Passage, Rectangle};
 fn fast_losses_are_the_exact_ones() {
     let mut off_db = Vec::new();
     for carrier_ghz in [28.0, 60.0, 140.0] {
+        let waves = MODELS.map(|loss_model| {
+            (loss_model, Wave::new(&Radio { carrier_ghz, loss_model, ..Radio::default() }, 20.0))
+        });
         for (ap_z, length_m) in [(2.0, 8.0), (3.0, 12.0)] {
             for at_m in [0.4, 1.0, 3.0] {
                 for aside_m in [0.0, 0.08, 0.2, 0.3, 0.5] {
                     for turned in [[0.0, 1.0], [1.0, 0.0], [0.6, 0.8]] {
                         let case = Case { carrier_ghz, ap_z, length_m, at_m, aside_m, turned };
-                        off_db.push(compare(&case));
+                        off_db.push(compare(&case, &waves));
                     }
                 }
             }
@@ -22,6 +25,48 @@ fn fast_losses_are_the_exact_ones() {
     assert_eq!(off_db.len(), 270);
     let mean_square = off_db.iter().map(|db| db * db).sum::<f64>() / off_db.len() as f64;
     assert!(mean_square.sqrt() < 0.75, "{}", mean_square.sqrt());
+}
+
+const MODELS: [LossModel; 6] = [
+    LossModel::Kirchhoff,
+    LossModel::ModelB,
+    LossModel::ModelBAdult,
+    LossModel::ModelBBody,
+    LossModel::KnifeEdges,
+    LossModel::ThreeEdges,
+];
+
+/// No number ends the program, and none of them is lost where another is not one.
+#[test]
+fn whatever_the_numbers_are_a_loss_is_told() {
+    let usual = [3.0, 3.0, 0.1, 1.0, 0.1, 0.0, 1.0, 1.72, 1.0];
+    for carrier_ghz in [0.5, 28.0, 300.0, 1000.0] {
+        for longest_m in [0.1, 30.0, 1e5] {
+            let wave = Wave::new(&Radio { carrier_ghz, ..Radio::default() }, longest_m);
+            for number in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -1.0, 1e30, 1e-30] {
+                for which in 0..NUMBERS {
+                    let mut of = usual.map(|number| [number; WORD]);
+                    of[which] = [number; WORD];
+                    let losses_db = wave.losses_db(&of, !0);
+                    assert!(
+                        losses_db.iter().all(|db| (-3.1..=50.1).contains(db)),
+                        "{which} {number}: {losses_db:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// A path that is higher above a head than the grid reaches is free, however many heads it passes.
+#[test]
+fn a_path_high_above_a_head_is_free() {
+    let wave = Wave::new(&Radio::default(), 20.0);
+    let of = |path_m: f32| {
+        wave.losses_db(&[3.0, 3.0, 0.0, path_m, 0.1, 0.0, 1.0, 1.72, 1.0].map(|x| [x; WORD]), 1)[0]
+    };
+    assert!([2.2, 2.4, 3.0, 6.0].iter().all(|&path_m| of(path_m).abs() < 1e-3), "{}", of(2.2));
+    assert!(of(1.3) > 5.0);
 }
 
 #[derive(Debug)]
@@ -35,7 +80,7 @@ struct Case {
 }
 
 /// How far the fast integral is from the exact one; the other models are held here.
-fn compare(case: &Case) -> f64 {
+fn compare(case: &Case, waves: &[(LossModel, Wave)]) -> f64 {
     let (ap_m, ue_m) = (DVec3::new(case.length_m, 0.0, case.ap_z), DVec3::new(0.0, 0.0, 0.86));
     let passage = Passage::new(ap_m, ue_m, DVec2::new(case.at_m, case.aside_m), 0.0).unwrap();
     let numbers = [passage.from_tx_m, passage.to_rx_m, passage.aside_m, passage.height_m, passage.slope]
@@ -48,9 +93,9 @@ fn compare(case: &Case) -> f64 {
     let (shoulders_m, height_m) = (0.82 * 1.72, 1.72);
     let body: [Rectangle; 2] =
         [passage.rectangle(half_m, 0.0, shoulders_m), passage.rectangle(0.1, shoulders_m, height_m)];
-    let fast = |loss_model| {
-        let radio = Radio { carrier_ghz: case.carrier_ghz, loss_model, ..Radio::default() };
-        f64::from(Wave::new(&radio, 20.0).losses_db(&across.map(|number| [number; WORD]), 1)[0])
+    let fast = |model| {
+        let (_, wave) = waves.iter().find(|(of, _)| *of == model).unwrap();
+        f64::from(wave.losses_db(&across.map(|number| [number; WORD]), 1)[0])
     };
     let wavelength_m = Radio { carrier_ghz: case.carrier_ghz, ..Radio::default() }.wavelength_m();
     let near = |model, exact: f64, within_db: f64| {

@@ -28,7 +28,7 @@ pub fn integrals(x: f64) -> Complex {
     of_size.map(|part| part.copysign(x))
 }
 
-/// C and S in single precision, to 1.5e-4, without a branch: for loops in vector registers. C = 1/2 + f sin - g cos and
+/// C and S in single precision, to 1.5e-4, without a branch. C = 1/2 + f sin - g cos and
 /// S = 1/2 - f cos - g sin of pi x^2 / 2 (Abramowitz and Stegun, 7.3.9 and 7.3.10); f and g are smooth, and here polynomials in
 /// 1 / (1 + 0.8 x) whose largest error is the least.
 #[inline(always)]

@@ -24,7 +24,8 @@ pub(super) const NUMBERS: usize = 9;
 
 /// Losses over a grid: how fine the fringes are (the square of Fresnel's parameter for a metre), half the trunk's width, how far the
 /// body's axis is beside the path, and how far the top of its head is above it. Lengths are those of a body of the usual height. The
-/// grid leaves out that a head is wider where a person is: this and the grid move a loss by half a dB, a body's shape by five.
+/// grid leaves out that a head is wider where a person is: this and the grid move a loss by less than a dB, a body's shape by five. Who
+/// is much wider than others is held to the widest.
 #[derive(Debug, Clone)]
 pub(super) struct Table {
     per_wavelength: f32,
@@ -49,12 +50,12 @@ const SLICE_BITS: u32 = 21;
 const HALF_M: [f32; 2] = [0.1, 0.36];
 const WIDTHS: usize = 8;
 const PLACES: usize = 32;
-/// So far above a path the top of a head may be: then the path passes the trunk alone.
+/// So far above a path the top of a head may be: then the path passes the trunk alone, unless fringes are so wide that its feet count.
 const ABOVE_M: f32 = 0.9;
-/// So far beyond an edge the grid reaches, in Fresnel's parameter.
-const BEYOND_NU: f32 = 3.0;
-/// The finest fringes are those of a body so near to an antenna.
-const NEAREST_M: f32 = 0.05;
+/// So far beyond an edge, in Fresnel's parameter, a path is as free as any: its loss swings by .4 dB about nothing. Here the grid ends.
+pub(super) const CLEAR_NU: f32 = 3.0;
+/// What stands nearer to an end of the path cannot be told from who holds it: it costs nothing.
+pub(super) const NEAREST_M: f32 = 0.05;
 const LEAST_DB: f32 = -4.0;
 const STEP_DB: f32 = 1e-3;
 
@@ -108,9 +109,10 @@ impl Table {
     /// A slice more, of this Fresnel's parameter for a metre.
     fn add(&mut self, nu_per_m: f32) {
         let last = (PLACES - 1) as f32;
-        let beyond_m = BEYOND_NU / nu_per_m;
+        let beyond_m = CLEAR_NU / nu_per_m;
         let beside_m = (HALF_M[1] + beyond_m) / last;
-        let above_m = (ABOVE_M + beyond_m) / last;
+        let highest_m = if beyond_m < USUAL_M - ABOVE_M { ABOVE_M } else { USUAL_M };
+        let above_m = (highest_m + beyond_m) / last;
         self.slices.push(Slice {
             lowest_m: -beyond_m,
             beside_per_m: 1.0 / beside_m,
@@ -139,11 +141,14 @@ impl Table {
                     [half_m, HEAD_M].map(|half_m| through(aside_m - half_m, aside_m + half_m))
                 })
             });
-            for up in &ups {
+            for (above, up) in ups.iter().enumerate() {
+                // What lies farther out is looked up here: it is free, not on the fringe that happens to be there.
+                let is_free = above == 0 || place == PLACES - 1;
                 self.losses.extend(sides.iter().map(|sides| {
                     let powers =
                         sides.iter().zip(SHIFTS_M).map(|(side, (_, weight))| weight * passed(side, up));
-                    ((loss_db(powers.sum()) - LEAST_DB) / STEP_DB).round() as u16
+                    let db = if is_free { 0.0 } else { loss_db(powers.sum()) };
+                    ((db - LEAST_DB) / STEP_DB).round() as u16
                 }));
             }
         }

@@ -113,14 +113,25 @@ impl Fader {
     /// Needs the site's access points, their radios and where the UE is.
     pub fn new(site: &Site) -> Self {
         let [least_m, most_m] = site.hall.bounds_m();
-        let longest_m = least_m.distance(most_m).hypot(site.hall.height_m);
-        // Alike radios share what is worked out for them.
+        // An access point may hang outside an outline.
+        let far_m = |ap: &AccessPoint| {
+            let at_m = ap.position().truncate();
+            (at_m - least_m).abs().max((at_m - most_m).abs()).length()
+        };
+        let farthest_m = site.access_points.iter().map(far_m).fold(0.0, f64::max);
+        let longest_m = farthest_m.hypot(site.hall.height_m);
+        // Radios of one carrier share what is worked out for it.
         let mut waves: Vec<(Radio, Wave)> = Vec::new();
         let mut antenna = |ap: &AccessPoint| {
             let radio = ap.radio?;
-            let known = waves.iter().find(|(of, _)| *of == radio).map(|(_, wave)| wave.clone());
-            let wave = known.unwrap_or_else(|| Wave::new(&radio, longest_m));
-            waves.push((radio, wave.clone()));
+            let is_alike =
+                |of: &Radio| (of.carrier_ghz, of.loss_model) == (radio.carrier_ghz, radio.loss_model);
+            let known = waves.iter().find(|(of, _)| is_alike(of)).map(|(_, wave)| wave.clone());
+            let wave = known.unwrap_or_else(|| {
+                let wave = Wave::new(&radio, longest_m);
+                waves.push((radio, wave.clone()));
+                wave
+            });
             let Radio { margin_db, fade_spread: spreads, .. } = radio;
             Some(Antenna { place_m: ap.position(), wave, margin_db, spreads })
         };
