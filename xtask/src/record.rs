@@ -108,7 +108,7 @@ const JOBS: [Job; 53] = [
     job("slurm", "the job files on a Slurm of this one machine", 3, Needs::Program("slurmctld"), house::slurm),
     job("kubernetes", "the job files as a cluster would read them", 3, Needs::Program("python3"), house::kubernetes),
     job("tests", "CI on a fresh clone, nothing built, step by step", 16, Needs::Asking, house::tests),
-    job("chores", "what CI does apart: other formats, the training framework, licences, benchmarks", 40, Needs::Asking, house::chores),
+    job("chores", "what CI does apart: nodes, Python, other formats, the training framework, licences, benchmarks", 60, Needs::Asking, house::chores),
     job("python", "from a clone to a link in Python, and the benchmark of predictors", 12, Needs::Asking, house::python),
     job("fresh-clone", "the first command on a fresh clone, nothing built", 4, Needs::Asking, house::fresh_clone),
     job("structure", "files, imports, circles, in words", 1, Needs::Nothing, house::structure),

@@ -26,8 +26,9 @@ fn every_whole_input_is_understood() {
     for target in &TARGETS {
         for (number, whole) in (target.corpus)().iter().enumerate() {
             // A server that reads the end of what is said before it answers may hang up: a busy machine is given five tries.
-            let mut tries = (0..5).map(|_| checked(target, 0, whole));
-            let checked = tries.find(|checked| *checked != Ok(false)).unwrap_or(Ok(false));
+            let tries = if target.name == "http" { 5 } else { 1 };
+            let mut found = (0..tries).map(|_| checked(target, 0, whole));
+            let checked = found.find(|checked| *checked != Ok(false)).unwrap_or(Ok(false));
             // No frame of these has anybody in it, and no request may be posted.
             let may_be_refused = target.name == "step" && number > 3 || whole.starts_with(b"POST");
             if checked != Ok(true) && (checked != Ok(false) || !may_be_refused) {
