@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use super::fresnel::integrals_f32;
 use super::kirchhoff::{
-    CLEAR_NU, HEAD_M, NEAREST_M, NUMBERS, SHOULDERS, TRUNK_M, Table, USUAL_M, Word, WordOf, half_trunk_m,
-    loss_db,
+    Across, CLEAR_NU, HEAD_M, NEAREST_M, SHOULDERS, TRUNK_M, Table, USUAL_M, Word, half_trunk_m, loss_db,
 };
 use crate::blockage::lanes::{WORD, larger, smaller};
 use crate::site::{LossModel, Radio};
@@ -15,17 +14,6 @@ use crate::site::{LossModel, Radio};
 /// 3GPP TR 38.901: the human that blocks, and the adult of the sensing channel; width and height.
 const HUMAN_M: [f32; 2] = [0.3, 1.7];
 const ADULT_M: [f32; 2] = [0.5, 1.75];
-
-/// A body across a link, of one sample.
-#[derive(Debug, Clone, Copy)]
-struct Across {
-    from_tx_m: f32,
-    to_rx_m: f32,
-    aside_m: f32,
-    path_m: f32,
-    slope: f32,
-    height_m: f32,
-}
 
 /// A radio's numbers.
 #[derive(Debug, Clone)]
@@ -77,22 +65,21 @@ impl Wave {
         height_m / USUAL_M * width_scale
     }
 
-    /// Whether a body stands so far beside a path that what it costs is not worth telling, whichever way it faces.
+    /// Whether what a body costs is not worth telling, whichever way it faces: it stands far beside a path, or at an end of it.
     #[inline(always)]
     pub(super) fn is_clear(&self, scale: f32, aside_m: f32, from_tx_m: f32, to_rx_m: f32) -> bool {
         // Beyond the trunk's edge by CLEAR_NU of Fresnel's parameter, sqrt(2 / lambda (1 / d1 + 1 / d2)), squared.
         let beyond_m = aside_m.abs() - larger(TRUNK_M[1], 0.5 * ADULT_M[0]) * scale;
         let lengths_m = from_tx_m + to_rx_m;
-        (beyond_m > 0.0)
+        let is_beside = (beyond_m > 0.0)
             & (2.0 * self.per_wavelength * lengths_m * beyond_m * beyond_m
-                > CLEAR_NU * CLEAR_NU * from_tx_m * to_rx_m)
+                > CLEAR_NU * CLEAR_NU * from_tx_m * to_rx_m);
+        is_beside | (smaller(from_tx_m, to_rx_m) < NEAREST_M)
     }
 
-    /// What the bodies with these numbers cost, dB; nothing where the sample's bit is not `open`.
+    /// What bodies cost, dB; nothing where a sample's bit is not `open`.
     #[inline(always)]
-    pub(super) fn losses_db(&self, of: &WordOf<NUMBERS>, open: u32) -> Word {
-        let near = |k: usize| smaller(of[0][k], of[1][k]) < NEAREST_M;
-        let open = (0..WORD).fold(open, |open, k| if near(k) { open & !(1 << k) } else { open });
+    pub(super) fn losses_db(&self, of: &Across<Word>, open: u32) -> Word {
         match &self.model {
             Model::Kirchhoff(table) => table.losses_db(of, open),
             Model::Screen([width_m, top_m]) => {
@@ -108,13 +95,13 @@ impl Wave {
 
     /// Fresnel's parameter for a metre across the path.
     #[inline(always)]
-    fn nu_per_m(&self, across: &Across, slant: f32) -> f32 {
+    fn nu_per_m(&self, across: &Across<f32>, slant: f32) -> f32 {
         let near = 1.0 / across.from_tx_m + 1.0 / across.to_rx_m;
         (2.0 * self.per_wavelength * near / slant).sqrt()
     }
 
     #[inline(always)]
-    fn model_b<const N: usize>(&self, across: &Across, parts: &[[f32; 3]; N]) -> f32 {
+    fn model_b<const N: usize>(&self, across: &Across<f32>, parts: &[[f32; 3]; N]) -> f32 {
         let slant = slant(across);
         let (tx_m, rx_m) = (across.from_tx_m * slant, across.to_rx_m * slant);
         let detour_m = |off_m: f32| {
@@ -140,7 +127,7 @@ impl Wave {
 
     /// Round both sides, and over the top where there is one: powers.
     #[inline(always)]
-    fn edges(&self, across: &Across, half_m: f32, top_m: Option<f32>) -> f32 {
+    fn edges(&self, across: &Across<f32>, half_m: f32, top_m: Option<f32>) -> f32 {
         let per_m = self.nu_per_m(across, if top_m.is_some() { slant(across) } else { 1.0 });
         let round = |covered_m: f32| {
             let [c, s] = integrals_f32(per_m * covered_m);
@@ -155,21 +142,29 @@ impl Wave {
 
 /// What the bodies cost of which `power` passes, given a trunk and a head: half widths, bottoms and tops.
 #[inline(always)]
-fn work_out(of: &WordOf<NUMBERS>, open: u32, power: impl Fn(&Across, &[[f32; 3]; 2]) -> f32) -> Word {
+fn work_out(of: &Across<Word>, open: u32, power: impl Fn(&Across<f32>, &[[f32; 3]; 2]) -> f32) -> Word {
     let mut db = [0.0; WORD];
     for k in (0..WORD).filter(|k| open >> k & 1 == 1) {
-        let [from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale] =
-            of.each_ref().map(|n| n[k]);
-        let across = Across { from_tx_m, to_rx_m, aside_m, path_m, slope, height_m };
-        let shoulders_m = SHOULDERS * height_m;
-        let trunk = [half_trunk_m(scale, depth, width), 0.0, shoulders_m];
-        db[k] = loss_db(power(&across, &[trunk, [HEAD_M * scale, shoulders_m, height_m]]));
+        let across = Across {
+            from_tx_m: of.from_tx_m[k],
+            to_rx_m: of.to_rx_m[k],
+            aside_m: of.aside_m[k],
+            path_m: of.path_m[k],
+            slope: of.slope[k],
+            depth: of.depth[k],
+            width: of.width[k],
+            height_m: of.height_m[k],
+            scale: of.scale[k],
+        };
+        let shoulders_m = SHOULDERS * across.height_m;
+        let trunk = [half_trunk_m(across.scale, across.depth, across.width), 0.0, shoulders_m];
+        db[k] = loss_db(power(&across, &[trunk, [HEAD_M * across.scale, shoulders_m, across.height_m]]));
     }
     db
 }
 
 #[inline(always)]
-fn slant(across: &Across) -> f32 {
+fn slant(across: &Across<f32>) -> f32 {
     (1.0 + across.slope * across.slope).sqrt()
 }
 

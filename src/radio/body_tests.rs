@@ -44,10 +44,10 @@ fn whatever_the_numbers_are_a_loss_is_told() {
         for longest_m in [0.1, 30.0, 1e5] {
             let wave = Wave::new(&Radio { carrier_ghz, ..Radio::default() }, longest_m);
             for number in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -1.0, 1e30, 1e-30] {
-                for which in 0..NUMBERS {
-                    let mut of = usual.map(|number| [number; WORD]);
-                    of[which] = [number; WORD];
-                    let losses_db = wave.losses_db(&of, !0);
+                for which in 0..usual.len() {
+                    let mut of = usual;
+                    of[which] = number;
+                    let losses_db = wave.losses_db(&word(of), !0);
                     assert!(
                         losses_db.iter().all(|db| (-3.1..=50.1).contains(db)),
                         "{which} {number}: {losses_db:?}"
@@ -62,9 +62,7 @@ fn whatever_the_numbers_are_a_loss_is_told() {
 #[test]
 fn a_path_high_above_a_head_is_free() {
     let wave = Wave::new(&Radio::default(), 20.0);
-    let of = |path_m: f32| {
-        wave.losses_db(&[3.0, 3.0, 0.0, path_m, 0.1, 0.0, 1.0, 1.72, 1.0].map(|x| [x; WORD]), 1)[0]
-    };
+    let of = |path_m: f32| wave.losses_db(&word([3.0, 3.0, 0.0, path_m, 0.1, 0.0, 1.0, 1.72, 1.0]), 1)[0];
     assert!([2.2, 2.4, 3.0, 6.0].iter().all(|&path_m| of(path_m).abs() < 1e-3), "{}", of(2.2));
     assert!(of(1.3) > 5.0);
 }
@@ -79,6 +77,13 @@ struct Case {
     turned: [f32; 2],
 }
 
+/// A word of bodies that are alike, of numbers in the order of [`Across`].
+fn word(numbers: [f32; 9]) -> Across<Word> {
+    let [from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale] =
+        numbers.map(|number| [number; WORD]);
+    Across { from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale }
+}
+
 /// How far the fast integral is from the exact one; the other models are held here.
 fn compare(case: &Case, waves: &[(LossModel, Wave)]) -> f64 {
     let (ap_m, ue_m) = (DVec3::new(case.length_m, 0.0, case.ap_z), DVec3::new(0.0, 0.0, 0.86));
@@ -87,7 +92,7 @@ fn compare(case: &Case, waves: &[(LossModel, Wave)]) -> f64 {
         .map(|x| x as f32);
     let [from_tx_m, to_rx_m, aside_m, path_m, slope] = numbers;
     let [depth, width] = case.turned;
-    let across = [from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, USUAL_M, 1.0];
+    let across = word([from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, USUAL_M, 1.0]);
     let [depth, width] = case.turned.map(f64::from);
     let half_m = (0.13 * depth).hypot(0.28 * width);
     let (shoulders_m, height_m) = (0.82 * 1.72, 1.72);
@@ -95,7 +100,7 @@ fn compare(case: &Case, waves: &[(LossModel, Wave)]) -> f64 {
         [passage.rectangle(half_m, 0.0, shoulders_m), passage.rectangle(0.1, shoulders_m, height_m)];
     let fast = |model| {
         let (_, wave) = waves.iter().find(|(of, _)| *of == model).unwrap();
-        f64::from(wave.losses_db(&across.map(|number| [number; WORD]), 1)[0])
+        f64::from(wave.losses_db(&across, 1)[0])
     };
     let wavelength_m = Radio { carrier_ghz: case.carrier_ghz, ..Radio::default() }.wavelength_m();
     let near = |model, exact: f64, within_db: f64| {

@@ -12,15 +12,27 @@ pub(super) const HEAD_M: f32 = passage::HEAD_M as f32;
 pub(super) const USUAL_M: f32 = passage::USUAL_M as f32;
 pub(super) const SHOULDERS: f32 = passage::SHOULDERS as f32;
 
-/// Numbers of a word of samples, each beside those of the others, for loops in vector registers.
-pub(super) type WordOf<const N: usize> = [Word; N];
+/// A number of each sample of a word, for loops in vector registers.
 pub(super) type Word = [f32; WORD];
 
-/// What is known of a body across a link: how far along the path it is from both ends, in plan view; how far its axis is to the left of
-/// the path; how high the path is above the floor that the body stands on, and how much it rises toward the transmitter in a metre; how
-/// much of the body's depth and of its width lie across the path, as sine and cosine between its heading and the path; its height; and
-/// how much wider it is than a usual body ([`super::body::Wave::scale`]).
-pub(super) const NUMBERS: usize = 9;
+/// A body across a link: of one sample, or of a word of them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Across<T> {
+    /// Along the path in plan view, from its ends.
+    pub(super) from_tx_m: T,
+    pub(super) to_rx_m: T,
+    /// The body's axis to the left of the path.
+    pub(super) aside_m: T,
+    /// The path above the floor that the body stands on, and how much it rises toward the transmitter in a metre.
+    pub(super) path_m: T,
+    pub(super) slope: T,
+    /// How much of the body's depth and of its width lie across the path: sine and cosine between its heading and the path.
+    pub(super) depth: T,
+    pub(super) width: T,
+    pub(super) height_m: T,
+    /// How much wider than a usual body: [`super::body::Wave::scale`].
+    pub(super) scale: T,
+}
 
 /// Losses over a grid: how fine the fringes are (the square of Fresnel's parameter for a metre), half the trunk's width, how far the
 /// body's axis is beside the path, and how far the top of its head is above it. Lengths are those of a body of the usual height. The
@@ -154,10 +166,10 @@ impl Table {
         }
     }
 
-    /// What bodies with these numbers cost, dB; nothing where a sample's bit is not `open`.
+    /// What bodies cost, dB; nothing where a sample's bit is not `open`.
     #[inline(always)]
-    pub(super) fn losses_db(&self, of: &WordOf<NUMBERS>, open: u32) -> Word {
-        let [from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale] = of;
+    pub(super) fn losses_db(&self, of: &Across<Word>, open: u32) -> Word {
+        let Across { from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale } = of;
         let mut bits = [0; WORD];
         let [mut half_m, mut beside_m, mut above_m] = [[0.0; WORD]; 3];
         for k in 0..WORD {

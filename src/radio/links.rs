@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::beyond::Beyond;
 use super::body::Wave;
-use super::kirchhoff::{NUMBERS, Word};
+use super::kirchhoff::{Across, Word};
 use super::outages::Outages;
 use crate::blockage::Caster;
 use crate::blockage::draws::Quantiles;
@@ -244,16 +244,13 @@ impl Fader {
             self.cross(access_point, owner, people, self.meetings[meeting], samples);
         }
         let Some(antenna) = &self.radios[access_point] else { return loss };
-        if !self.spreads.contains_key(&(access_point, track)) {
+        let spread = self.spreads.entry((access_point, track)).or_insert_with(|| {
             let quantiles = self.quantiles.get_or_insert_with(|| Quantiles::new(asked));
-            let key = track.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (access_point as u64 + 1) << 32;
-            self.spreads.insert((access_point, track), quantiles.normal(key));
-        }
-        if let Some(spread) = self.spreads.get(&(access_point, track)) {
-            for of_step in self.losses_db.chunks_exact_mut(samples) {
-                for (db, deeper) in of_step.iter_mut().zip(spread) {
-                    *db += deeper * spread_db(*db, antenna.spreads);
-                }
+            quantiles.normal(track.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (access_point as u64 + 1) << 32)
+        });
+        for of_step in self.losses_db.chunks_exact_mut(samples) {
+            for (db, deeper) in of_step.iter_mut().zip(&*spread) {
+                *db += deeper * spread_db(*db, antenna.spreads);
             }
         }
         for step in 0..MOMENTS {
@@ -337,7 +334,7 @@ impl Fader {
                     end_z[k] += up_m[k];
                 }
             }
-            let (mut all, mut open) = ([[0.0; WORD]; NUMBERS], [0; WORD]);
+            let (mut across, mut open) = (Across::<Word>::default(), [0; WORD]);
             for k in 0..WORD {
                 let length_m = larger((end_x[k] * end_x[k] + end_y[k] * end_y[k]).sqrt(), 1e-3);
                 let (to_x, to_y) = (end_x[k] / length_m, end_y[k] / length_m);
@@ -349,20 +346,20 @@ impl Fader {
                 let (x, y) = (body_x * cos[k] - body_y * sin[k], body_x * sin[k] + body_y * cos[k]);
                 let is_clear = wave.is_clear(scale, aside_m, from_tx_m, length_m - from_tx_m);
                 open[k] = if is_clear || k >= n { 0 } else { 1_u32 << k };
-                all[0][k] = from_tx_m;
-                all[1][k] = length_m - from_tx_m;
-                all[2][k] = aside_m;
-                all[3][k] = ap_z - slope * from_tx_m - floors_m[1];
-                all[4][k] = slope;
-                all[5][k] = to_x * y - to_y * x;
-                all[6][k] = to_x * x + to_y * y;
-                all[7][k] = height_m[k];
-                all[8][k] = scale;
+                across.from_tx_m[k] = from_tx_m;
+                across.to_rx_m[k] = length_m - from_tx_m;
+                across.aside_m[k] = aside_m;
+                across.path_m[k] = ap_z - slope * from_tx_m - floors_m[1];
+                across.slope[k] = slope;
+                across.depth[k] = to_x * y - to_y * x;
+                across.width[k] = to_x * x + to_y * y;
+                across.height_m[k] = height_m[k];
+                across.scale[k] = scale;
             }
             let open = open.iter().fold(0, |all, bit| all | bit);
             if open != 0 {
                 let first = step * samples + first;
-                let costs_db = wave.losses_db(&all, open);
+                let costs_db = wave.losses_db(&across, open);
                 for (db, costs_db) in self.losses_db[first..first + n].iter_mut().zip(costs_db) {
                     *db += costs_db;
                 }
