@@ -121,10 +121,11 @@ impl Programme {
             for (way, of) in ways.iter().enumerate() {
                 let out = outages.of(of.index, person, step);
                 let soon = if step + 1 < MOMENTS { outages.of(of.index, person, step + 1) } else { &[] };
-                let row = way * samples..(way + 1) * samples;
+                let row = |way: usize| way * samples..(way + 1) * samples;
+                let (here_s, after_s) = (&mut here_s[row(way)], &next_s[row(way)]);
                 let weaker_s = of.weaker_s();
                 for k in 0..samples {
-                    let after_s = weaker_s + next_s[row.start + k];
+                    let after_s = weaker_s + after_s[k];
                     let stayed_s = if has(out, k) {
                         (STEP_S as f32 + after_s).min(numbers.given_up_s + self.least_s[k])
                     } else {
@@ -132,17 +133,16 @@ impl Programme {
                     };
                     let lost = numbers.lost(has(out, k), has(soon, k));
                     let changed_s = numbers.change_s + self.least_s[k];
-                    here_s[row.start + k] = stayed_s.min(changed_s + lost * (stayed_s - changed_s).max(0.0));
+                    here_s[k] = stayed_s.min(changed_s + lost * (stayed_s - changed_s).max(0.0));
                 }
                 // Now a beam is pointed elsewhere by a command alone, which is weighed below.
                 let Some(twin) = of.twin.filter(|_| step > 0) else { continue };
-                let twin_out = outages.of(ways[twin].index, person, step);
+                let (twin_out, twin_s) = (outages.of(ways[twin].index, person, step), &next_s[row(twin)]);
                 for k in 0..samples {
-                    let here_s = &mut here_s[row.start + k];
                     let rest_s = if has(twin_out, k) { STEP_S as f32 - numbers.beam_s } else { 0.0 };
-                    let beam_s = numbers.beam_s + rest_s + next_s[twin * samples + k];
+                    let beam_s = numbers.beam_s + rest_s + twin_s[k];
                     let lost = numbers.lost_command(has(out, k), has(soon, k));
-                    *here_s = here_s.min(beam_s + lost * (*here_s - beam_s).max(0.0));
+                    here_s[k] = here_s[k].min(beam_s + lost * (here_s[k] - beam_s).max(0.0));
                 }
             }
         }

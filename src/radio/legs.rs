@@ -6,37 +6,6 @@ use crate::blockage::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
 
-/// An access point with a radio.
-#[derive(Debug, Clone)]
-pub(super) struct Antenna {
-    pub(super) place_m: DVec3,
-    pub(super) wave: Wave,
-    pub(super) margin_db: f64,
-    pub(super) spreads: bool,
-}
-
-/// A straight line from an access point, or its image, to a device, or its image. People are before every mirror, so that those who
-/// meet the line to an image meet the real piece of it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Leg {
-    pub(super) access_point: usize,
-    pub(super) owner: usize,
-    pub(super) start_m: DVec3,
-    /// Where it ends at an image.
-    pub(super) mirror: Option<Mirror>,
-    /// What of it is below the floor is not there.
-    pub(super) is_folded: bool,
-}
-
-/// A way by a reflection.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Reflected {
-    pub(super) access_point: usize,
-    pub(super) owner: usize,
-    /// By step: what it loses without anybody, beside the straight way.
-    pub(super) excess_db: [f64; MOMENTS],
-}
-
 /// Those of every straight way, access points first; then two of each way by a reflection.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Legs {
@@ -83,6 +52,37 @@ impl Legs {
     pub(super) fn straight(&self) -> usize {
         self.legs.len() - 2 * self.reflected.len()
     }
+}
+
+/// An access point with a radio.
+#[derive(Debug, Clone)]
+pub(super) struct Antenna {
+    pub(super) place_m: DVec3,
+    pub(super) wave: Wave,
+    pub(super) margin_db: f64,
+    pub(super) spreads: bool,
+}
+
+/// A straight line from an access point, or its image, to a device, or its image. People are before every mirror, so that those who
+/// meet the line to an image meet the real piece of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leg {
+    pub(super) access_point: usize,
+    pub(super) owner: usize,
+    pub(super) start_m: DVec3,
+    /// Where it ends at an image.
+    pub(super) mirror: Option<Mirror>,
+    /// What of it is below the floor is not there.
+    pub(super) is_folded: bool,
+}
+
+/// A way by a reflection.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reflected {
+    pub(super) access_point: usize,
+    pub(super) owner: usize,
+    /// By step: what it loses without anybody, beside the straight way.
+    pub(super) excess_db: [f64; MOMENTS],
 }
 
 impl Leg {
