@@ -6,6 +6,7 @@ mod hall;
 mod handover;
 mod optics;
 mod radio;
+mod reflections;
 
 use std::collections::BTreeMap;
 
@@ -19,6 +20,7 @@ pub(crate) use hall::{doubled_area_m2, from_segment_m};
 pub use handover::{Costs, Handover, Procedure};
 pub use optics::{DarkCloth, MixedReturns, Pane, Surface};
 pub use radio::{LossModel, Radio};
+pub use reflections::{Material, Reflections};
 
 /// The place that is watched.
 ///
@@ -46,6 +48,9 @@ pub struct Site {
     /// What changing to another access point costs; without it nothing is decided.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub handover: Option<Handover>,
+    /// What reflects radio; without it beams are pointed straight at devices.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reflections: Option<Reflections>,
     /// What only a simulator reads.
     pub simulation: Simulation,
 }

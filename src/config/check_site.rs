@@ -3,11 +3,13 @@
 use super::check_hall::{HALL_MAX_M, above_0, check_hall, within};
 use crate::geometry::DVec2;
 use crate::lidar::{Model, sensor_model, sensor_models};
-use crate::site::{AccessPoint, Furniture, Pillar, Sensor, Ue};
+use crate::site::{AccessPoint, Furniture, Handover, Pillar, Sensor, Ue};
 use crate::{Error, Site};
 
 /// A clock that is further ahead is not set: that is the assembler's to put right.
 const CLOCK_MS: f64 = 1000.0;
+/// No procedure of a network takes longer.
+const LONGEST_MS: f64 = 60_000.0;
 
 /// Refuses the first value that cannot be, with its key, the name of its sensor or access point, what was expected
 /// and what was found.
@@ -26,6 +28,7 @@ pub(super) fn check_site(site: &Site) -> Result<(), Error> {
     site.pillars.iter().enumerate().try_for_each(|(i, p)| pillar(i, p, site))?;
     site.furniture.iter().enumerate().try_for_each(|(i, f)| furniture(i, f, site))?;
     ue(&site.ue)?;
+    site.handover.as_ref().map_or(Ok(()), handover)?;
     simulation(site)
 }
 
@@ -142,6 +145,21 @@ fn access_point(ap: &AccessPoint, site: &Site) -> Result<(), Error> {
     within(&key("radio.bandwidth_mhz"), radio.bandwidth_mhz, 0.001, 1e5)?;
     within(&key("radio.transmit_dbm"), radio.transmit_dbm, -100.0, 100.0)?;
     within(&key("radio.noise_figure_db"), radio.noise_figure_db, 0.0, 60.0)
+}
+
+fn handover(handover: &Handover) -> Result<(), Error> {
+    for (key, value_ms) in [
+        ("interruption_ms", handover.interruption_ms),
+        ("command_ms", handover.command_ms),
+        ("age_ms", handover.age_ms),
+        ("given_up_after_ms", handover.given_up_after_ms),
+        ("recovery_ms", handover.recovery_ms),
+        ("price_ms", handover.price_ms),
+        ("beam_ms", handover.beam_ms),
+    ] {
+        within(&format!("site.handover.{key}"), value_ms.unwrap_or_default(), 0.0, LONGEST_MS)?;
+    }
+    within("site.handover.leaves_at", handover.leaves_at.unwrap_or_default(), 0.0, 1.0)
 }
 
 fn pillar(index: usize, pillar: &Pillar, site: &Site) -> Result<(), Error> {

@@ -52,8 +52,9 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 18] = [
+const OPTIONAL: [(&str, &str, &str); 19] = [
     ("site", "handover", "a table"),
+    ("site", "reflections", "a table"),
     ("site.hall", "outline_m", "an array"),
     ("site.hall", "floors", "an array"),
     ("site.access_points", "radio", "a table"),

@@ -1,15 +1,16 @@
-//! What to do about each device's link: stay, wait, change to another access point, and until when.
+//! What to do about each device's link: stay, wait, point the beam elsewhere, change to another access point, and until when.
 
 mod programme;
 
 use std::collections::BTreeMap;
 
-use crate::radio::{Loss, Outages};
+use crate::blockage::probability::chances_of;
+use crate::radio::{Loss, Outages, Surface};
 use crate::site::{Costs, Site};
 use crate::track::Track;
 use crate::{STEP_S, STEPS};
 
-use programme::Programme;
+use programme::{Programme, Way};
 
 /// What a network should do about the device of one person.
 ///
@@ -32,6 +33,8 @@ pub struct Decision {
     pub action: Action,
     /// Where to: of a change, or of one that should be prepared.
     pub target: Option<usize>,
+    /// What a beam should be pointed at; `None` for the device itself.
+    pub surface: Option<Surface>,
     /// Until when the command must have been sent, seconds from the frame's instant. Then the link is likely to be out soon, or
     /// the change would not be over in time. `None` where nothing comes.
     pub deadline_s: Option<f64>,
@@ -57,11 +60,35 @@ pub enum Action {
     HandOver,
     /// Be prepared to change to the target as soon as the serving link falls.
     Prepare,
+    /// Point the beam of the serving access point at a surface, or at the device again.
+    Beam,
+}
+
+/// How a device is served.
+///
+/// ```
+/// use umbracast::decide::Serving;
+///
+/// assert_eq!(Serving::straight(2), Serving { access_point: 2, is_reflected: false });
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Serving {
+    /// By which access point.
+    pub access_point: usize,
+    /// Whether its beam is pointed at the best reflection.
+    pub is_reflected: bool,
+}
+
+impl Serving {
+    /// By a beam that is pointed at the device.
+    pub fn straight(access_point: usize) -> Self {
+        Self { access_point, is_reflected: false }
+    }
 }
 
 impl Action {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Stay, Self::Wait, Self::HandOver, Self::Prepare];
+    pub const ALL: [Self; 5] = [Self::Stay, Self::Wait, Self::HandOver, Self::Prepare, Self::Beam];
 
     /// As tables and messages write it.
     pub fn name(self) -> &'static str {
@@ -70,6 +97,7 @@ impl Action {
             Self::Wait => "wait",
             Self::HandOver => "hand-over",
             Self::Prepare => "prepare",
+            Self::Beam => "beam",
         }
     }
 }
@@ -83,25 +111,28 @@ pub struct Decider {
     costs: Option<Costs>,
     radios: Vec<bool>,
     places_m: Vec<crate::geometry::DVec3>,
-    serving: BTreeMap<u64, usize>,
+    reflects: bool,
+    serving: BTreeMap<u64, Serving>,
     programme: Programme,
 }
 
 impl Decider {
-    /// Needs the site's access points, their radios and `site.handover`; without that it decides nothing.
+    /// Needs the site's access points, their radios and `site.handover`; without that it decides nothing. Beams are pointed at
+    /// reflections where the site has `site.reflections`.
     pub fn new(site: &Site) -> Self {
         Self {
             costs: site.handover.map(|handover| handover.costs()),
             radios: site.access_points.iter().map(|ap| ap.radio.is_some()).collect(),
             places_m: site.access_points.iter().map(|ap| ap.position()).collect(),
+            reflects: site.reflections.is_some(),
             serving: BTreeMap::new(),
             programme: Programme::default(),
         }
     }
 
-    /// Tells which access point serves a person's device.
+    /// Tells which access point serves a person's device, with a beam that is pointed at it.
     pub fn serve(&mut self, track: u64, access_point: usize) {
-        self.serving.insert(track, access_point);
+        self.serving.insert(track, Serving::straight(access_point));
     }
 
     /// Everybody has another number from now on.
@@ -133,29 +164,33 @@ impl Decider {
         self.serving.retain(|id, _| confirmed().any(|track| track.id == *id));
         for (person, track) in confirmed().enumerate() {
             let loss_of = |ap: usize| losses.iter().find(|l| l.track == track.id && l.access_point == ap);
-            let known = self.serving.get(&track.id).copied().filter(|&ap| self.has_radio(ap));
-            let Some(serving) = known.or_else(|| self.best(track, &loss_of)) else { continue };
+            let known = self.serving.get(&track.id).copied().filter(|of| self.has_radio(of.access_point));
+            let best = || self.best(track, &loss_of).map(Serving::straight);
+            let Some(serving) = known.or_else(best) else { continue };
             self.serving.insert(track.id, serving);
-            let Some(loss) = loss_of(serving) else { continue };
-            let decision = self.of_device(&costs, track.id, serving, loss, person, outages);
-            if let (Action::HandOver, Some(target)) = (decision.action, decision.target) {
-                self.serving.insert(track.id, target);
-            }
+            let Some(loss) = loss_of(serving.access_point) else { continue };
+            let decision = self.of_device(&costs, serving, loss, person, outages);
+            let then = match (decision.action, decision.target) {
+                (Action::HandOver, Some(target)) => Serving::straight(target),
+                (Action::Beam, _) => Serving { is_reflected: decision.surface.is_some(), ..serving },
+                _ => serving,
+            };
+            self.serving.insert(track.id, then);
             decisions.push(decision);
         }
     }
 
-    /// What to do about one device that `serving` serves: the person at `person` among those of `outages`, of whose link `loss`
-    /// is. `None` where the site does not say what changes cost.
+    /// What to do about one device that is served so: that of the person at `person` among those of `outages`; `loss` is of the
+    /// straight way to it. `None` where the site does not say what changes cost.
     pub fn advise(
         &mut self,
-        serving: usize,
+        serving: Serving,
         loss: &Loss,
         person: usize,
         outages: &Outages,
     ) -> Option<Decision> {
         let costs = self.costs?;
-        Some(self.of_device(&costs, loss.track, serving, loss, person, outages))
+        Some(self.of_device(&costs, serving, loss, person, outages))
     }
 
     fn has_radio(&self, ap: usize) -> bool {
@@ -176,41 +211,77 @@ impl Decider {
     fn of_device(
         &mut self,
         costs: &Costs,
-        track: u64,
-        serving: usize,
+        serving: Serving,
         loss: &Loss,
         person: usize,
         outages: &Outages,
     ) -> Decision {
-        let p_out = loss.p_out[STEPS - 1].max(loss.p_out_now);
+        let reflection = |ap: usize| if self.reflects { outages.reflected(ap, person) } else { None };
+        let of_serving = reflection(serving.access_point);
+        let reflected = of_serving.filter(|_| serving.is_reflected);
+        let risk = reflected.map_or_else(|| Risk::of_loss(loss), |(way, _)| Risk::of(way, person, outages));
         let mut decision = Decision {
-            track,
-            serving,
+            track: loss.track,
+            serving: serving.access_point,
             action: Action::Stay,
             target: None,
+            surface: None,
             deadline_s: None,
             saved_s: 0.0,
-            p_out,
+            p_out: risk.p_out,
         };
-        if p_out == 0.0 {
+        // Who is served by a reflection for nothing had better be served straight.
+        if risk.p_out == 0.0 && reflected.is_none() {
             return decision;
         }
-        let onset_s = loss.onset_s[0].map(|onset_s| onset_s - STEP_S);
+        let onset_s = risk.onset_s.map(|onset_s| onset_s - STEP_S);
         decision.deadline_s =
             onset_s.map(|onset_s| (onset_s - costs.interruption_s - costs.command_s - costs.age_s).max(0.0));
-        let ways: Vec<usize> = (0..self.radios.len()).filter(|&ap| self.has_radio(ap)).collect();
-        let values = self.programme.run(costs, &ways, serving, person, outages);
+        let access_points = (0..self.radios.len()).filter(|&ap| self.has_radio(ap));
+        let ways = Way::all(access_points, reflection);
+        let own = Serving { is_reflected: reflected.is_some(), ..serving };
+        let values = self.programme.run(costs, &ways, own, person, outages);
         let best = values.changed_s.iter().min_by(|a, b| a.1.total_cmp(&b.1)).copied();
-        if let Some((target, cost_s)) = best.filter(|(_, cost_s)| *cost_s < values.stay_s) {
+        let best = best.filter(|(_, cost_s)| *cost_s < values.stay_s);
+        let beam_s = values
+            .beam_s
+            .filter(|cost_s| *cost_s < values.stay_s && best.is_none_or(|(_, change_s)| *cost_s <= change_s));
+        if let Some(cost_s) = beam_s {
+            let to = of_serving.filter(|_| reflected.is_none());
+            (decision.action, decision.surface) = (Action::Beam, to.map(|(_, surface)| surface));
+            decision.saved_s = values.stay_s - cost_s;
+        } else if let Some((target, cost_s)) = best {
             (decision.action, decision.target) = (Action::HandOver, Some(target));
             decision.saved_s = values.stay_s - cost_s;
         } else if let Some((target, _)) = values.later.filter(|(_, share)| *share >= LIKELY) {
             (decision.action, decision.target) = (Action::Prepare, Some(target));
-        } else if values.held_s < values.given_up_s && loss.p_out_now >= LIKELY {
+        } else if values.held_s < values.given_up_s && risk.p_out_now >= LIKELY {
             decision.action = Action::Wait;
             decision.saved_s = values.given_up_s - values.held_s;
         }
         decision
+    }
+}
+
+/// How likely the way that serves a device is out.
+struct Risk {
+    p_out_now: f64,
+    /// Now or at any step.
+    p_out: f64,
+    /// The earliest of the quantiles.
+    onset_s: Option<f64>,
+}
+
+impl Risk {
+    fn of_loss(loss: &Loss) -> Self {
+        let p_out = loss.p_out[STEPS - 1].max(loss.p_out_now);
+        Self { p_out_now: loss.p_out_now, p_out, onset_s: loss.onset_s[0] }
+    }
+
+    fn of(way: usize, person: usize, outages: &Outages) -> Self {
+        let chances = chances_of(|step| outages.of(way, person, step), outages.samples(), 0.5);
+        let p_out = chances.p[STEPS - 1].max(chances.p_now);
+        Self { p_out_now: chances.p_now, p_out, onset_s: chances.onset_s[0] }
     }
 }
 

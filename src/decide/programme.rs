@@ -6,11 +6,50 @@
 //! where waiting costs nothing. After the last step everybody is taken to walk straight on for a second: whose link is cut then
 //! will have to change once more. Access points behind one person fail together, for their samples are the same.
 
+use super::Serving;
 use crate::STEP_S;
 use crate::blockage::lanes::WORD;
 use crate::blockage::trajectories::MOMENTS;
-use crate::radio::Outages;
+use crate::radio::{Outages, Surface};
 use crate::site::Costs;
+
+/// One step on a reflection costs so much more than on the straight way, seconds in outage: it carries less, and is left when the
+/// straight way is free again.
+const WEAKER_S: f32 = 0.001;
+
+/// A way that may serve the device.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Way {
+    serving: Serving,
+    /// Its number in the samples.
+    index: usize,
+    /// The place of the other way of the same access point.
+    twin: Option<usize>,
+}
+
+impl Way {
+    /// All ways to a device: the straight ones in the order of access points, then those by a reflection.
+    pub(super) fn all(
+        access_points: impl Iterator<Item = usize>,
+        reflection: impl Fn(usize) -> Option<(usize, Surface)>,
+    ) -> Vec<Self> {
+        let straight = |ap| Self { serving: Serving::straight(ap), index: ap, twin: None };
+        let mut ways: Vec<Self> = access_points.map(straight).collect();
+        for twin in 0..ways.len() {
+            let access_point = ways[twin].index;
+            if let Some((index, _)) = reflection(access_point) {
+                ways[twin].twin = Some(ways.len());
+                let serving = Serving { access_point, is_reflected: true };
+                ways.push(Self { serving, index, twin: Some(twin) });
+            }
+        }
+        ways
+    }
+
+    fn weaker_s(&self) -> f32 {
+        if self.serving.is_reflected { WEAKER_S } else { 0.0 }
+    }
+}
 
 /// Expected costs, seconds in outage.
 #[derive(Debug, Clone, Default)]
@@ -19,6 +58,8 @@ pub(super) struct Values {
     pub(super) stay_s: f64,
     /// Of changing now, by access point.
     pub(super) changed_s: Vec<(usize, f64)>,
+    /// Of pointing the beam at the other way of the serving access point now.
+    pub(super) beam_s: Option<f64>,
     /// Of an outage now that is sat out, and of one that the network gives up.
     pub(super) held_s: f64,
     pub(super) given_up_s: f64,
@@ -44,14 +85,15 @@ struct Numbers {
     /// What is left of a step after a change in it: in outage where the new link is out.
     rest_s: f32,
     given_up_s: f32,
+    beam_s: f32,
 }
 
 impl Programme {
     pub(super) fn run(
         &mut self,
         costs: &Costs,
-        ways: &[usize],
-        serving: usize,
+        ways: &[Way],
+        serving: Serving,
         person: usize,
         outages: &Outages,
     ) -> Values {
@@ -61,34 +103,46 @@ impl Programme {
             change_s: (costs.interruption_s + costs.price_s) as f32,
             rest_s: (STEP_S - costs.interruption_s).max(0.0) as f32,
             given_up_s: (costs.given_up_after_s + costs.recovery_s + costs.price_s) as f32,
+            beam_s: costs.beam_s.min(STEP_S) as f32,
         };
         let samples = outages.samples();
         let of_step = ways.len() * samples;
         self.value_s.clear();
         self.value_s.resize((MOMENTS + 1) * of_step, 0.0);
         let after_s = self.value_s[MOMENTS * of_step..].chunks_exact_mut(samples);
-        for (after_s, &ap) in after_s.zip(ways) {
-            let soon = outages.beyond(ap, person);
+        for (after_s, way) in after_s.zip(ways) {
+            let soon = outages.beyond(way.index, person);
             let cut = (0..samples).filter(|k| has(soon, *k));
             cut.for_each(|k| after_s[k] = numbers.change_s);
         }
         for step in (0..MOMENTS).rev() {
             self.find_least(&numbers, ways, person, outages, step);
             let (here_s, next_s) = self.value_s[step * of_step..].split_at_mut(of_step);
-            for (way, &ap) in ways.iter().enumerate() {
-                let out = outages.of(ap, person, step);
-                let soon = if step + 1 < MOMENTS { outages.of(ap, person, step + 1) } else { &[] };
-                let row = way * samples..(way + 1) * samples;
-                let (next_s, here_s) = (&next_s[row.clone()], &mut here_s[row]);
+            for (way, of) in ways.iter().enumerate() {
+                let out = outages.of(of.index, person, step);
+                let soon = if step + 1 < MOMENTS { outages.of(of.index, person, step + 1) } else { &[] };
+                let row = |way: usize| way * samples..(way + 1) * samples;
+                let (here_s, after_s) = (&mut here_s[row(way)], &next_s[row(way)]);
+                let weaker_s = of.weaker_s();
                 for k in 0..samples {
+                    let after_s = weaker_s + after_s[k];
                     let stayed_s = if has(out, k) {
-                        (STEP_S as f32 + next_s[k]).min(numbers.given_up_s + self.least_s[k])
+                        (STEP_S as f32 + after_s).min(numbers.given_up_s + self.least_s[k])
                     } else {
-                        next_s[k]
+                        after_s
                     };
                     let lost = numbers.lost(has(out, k), has(soon, k));
                     let changed_s = numbers.change_s + self.least_s[k];
                     here_s[k] = stayed_s.min(changed_s + lost * (stayed_s - changed_s).max(0.0));
+                }
+                // Now a beam is pointed elsewhere by a command alone, which is weighed below.
+                let Some(twin) = of.twin.filter(|_| step > 0) else { continue };
+                let (twin_out, twin_s) = (outages.of(ways[twin].index, person, step), &next_s[row(twin)]);
+                for k in 0..samples {
+                    let rest_s = if has(twin_out, k) { STEP_S as f32 - numbers.beam_s } else { 0.0 };
+                    let beam_s = numbers.beam_s + rest_s + twin_s[k];
+                    let lost = numbers.lost_command(has(out, k), has(soon, k));
+                    here_s[k] = here_s[k].min(beam_s + lost * (here_s[k] - beam_s).max(0.0));
                 }
             }
         }
@@ -99,22 +153,26 @@ impl Programme {
     fn weigh(
         &mut self,
         numbers: &Numbers,
-        ways: &[usize],
-        serving: usize,
+        ways: &[Way],
+        serving: Serving,
         person: usize,
         outages: &Outages,
     ) -> Values {
         let samples = outages.samples();
         let of_step = ways.len() * samples;
         self.find_least(numbers, ways, person, outages, 0);
-        let own = ways.iter().position(|ap| *ap == serving).unwrap_or_default();
+        let own = ways.iter().position(|way| way.serving == serving).unwrap_or_default();
+        let of = |way: usize, step: usize| outages.of(ways[way].index, person, step);
         let value_s = |step: usize, way: usize, k: usize| self.value_s[step * of_step + way * samples + k];
-        let (out, soon) = (outages.of(serving, person, 0), outages.of(serving, person, 1));
+        let (out, soon) = (of(own, 0), of(own, 1));
+        let weaker_s = ways[own].weaker_s();
+        let straight_or =
+            |own: usize| (0..ways.len()).filter(move |&way| way == own || !ways[way].serving.is_reflected);
         let mut changed_s = vec![0.0_f64; ways.len()];
         let mut later_s = vec![0.0_f64; ways.len()];
-        let (mut stay, mut held, mut given_up, mut later) = (0.0, 0.0, 0.0, 0);
+        let (mut stay, mut held, mut given_up, mut beam, mut later) = (0.0, 0.0, 0.0, 0.0, 0);
         for k in 0..samples {
-            let stayed_s = value_s(1, own, k) + if has(out, k) { STEP_S as f32 } else { 0.0 };
+            let stayed_s = weaker_s + value_s(1, own, k) + if has(out, k) { STEP_S as f32 } else { 0.0 };
             let given_up_s = numbers.given_up_s + self.least_s[k];
             held += f64::from(stayed_s);
             given_up += f64::from(given_up_s);
@@ -123,13 +181,18 @@ impl Programme {
                 f64::from(if numbers.conditional { value_s(0, own, k) } else { stayed_s.min(given_up_s) });
             let lost = numbers.lost(has(out, k), has(soon, k)) * f32::from(u8::from(!numbers.conditional));
             for (way, sum) in changed_s.iter_mut().enumerate() {
-                let rest_s = if has(outages.of(ways[way], person, 0), k) { numbers.rest_s } else { 0.0 };
+                let rest_s = if has(of(way, 0), k) { numbers.rest_s } else { 0.0 };
                 let changed_s = numbers.change_s + rest_s + value_s(1, way, k);
                 *sum += f64::from(changed_s + lost * (stayed_s - changed_s));
             }
-            let onset = (0..MOMENTS).find(|&step| has(outages.of(serving, person, step), k));
-            let Some(onset) = onset else { continue };
-            let least_s = (0..ways.len()).map(|way| value_s(onset, way, k)).fold(f32::MAX, f32::min);
+            if let Some(twin) = ways[own].twin {
+                let rest_s = if has(of(twin, 0), k) { STEP_S as f32 - numbers.beam_s } else { 0.0 };
+                let beam_s = numbers.beam_s + rest_s + value_s(1, twin, k);
+                let lost = numbers.lost_command(has(out, k), has(soon, k));
+                beam += f64::from(beam_s + lost * (stayed_s - beam_s));
+            }
+            let Some(onset) = (0..MOMENTS).find(|&step| has(of(own, step), k)) else { continue };
+            let least_s = straight_or(own).map(|way| value_s(onset, way, k)).fold(f32::MAX, f32::min);
             if numbers.change_s + least_s < value_s(onset + 1, own, k) + STEP_S as f32 {
                 later += 1;
                 later_s
@@ -139,33 +202,29 @@ impl Programme {
             }
         }
         let mean = |sum: f64| sum / samples as f64;
-        let others = || (0..ways.len()).filter(|way| *way != own);
+        let is_other = |way: &usize| ways[*way].serving.access_point != serving.access_point;
+        let others = || straight_or(own).filter(is_other);
         let best_later = others().min_by(|a, b| later_s[*a].total_cmp(&later_s[*b])).filter(|_| later > 0);
         Values {
             stay_s: mean(stay),
-            changed_s: others().map(|way| (ways[way], mean(changed_s[way]))).collect(),
+            changed_s: others().map(|way| (ways[way].index, mean(changed_s[way]))).collect(),
+            beam_s: ways[own].twin.map(|_| mean(beam)),
             held_s: mean(held),
             given_up_s: mean(given_up),
-            later: best_later.map(|way| (ways[way], mean(f64::from(later)))),
+            later: best_later.map(|way| (ways[way].index, mean(f64::from(later)))),
         }
     }
 
-    /// By sample, what is left after a change at `step` to the best way.
-    fn find_least(
-        &mut self,
-        numbers: &Numbers,
-        ways: &[usize],
-        person: usize,
-        outages: &Outages,
-        step: usize,
-    ) {
+    /// By sample, what is left after a change at `step` to the best access point: a device that changes is met by a straight beam.
+    fn find_least(&mut self, numbers: &Numbers, ways: &[Way], person: usize, outages: &Outages, step: usize) {
         let samples = outages.samples();
         let of_step = ways.len() * samples;
         self.least_s.clear();
         self.least_s.resize(samples, f32::MAX);
         let next_s = &self.value_s[(step + 1) * of_step..(step + 2) * of_step];
-        for (of_way, &ap) in next_s.chunks_exact(samples).zip(ways) {
-            let out = outages.of(ap, person, step);
+        let straight = |(_, way): &(&[f32], &Way)| !way.serving.is_reflected;
+        for (of_way, way) in next_s.chunks_exact(samples).zip(ways).filter(straight) {
+            let out = outages.of(way.index, person, step);
             for (k, (least_s, way_s)) in self.least_s.iter_mut().zip(of_way).enumerate() {
                 *least_s = least_s.min(way_s + if has(out, k) { numbers.rest_s } else { 0.0 });
             }
@@ -174,14 +233,19 @@ impl Programme {
 }
 
 impl Numbers {
-    /// The chance that a change that begins now does not come about. A link that is out hears no command; a prepared device
-    /// needs none.
+    /// The chance that a change that begins now does not come about: a prepared device needs no command.
     #[inline(always)]
     fn lost(&self, out: bool, soon: bool) -> f32 {
-        match (self.conditional, out, soon) {
-            (true, ..) | (_, false, false) => 0.0,
-            (_, true, _) => 1.0,
-            (_, false, true) => self.lost,
+        if self.conditional { 0.0 } else { self.lost_command(out, soon) }
+    }
+
+    /// The chance that a command does not arrive: a link that is out hears none.
+    #[inline(always)]
+    fn lost_command(&self, out: bool, soon: bool) -> f32 {
+        match (out, soon) {
+            (false, false) => 0.0,
+            (true, _) => 1.0,
+            (false, true) => self.lost,
         }
     }
 }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::Config;
-use crate::site::{AccessPoint, Handover, Radio};
+use crate::radio::Surface;
+use crate::site::{AccessPoint, Handover, Radio, Reflections};
 
 /// Three access points with radios, of which changes cost what these procedures do.
 fn decider(handover: Handover) -> Decider {
@@ -11,7 +12,7 @@ fn decider(handover: Handover) -> Decider {
         radio: Some(Radio::default()),
     };
     site.access_points = [-5.0, 0.0, 5.0].map(place).to_vec();
-    site.handover = Some(handover);
+    (site.handover, site.reflections) = (Some(handover), Some(Reflections::default()));
     Decider::new(&site)
 }
 
@@ -38,7 +39,7 @@ fn loss(p_out_now: f64, p_out: f64) -> Loss {
 #[test]
 fn who_is_not_at_risk_stays() {
     let outages = Outages::new(3, 1, SAMPLES);
-    let decision = decider(commands()).advise(0, &loss(0.0, 0.0), 0, &outages).unwrap();
+    let decision = decider(commands()).advise(Serving::straight(0), &loss(0.0, 0.0), 0, &outages).unwrap();
     assert_eq!((decision.action, decision.target, decision.saved_s), (Action::Stay, None, 0.0));
 }
 
@@ -48,7 +49,7 @@ fn a_link_that_will_surely_be_out_is_left_for_one_that_will_not() {
     // At once after the next command could still pass, and for half a second.
     out(&mut outages, 0, 1..=5, SAMPLES);
     out(&mut outages, 1, 3..=6, SAMPLES);
-    let decision = decider(commands()).advise(0, &loss(0.0, 1.0), 0, &outages).unwrap();
+    let decision = decider(commands()).advise(Serving::straight(0), &loss(0.0, 1.0), 0, &outages).unwrap();
     assert_eq!((decision.action, decision.target), (Action::HandOver, Some(2)));
     assert!(decision.saved_s > 0.02, "{decision:?}");
 }
@@ -57,8 +58,9 @@ fn a_link_that_will_surely_be_out_is_left_for_one_that_will_not() {
 fn of_two_that_are_in_sight_the_one_that_stays_so_longer_is_taken() {
     let mut outages = Outages::new(3, 1, SAMPLES);
     out(&mut outages, 0, 1..=5, SAMPLES);
-    let target =
-        |outages: &Outages| decider(commands()).advise(0, &loss(0.0, 1.0), 0, outages).unwrap().target;
+    let target = |outages: &Outages| {
+        decider(commands()).advise(Serving::straight(0), &loss(0.0, 1.0), 0, outages).unwrap().target
+    };
     assert_eq!(target(&outages), Some(1));
     // Somebody is about to walk between the first of them and the device, after the last step.
     (0..SAMPLES / 4).for_each(|sample| outages.set_beyond(1, 0, sample));
@@ -70,7 +72,7 @@ fn who_can_wait_waits_for_a_better_forecast() {
     let mut outages = Outages::new(3, 1, SAMPLES);
     // In half of the samples, and not soon.
     out(&mut outages, 0, 6..=8, SAMPLES / 2);
-    let decision = decider(commands()).advise(0, &loss(0.0, 0.5), 0, &outages).unwrap();
+    let decision = decider(commands()).advise(Serving::straight(0), &loss(0.0, 0.5), 0, &outages).unwrap();
     assert_eq!((decision.action, decision.target), (Action::Prepare, Some(1)));
     // Onset at 0.4 s at the earliest: a step earlier, less interruption, command and age.
     assert!(decision.deadline_s.is_some_and(|s| (s - 0.225).abs() < 1e-9), "{decision:?}");
@@ -85,7 +87,8 @@ fn access_points_behind_one_person_fail_together_and_are_no_refuge() {
     for sample in SAMPLES / 2..SAMPLES {
         (1..=4).for_each(|step| outages.set(2, 0, step, sample));
     }
-    let prepares = decider(Handover::default()).advise(0, &loss(0.0, 0.5), 0, &outages).unwrap();
+    let prepares =
+        decider(Handover::default()).advise(Serving::straight(0), &loss(0.0, 0.5), 0, &outages).unwrap();
     assert_eq!((prepares.action, prepares.target), (Action::Prepare, Some(2)));
 }
 
@@ -93,7 +96,8 @@ fn access_points_behind_one_person_fail_together_and_are_no_refuge() {
 fn a_short_outage_of_all_is_sat_out() {
     let mut outages = Outages::new(3, 1, SAMPLES);
     (0..3).for_each(|ap| out(&mut outages, ap, 0..=0, SAMPLES));
-    let decision = decider(Handover::default()).advise(0, &loss(1.0, 1.0), 0, &outages).unwrap();
+    let decision =
+        decider(Handover::default()).advise(Serving::straight(0), &loss(1.0, 1.0), 0, &outages).unwrap();
     assert_eq!(decision.action, Action::Wait);
     assert!(decision.saved_s > 0.1, "giving up costs 160 ms, the outage 100: {decision:?}");
 }
@@ -102,9 +106,49 @@ fn a_short_outage_of_all_is_sat_out() {
 fn a_device_is_served_as_it_was_advised_until_the_network_says_otherwise() {
     let mut decider = decider(commands());
     decider.serve(7, 2);
-    assert_eq!(decider.serving.get(&7), Some(&2));
+    assert_eq!(decider.serving.get(&7), Some(&Serving::straight(2)));
     let mut without = Decider::new(&Config::default().site);
     let mut decisions = vec![];
     without.decide(&[], &[], &Outages::new(1, 0, SAMPLES), &mut decisions);
-    assert!(decisions.is_empty() && without.advise(0, &loss(0.0, 0.0), 0, &Outages::new(1, 1, 1)).is_none());
+    assert!(
+        decisions.is_empty()
+            && without.advise(Serving::straight(0), &loss(0.0, 0.0), 0, &Outages::new(1, 1, 1)).is_none()
+    );
+}
+
+/// The first access point can reach the device over the ceiling; `reflected` of the samples of that way are out at steps 1 to 5.
+fn with_ceiling(outages: &mut Outages, reflected: usize) {
+    outages.set_surface(0, 0, Surface::Ceiling);
+    let (way, surface) = outages.reflected(0, 0).unwrap();
+    assert_eq!((way, surface, outages.reflected(1, 0)), (3, Surface::Ceiling, None));
+    out(outages, way, 1..=5, reflected);
+}
+
+#[test]
+fn a_beam_that_is_pointed_elsewhere_is_cheaper_than_a_change() {
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    out(&mut outages, 0, 1..=5, SAMPLES);
+    with_ceiling(&mut outages, 0);
+    for handover in [commands(), Handover::default()] {
+        let decision = decider(handover).advise(Serving::straight(0), &loss(0.0, 1.0), 0, &outages).unwrap();
+        let beam = (Action::Beam, None, Some(Surface::Ceiling));
+        assert_eq!((decision.action, decision.target, decision.surface), beam, "{decision:?}");
+        assert!(decision.saved_s > 0.02, "{decision:?}");
+    }
+    with_ceiling(&mut outages, SAMPLES);
+    let decision = decider(commands()).advise(Serving::straight(0), &loss(0.0, 1.0), 0, &outages).unwrap();
+    assert_eq!((decision.action, decision.surface), (Action::HandOver, None), "both ways are cut");
+}
+
+#[test]
+fn a_beam_comes_back_to_the_device_when_nobody_is_in_the_way_any_more() {
+    let reflected = Serving { access_point: 0, is_reflected: true };
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    with_ceiling(&mut outages, 0);
+    let mut decider = decider(commands());
+    let decision = decider.advise(reflected, &loss(0.0, 0.0), 0, &outages).unwrap();
+    assert_eq!((decision.action, decision.target, decision.surface), (Action::Beam, None, None));
+    out(&mut outages, 0, 0..=4, SAMPLES);
+    let decision = decider.advise(reflected, &loss(1.0, 1.0), 0, &outages).unwrap();
+    assert_eq!((decision.action, decision.p_out), (Action::Stay, 0.0), "the straight way is cut as yet");
 }

@@ -6,14 +6,15 @@ use std::collections::BTreeMap;
 use super::beyond::Beyond;
 use super::body::Wave;
 use super::kirchhoff::{Across, Word};
+use super::legs::{Antenna, Leg, Legs, Reflected};
 use super::outages::Outages;
+use super::reflection::Mirrors;
 use crate::blockage::Caster;
 use crate::blockage::draws::Quantiles;
 use crate::blockage::lanes::{WORD, cos_sin, larger, smaller};
 use crate::blockage::probability::chances_of;
 use crate::blockage::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::elementary::wide;
-use crate::geometry::{DVec2, DVec3};
 use crate::site::{AccessPoint, Radio, Ue};
 use crate::{STEPS, Site};
 
@@ -78,12 +79,15 @@ const LOSSES_MAX: usize = 1 << 16;
 pub struct Fader {
     /// By access point; `None` without a radio.
     radios: Vec<Option<Antenna>>,
+    /// Only where something reflects and decisions are made of it.
+    mirrors: Option<Mirrors>,
     ue: Ue,
     quantiles: Option<Quantiles>,
-    /// By access point and track: by how much each sample's fades are deeper than the model's, standard normal. One draw a fade.
+    /// By way and track: by how much each sample's fades are deeper than the model's, standard normal. One draw a fade.
     spreads: BTreeMap<(usize, u64), Vec<f32>>,
+    legs: Legs,
     meetings: Vec<Meeting>,
-    /// By link, access points first: one past its last meeting.
+    /// By leg: one past its last meeting.
     ends: Vec<usize>,
     /// By person: cosine and sine of the turn of each sample's trunk from the heading. Empty until it is asked for.
     turns: Vec<[Vec<f32>; 2]>,
@@ -91,18 +95,11 @@ pub struct Fader {
     sorted_db: Vec<f32>,
     /// Only where decisions are made of it.
     beyond: Option<Beyond>,
+    beyond_bits: Vec<u32>,
     outages: Outages,
 }
 
-#[derive(Debug, Clone)]
-struct Antenna {
-    place_m: DVec3,
-    wave: Wave,
-    margin_db: f64,
-    spreads: bool,
-}
-
-/// A body that may cost a link something at a step.
+/// A body that may cost a leg something at a step.
 #[derive(Debug, Clone, Copy)]
 struct Meeting {
     body: usize,
@@ -119,7 +116,9 @@ impl Fader {
             (at_m - least_m).abs().max((at_m - most_m).abs()).length()
         };
         let farthest_m = site.access_points.iter().map(far_m).fold(0.0, f64::max);
-        let longest_m = farthest_m.hypot(site.hall.height_m);
+        // A way by a reflection may be twice as long as the hall.
+        let times = if site.reflections.is_some() { 2.0 } else { 1.0 };
+        let longest_m = times * farthest_m.hypot(site.hall.height_m);
         // Radios of one carrier share what is worked out for it.
         let mut waves: Vec<(Radio, Wave)> = Vec::new();
         let mut antenna = |ap: &AccessPoint| {
@@ -137,15 +136,18 @@ impl Fader {
         };
         Self {
             radios: site.access_points.iter().map(&mut antenna).collect(),
+            mirrors: site.handover.and(site.reflections).map(|of| Mirrors::new(&site.hall, of)),
             ue: site.ue,
             quantiles: None,
             spreads: BTreeMap::new(),
+            legs: Legs::default(),
             meetings: Vec::new(),
             ends: Vec::new(),
             turns: Vec::new(),
             losses_db: Vec::new(),
             sorted_db: Vec::new(),
             beyond: site.handover.map(|_| Beyond::default()),
+            beyond_bits: Vec::new(),
             outages: Outages::default(),
         }
     }
@@ -159,6 +161,7 @@ impl Fader {
         if self.radios.iter().all(Option::is_none) || people.is_empty() {
             return;
         }
+        self.legs.lay(&self.radios, self.mirrors.as_ref(), &self.ue, people);
         self.meet(people);
         let affordable = LOSSES_MAX / self.meetings.len().max(1) / WORD * WORD;
         let (samples, asked) = (drawn.min(affordable.max(WORD)), caster.samples_asked());
@@ -171,91 +174,65 @@ impl Fader {
         if let Some(beyond) = &mut self.beyond {
             beyond.take(people, self.ue.height_share);
         }
-        let mut begin = 0;
-        let mut link = 0;
-        for access_point in 0..self.radios.len() {
-            let Some(Antenna { place_m, .. }) = self.radios[access_point] else { continue };
-            for person in 0..people.len() {
-                if let Some(beyond) = &self.beyond {
-                    beyond.mark(place_m, person, self.outages.beyond_mut(access_point, person));
-                }
-                let end = self.ends[link];
-                losses.push(self.of_link(access_point, person, people, begin..end, [samples, asked]));
-                (begin, link) = (end, link + 1);
-            }
+        let straight = self.legs.straight();
+        losses.extend((0..straight).map(|leg| self.of_link(leg, people, [samples, asked])));
+        for k in 0..self.legs.reflected.len() {
+            self.reflect(self.legs.reflected[k], straight + 2 * k, people, [samples, asked]);
         }
     }
 
-    /// The samples of the last frame: in which each link is out, and when.
+    /// The samples of the last frame: in which each way is out, and when.
     pub fn outages(&self) -> &Outages {
         &self.outages
     }
 
-    /// Finds the bodies that may cost a link something, erring on the side of asking the samples.
+    /// Finds the bodies that may cost a leg something, erring on the side of asking the samples.
     fn meet(&mut self, people: &[Trajectories]) {
         self.meetings.clear();
         self.ends.clear();
         let [reach_m, rises_m] = self.ue.reach_m();
-        for antenna in self.radios.iter().flatten() {
-            for (owner, q) in people.iter().enumerate() {
-                let lowest_m = self.ue.height_share * q.heights_m[0] + q.floors_m[0] - rises_m;
-                let near = |aim: Disc, p: &Trajectories, body: Disc| {
-                    let aim = Disc { radius_m: aim.radius_m + reach_m, ..aim };
-                    antenna.meets(aim, lowest_m, body, p.floors_m[1] + p.heights_m[1])
-                };
-                for (body, p) in people.iter().enumerate() {
-                    let own = body == owner;
-                    if (own && reach_m == 0.0) || !near(q.second, p, p.second) {
-                        continue;
-                    }
-                    for step in 0..MOMENTS {
-                        let at = |of: &Trajectories| Disc {
-                            center_m: of.mean_m[step],
-                            radius_m: of.spread[step].radius_m,
-                        };
-                        if own || near(at(q), p, at(p)) {
-                            self.meetings.push(Meeting { body, step });
-                        }
+        for leg in &self.legs.legs {
+            let Some(antenna) = &self.radios[leg.access_point] else { continue };
+            let q = &people[leg.owner];
+            let heights_m = [0, 1].map(|most| self.ue.height_share * q.heights_m[most] + q.floors_m[most]);
+            let lowest_m = leg.lowest_end_m([heights_m[0] - rises_m, heights_m[1] + rises_m]);
+            let near = |aim: Disc, p: &Trajectories, body: Disc| {
+                let aim = Disc { center_m: leg.end_m(aim.center_m), radius_m: aim.radius_m + reach_m };
+                antenna.meets(leg.start_m, aim, lowest_m, body, p.floors_m[1] + p.heights_m[1])
+            };
+            for (body, p) in people.iter().enumerate() {
+                let own = body == leg.owner;
+                if (own && reach_m == 0.0) || !near(q.second, p, p.second) {
+                    continue;
+                }
+                for step in 0..MOMENTS {
+                    let at = |of: &Trajectories| Disc {
+                        center_m: of.mean_m[step],
+                        radius_m: of.spread[step].radius_m,
+                    };
+                    if own || near(at(q), p, at(p)) {
+                        self.meetings.push(Meeting { body, step });
                     }
                 }
-                self.ends.push(self.meetings.len());
             }
+            self.ends.push(self.meetings.len());
         }
     }
 
-    fn of_link(
-        &mut self,
-        access_point: usize,
-        owner: usize,
-        people: &[Trajectories],
-        meetings: std::ops::Range<usize>,
-        [samples, asked]: [usize; 2],
-    ) -> Loss {
+    /// What a straight way loses.
+    fn of_link(&mut self, leg: usize, people: &[Trajectories], [samples, asked]: [usize; 2]) -> Loss {
+        let Leg { access_point, owner, start_m, .. } = self.legs.legs[leg];
+        if let Some(beyond) = &self.beyond {
+            beyond.mark(start_m, owner, self.outages.beyond_mut(access_point, owner));
+        }
         let track = people[owner].track;
         let mut loss = Loss::clear(access_point, track);
-        if meetings.is_empty() {
+        let Some(margin_db) = self.lose(access_point, leg..leg + 1, people, [samples, asked]) else {
             return loss;
-        }
-        self.losses_db.clear();
-        self.losses_db.resize(MOMENTS * samples, 0.0);
-        self.turn(people, owner);
-        for meeting in meetings {
-            self.turn(people, self.meetings[meeting].body);
-            self.cross(access_point, owner, people, self.meetings[meeting], samples);
-        }
-        let Some(antenna) = &self.radios[access_point] else { return loss };
-        let spread = self.spreads.entry((access_point, track)).or_insert_with(|| {
-            let quantiles = self.quantiles.get_or_insert_with(|| Quantiles::new(asked));
-            quantiles.normal(track.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (access_point as u64 + 1) << 32)
-        });
-        for of_step in self.losses_db.chunks_exact_mut(samples) {
-            for (db, deeper) in of_step.iter_mut().zip(&*spread) {
-                *db += deeper * spread_db(*db, antenna.spreads);
-            }
-        }
+        };
         for step in 0..MOMENTS {
             let of_step = &self.losses_db[step * samples..(step + 1) * samples];
-            self.outages.note(access_point, owner, step, of_step, antenna.margin_db as f32);
+            self.outages.note(access_point, owner, step, of_step, margin_db as f32);
             let quantiles_db = quantiles_db(of_step, &mut self.sorted_db);
             match step.checked_sub(1) {
                 None => loss.now_db = quantiles_db,
@@ -268,6 +245,67 @@ impl Fader {
         loss
     }
 
+    /// Notes when a way by a reflection is out, whose two legs begin at `leg`: a beam takes the reflection that is free, so the way
+    /// is out in those samples in which every one is.
+    fn reflect(&mut self, way: Reflected, leg: usize, people: &[Trajectories], [samples, asked]: [usize; 2]) {
+        let Reflected { access_point, owner, excess_db } = way;
+        let [from_image, to_image] = [self.legs.legs[leg], self.legs.legs[leg + 1]];
+        let Some(mirror) = to_image.mirror else { return };
+        let Some(Antenna { margin_db, .. }) = self.radios[access_point] else { return };
+        let way = self.radios.len() + access_point;
+        if self.lose(way, leg..leg + 2, people, [samples, asked]).is_none() {
+            self.losses_db.clear();
+            self.losses_db.resize(MOMENTS * samples, 0.0);
+        }
+        let by_step = self.losses_db.chunks_exact(samples).zip(excess_db);
+        let left_db = by_step.map(|(of_step, excess_db)| (of_step, (margin_db - excess_db) as f32));
+        self.outages.note_reflection(access_point, owner, mirror.surface, left_db);
+        if let Some(beyond) = &self.beyond {
+            self.beyond_bits.clear();
+            self.beyond_bits.resize(samples.div_ceil(WORD), 0);
+            beyond.mark(from_image.start_m, owner, &mut self.beyond_bits);
+            self.outages.and_beyond(way, owner, &self.beyond_bits);
+        }
+    }
+
+    /// Works out what bodies cost each sample of a way, and says what it may lose; `None` where nobody comes near its legs.
+    fn lose(
+        &mut self,
+        way: usize,
+        legs: std::ops::Range<usize>,
+        people: &[Trajectories],
+        [samples, asked]: [usize; 2],
+    ) -> Option<f64> {
+        let first = legs.start.checked_sub(1).map_or(0, |before| self.ends[before]);
+        if first == self.ends[legs.end - 1] {
+            return None;
+        }
+        let Leg { access_point, owner, .. } = self.legs.legs[legs.start];
+        self.losses_db.clear();
+        self.losses_db.resize(MOMENTS * samples, 0.0);
+        self.turn(people, owner);
+        let mut begin = first;
+        for leg in legs {
+            for meeting in begin..self.ends[leg] {
+                self.turn(people, self.meetings[meeting].body);
+                self.cross(leg, people, self.meetings[meeting], samples);
+            }
+            begin = self.ends[leg];
+        }
+        let antenna = self.radios[access_point].as_ref()?;
+        let track = people[owner].track;
+        let spread = self.spreads.entry((way, track)).or_insert_with(|| {
+            let quantiles = self.quantiles.get_or_insert_with(|| Quantiles::new(asked));
+            quantiles.normal(track.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (way as u64 + 1) << 32)
+        });
+        for of_step in self.losses_db.chunks_exact_mut(samples) {
+            for (db, deeper) in of_step.iter_mut().zip(&*spread) {
+                *db += deeper * spread_db(*db, antenna.spreads);
+            }
+        }
+        Some(antenna.margin_db)
+    }
+
     /// Works out how a person's samples turn, once a frame.
     fn turn(&mut self, people: &[Trajectories], person: usize) {
         let turn = &mut self.turns[person];
@@ -278,25 +316,19 @@ impl Fader {
     }
 
     wide! {
-        /// Adds what a body that may stand across a link costs each sample at a step.
+        /// Adds what a body that may stand across a leg costs each sample at a step.
         fn cross(
-            &mut self, access_point: usize, owner: usize, people: &[Trajectories], meeting: Meeting, samples: usize,
+            &mut self, leg: usize, people: &[Trajectories], meeting: Meeting, samples: usize,
         ) = cross_avx2 or cross_portably
     }
 
     #[inline(always)]
-    fn cross_portably(
-        &mut self,
-        access_point: usize,
-        owner: usize,
-        people: &[Trajectories],
-        meeting: Meeting,
-        samples: usize,
-    ) {
+    fn cross_portably(&mut self, leg: usize, people: &[Trajectories], meeting: Meeting, samples: usize) {
+        let Leg { access_point, owner, start_m, mirror, is_folded } = self.legs.legs[leg];
         let Some(antenna) = &self.radios[access_point] else { return };
         let Meeting { body, step } = meeting;
         let (q, p, wave) = (&people[owner], &people[body], &antenna.wave);
-        let [ap_x, ap_y, ap_z] = antenna.place_m.to_array();
+        let [ap_x, ap_y, ap_z] = start_m.to_array();
         let from_ap =
             |of: &Trajectories| [of.mean_m[step].x - ap_x, of.mean_m[step].y - ap_y].map(|m| m as f32);
         let ahead = |of: &Trajectories| of.ahead[step].to_array().map(|part| part as f32);
@@ -334,6 +366,15 @@ impl Fader {
                     end_z[k] += up_m[k];
                 }
             }
+            if let Some(mirror) = &mirror {
+                let [x, y, z] = mirror.normal.to_array().map(|part| part as f32);
+                let offset_m = mirror.off_m(start_m.truncate().extend(0.0)) as f32;
+                for k in 0..WORD {
+                    let off_m = 2.0 * (x * end_x[k] + y * end_y[k] + z * end_z[k] + offset_m);
+                    (end_x[k], end_y[k]) = (end_x[k] - off_m * x, end_y[k] - off_m * y);
+                    end_z[k] -= off_m * z;
+                }
+            }
             let (mut across, mut open) = (Across::<Word>::default(), [0; WORD]);
             for k in 0..WORD {
                 let length_m = larger((end_x[k] * end_x[k] + end_y[k] * end_y[k]).sqrt(), 1e-3);
@@ -344,12 +385,14 @@ impl Fader {
                 let scale = Wave::scale(height_m[k], width_scale[k]);
                 let aside_m = to_y * foot_x - to_x * foot_y;
                 let (x, y) = (body_x * cos[k] - body_y * sin[k], body_x * sin[k] + body_y * cos[k]);
-                let is_clear = wave.is_clear(scale, aside_m, from_tx_m, length_m - from_tx_m);
+                let path_m = ap_z - slope * from_tx_m - floors_m[1];
+                let is_clear = wave.is_clear(scale, aside_m, from_tx_m, length_m - from_tx_m)
+                    | (is_folded & (path_m < 0.0));
                 open[k] = if is_clear || k >= n { 0 } else { 1_u32 << k };
                 across.from_tx_m[k] = from_tx_m;
                 across.to_rx_m[k] = length_m - from_tx_m;
                 across.aside_m[k] = aside_m;
-                across.path_m[k] = ap_z - slope * from_tx_m - floors_m[1];
+                across.path_m[k] = path_m;
                 across.slope[k] = slope;
                 across.depth[k] = to_x * y - to_y * x;
                 across.width[k] = to_x * x + to_y * y;
@@ -374,29 +417,6 @@ fn word(numbers: &[f32], first: usize, count: usize) -> Word {
     let mut word = [0.0; WORD];
     word[..count].copy_from_slice(&numbers[first..first + count]);
     word
-}
-
-impl Antenna {
-    /// Whether a body within one disc may cost a path to another disc something.
-    fn meets(&self, aim: Disc, aim_z: f64, body: Disc, top_m: f64) -> bool {
-        let start_m: DVec2 = self.place_m.truncate();
-        let way_m = aim.center_m - start_m;
-        let length_m = way_m.length();
-        let (along, off_m) = (way_m / length_m.max(1e-9), body.center_m - start_m);
-        let from_start_m = along.dot(off_m);
-        let room_m = body.radius_m + self.wave.beside_m;
-        if from_start_m < -room_m || from_start_m > length_m + aim.radius_m + room_m {
-            return false;
-        }
-        let far = ((from_start_m + room_m) / length_m.max(1e-9)).clamp(0.0, 1.0);
-        let near = ((from_start_m - room_m) / (length_m + aim.radius_m)).clamp(0.0, 1.0);
-        if along.perp_dot(off_m).abs() > room_m + far * aim.radius_m {
-            return false;
-        }
-        let rises_m = aim_z - self.place_m.z;
-        let lowest_m = self.place_m.z + (rises_m * far).min(rises_m * near);
-        lowest_m <= top_m + self.wave.above_m
-    }
 }
 
 /// One standard deviation of the loss about a model that loses so much. A trunk and a head are not the body that walks there, and

@@ -4,10 +4,10 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::Config;
 use crate::forecast::{Forecast, constant_velocity};
-use crate::geometry::{Aabb, Obb};
-use crate::radio::Passage;
+use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 use crate::radio::models::kirchhoff_mean;
-use crate::site::Radio;
+use crate::radio::{Passage, Surface};
+use crate::site::{Handover, Material, Radio, Reflections};
 use crate::track::Track;
 
 /// Somebody who is known well, at a place, with a velocity.
@@ -190,4 +190,66 @@ fn one_by_one(
         sum_db += kirchhoff_mean(wavelength_m, &passage, &parts, 0.04).min(50.0);
     }
     sum_db
+}
+
+/// Two stand still. In what share of the samples the ways are out, the straight one and that by a reflection, of an access point at
+/// (14, 0) to who stands second; and what reflects. Links can lose `margin_db`.
+fn out_by(of: Reflections, [ap_z, margin_db]: [f64; 2], places_m: [DVec2; 2]) -> ([f64; 2], Option<Surface>) {
+    let mut config = config(false);
+    config.site.hall.height_m = 4.0;
+    (config.site.handover, config.site.reflections) = (Some(Handover::default()), Some(of));
+    config.site.access_points.truncate(1);
+    let ap = &mut config.site.access_points[0];
+    ap.position_m[2] = ap_z;
+    ap.radio = Some(Radio { margin_db, fade_spread: false, ..Radio::default() });
+    let tracks = [0, 1].map(|i| somebody(i as u64, places_m[i], DVec2::ZERO));
+    let (_, fader, _) = faded(&config, &tracks);
+    let outages = fader.outages();
+    let share = |way: usize| {
+        let bits: u32 = outages.of(way, 1, 0).iter().map(|word| word.count_ones()).sum();
+        f64::from(bits) / outages.samples() as f64
+    };
+    let reflected = outages.reflected(0, 1);
+    ([share(0), reflected.map_or(1.0, |(way, _)| share(way))], reflected.map(|(_, surface)| surface))
+}
+
+const NOTHING: Reflections =
+    Reflections { walls: Material::None, ceiling: Material::None, floor: Material::None };
+
+#[test]
+fn a_beam_at_the_ceiling_passes_over_who_stands_in_the_straight_way() {
+    let of = Reflections { ceiling: Material::Metal, ..NOTHING };
+    let places_m = [DVec2::new(5.0, 0.0), DVec2::new(2.0, 0.0)];
+    let ([straight, reflected], surface) = out_by(of, [2.0, 15.0], places_m);
+    assert_eq!(surface, Some(Surface::Ceiling));
+    assert!(straight > 0.5 && reflected < 0.1, "{straight} {reflected}");
+    assert_eq!(out_by(of, [2.0, 0.5], places_m).1, None, "it loses more than that without anybody");
+}
+
+#[test]
+fn a_beam_at_the_floor_is_cut_by_whom_the_straight_way_is_cut_by() {
+    let of = Reflections { floor: Material::Metal, ..NOTHING };
+    let places_m = [DVec2::new(3.0, 0.0), DVec2::new(2.0, 0.0)];
+    let ([straight, reflected], surface) = out_by(of, [2.0, 15.0], places_m);
+    assert_eq!(surface, Some(Surface::Floor));
+    assert!(straight > 0.7 && reflected > 0.7, "{straight} {reflected}");
+}
+
+#[test]
+fn both_legs_of_a_way_by_a_wall_are_cut_by_who_stands_in_them_and_by_nobody_else() {
+    // The wall at x = 17 shows the access point at (20, 0), 3 dB weaker; the others are more than 6 dB too far.
+    let of = Reflections { walls: Material::Metal, ..NOTHING };
+    let (ue_m, ap_m) = (DVec2::new(2.0, 6.0), DVec2::new(14.0, 0.0));
+    let out = |at_m: DVec2, margin_db: f64| out_by(of, [1.2, margin_db], [at_m, ue_m]);
+    let meets_m = ue_m.lerp(DVec2::new(20.0, 0.0), 15.0 / 18.0);
+    for at_m in [ue_m.lerp(meets_m, 0.3), meets_m.lerp(ap_m, 0.5)] {
+        let ([straight, reflected], surface) = out(at_m, 6.0);
+        assert_eq!(surface, Some(Surface::Wall(1)));
+        assert!(straight < 0.1 && reflected > 0.5, "{at_m}: {straight} {reflected}");
+    }
+    let ([straight, reflected], _) = out(ue_m.lerp(ap_m, 0.4), 6.0);
+    assert!(straight > 0.7 && reflected < 0.1, "{straight} {reflected}");
+    // With a wider margin the beam takes another wall where the first is cut.
+    let ([_, reflected], surface) = out(ue_m.lerp(meets_m, 0.3), 12.0);
+    assert!(reflected < 0.1 && surface.is_some_and(|of| of != Surface::Wall(1)), "{reflected} {surface:?}");
 }

@@ -1,6 +1,7 @@
 //! What the program answers to a fixed handful of questions, kept in `record/answers.txt`: scenes of two crowds in three modes,
 //! real walkers, real captures. A record names the digest of that file, so that everybody sees whether its figures are of the
-//! present program.
+//! present program. Questions about radios stand in a file of their own, `record/answers-radio.txt`: only records of radios depend on
+//! them, and name the digest of both files.
 //!
 //! The answers are scores and counts as they are printed, not bytes of tables: another processor may round a last bit otherwise.
 //! For the same reason the present answers are compared with those that are kept within a tolerance, and the digest is that of
@@ -12,12 +13,93 @@ use std::process::Command;
 
 /// Numbers that differ by less are the same answer.
 const SAME: f64 = 0.0021;
-/// The file, below the repository's folder.
-pub const FILE: &str = "record/answers.txt";
-
 /// One question: its name, whether it needs the real data, and the words that `umbracast` is asked with. `DATA` stands for the
-/// folder of the real data, `OUT` for one to write to.
-const QUESTIONS: [(&str, bool, &[&str]); 9] = [
+/// folder of the real data, `OUT` and `SIM` for ones to write to.
+type Question = (&'static str, bool, &'static [&'static str]);
+
+/// Questions whose answers are kept in one file.
+pub struct Asked {
+    /// Below the repository's folder.
+    pub file: &'static str,
+    questions: &'static [Question],
+}
+
+/// What every record depends on, and what records of radios do.
+pub const ASKED: [Asked; 2] = [
+    Asked { file: "record/answers.txt", questions: &QUESTIONS },
+    Asked { file: "record/answers-radio.txt", questions: &RADIO },
+];
+
+const RADIO: [Question; 4] = [
+    (
+        "losses",
+        false,
+        &[
+            "network",
+            "--losses",
+            "--scenes",
+            "1",
+            "--people",
+            "8",
+            "--seconds",
+            "25",
+            "--seed",
+            "100800",
+            "--carrier",
+            "28,140",
+            "--truth",
+            "edges",
+        ],
+    ),
+    (
+        "policies",
+        false,
+        &[
+            "network",
+            "--scenes",
+            "1",
+            "--people",
+            "8",
+            "--seconds",
+            "30",
+            "--seed",
+            "100810",
+            "--carrier",
+            "28",
+            "--margin",
+            "15",
+            "--truth",
+            "edges",
+            "--own-body",
+            "--policies",
+            "conditional-60-40,forecast,forecast-with-beams,oracle",
+        ],
+    ),
+    (
+        "devices",
+        false,
+        &[
+            "network",
+            "--dataset",
+            "SIM",
+            "--scenes",
+            "1",
+            "--people",
+            "6",
+            "--seconds",
+            "20",
+            "--seed",
+            "100820",
+            "--carrier",
+            "28",
+            "--truth",
+            "edges",
+        ],
+    ),
+    ("power heard", false, &["network", "--measured", "SIM", "--reports", "SIM/reports.parquet"]),
+];
+
+const QUESTIONS: [Question; 9] = [
     (
         "crossing",
         false,
@@ -90,12 +172,16 @@ const QUESTIONS: [(&str, bool, &[&str]); 9] = [
 ];
 
 /// What a program answers now, question by question; those that need the data only where there is some.
-pub fn ask(umbracast: &Path, root: &Path, data: Option<&Path>) -> Result<String, String> {
-    let out = std::env::temp_dir().join(format!("umbracast-answers-{}", std::process::id()));
+pub fn ask(asked: &Asked, umbracast: &Path, root: &Path, data: Option<&Path>) -> Result<String, String> {
+    let out = std::env::temp_dir().join(format!(
+        "umbracast-answers-{}-{}",
+        asked.questions.len(),
+        std::process::id()
+    ));
     let sim = out.with_extension("sim");
     let mut text = String::new();
     for (name, needs_data, words) in
-        QUESTIONS.iter().filter(|(_, needs_data, _)| !needs_data || data.is_some())
+        asked.questions.iter().filter(|(_, needs_data, _)| !needs_data || data.is_some())
     {
         let data = data.map(|data| data.display().to_string()).unwrap_or_default();
         let [sim, out_name] = [&sim, &out].map(|path| path.display().to_string());
@@ -112,6 +198,7 @@ pub fn ask(umbracast: &Path, root: &Path, data: Option<&Path>) -> Result<String,
         for line in said.lines().filter(|line| tells(line)) {
             let line = without(&without(line, &data, "DATA"), &sim, "SIM");
             let line = without(&line, &out_name, "OUT");
+            let line = line.split("; ").filter(|part| !takes(part)).collect::<Vec<_>>().join("; ");
             text += &format!("  {}\n", line.split_whitespace().collect::<Vec<_>>().join(" "));
         }
     }
@@ -126,7 +213,12 @@ fn without(line: &str, path: &str, name: &str) -> String {
 
 /// Everything but how long something took.
 fn tells(line: &str) -> bool {
-    !line.trim().is_empty() && !line.contains(" ms a frame") && !line.contains(" frames in ")
+    let is_time = !line.contains("; ") && takes(line);
+    !line.trim().is_empty() && !is_time && !line.contains(" frames in ")
+}
+
+fn takes(part: &str) -> bool {
+    part.contains(" ms a frame")
 }
 
 /// The first lines that differ by more than the tolerance, or whose words differ. Questions that were not asked now, for there is

@@ -17,7 +17,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use crate::answers;
-use crate::record::{ANSWERS, COMMIT, TOOK};
+use crate::record::{ANSWERS, COMMIT, RADIO, TOOK};
 use crate::tools::{Result, files_below, root};
 
 /// What a comment of a quoted block begins with.
@@ -35,7 +35,7 @@ fn pages() -> Vec<PathBuf> {
 /// Rewrites README.md, the leaderboard and the pages of docs/. Fails, once all that can be is written, where a rule finds nothing.
 pub fn run() -> Result<()> {
     let mut missing = Vec::new();
-    let present = present_digest()?;
+    let present = Digests::present()?;
     for page in pages() {
         let name = page.strip_prefix(root()).unwrap_or(&page).display().to_string();
         let text = fs::read_to_string(&page).map_err(|e| format!("{name}: {e}"))?;
@@ -49,11 +49,36 @@ pub fn run() -> Result<()> {
     if missing.is_empty() { Ok(()) } else { Err(format!("quote:\n{}", missing.join("\n"))) }
 }
 
-/// That of the answers that are kept.
-pub fn present_digest() -> Result<String> {
-    let kept =
-        fs::read_to_string(root().join(answers::FILE)).map_err(|e| format!("{}: {e}", answers::FILE))?;
-    Ok(answers::digest(&kept))
+/// Those of the answers that are kept.
+#[derive(Debug, Clone)]
+pub struct Digests {
+    plain: String,
+    /// With those about radios.
+    radio: String,
+}
+
+impl Digests {
+    /// # Errors
+    /// Answers that are not kept.
+    pub fn present() -> Result<Self> {
+        let kept = |file: &str| fs::read_to_string(root().join(file)).map_err(|e| format!("{file}: {e}"));
+        let [plain, radio] = &answers::ASKED;
+        let plain = kept(plain.file)?;
+        let both = plain.clone() + &kept(radio.file)?;
+        Ok(Self { plain: answers::digest(&plain), radio: answers::digest(&both) })
+    }
+
+    /// The same for all.
+    #[cfg(test)]
+    pub fn both(digest: &str) -> Self {
+        Self { plain: digest.into(), radio: digest.into() }
+    }
+
+    /// What a record of the present program names: `record/NAME.txt`, or its name.
+    pub fn of(&self, record: &str) -> &str {
+        let name = record.trim_start_matches("record/").trim_end_matches(".txt");
+        if RADIO.contains(&name) { &self.radio } else { &self.plain }
+    }
 }
 
 /// Whether a record was made by a program that gave these answers.
@@ -64,7 +89,7 @@ pub fn is_of(record: &str, digest: &str) -> bool {
 /// The page with every block cut anew. A block whose record is not there, or of which nothing is found, stays.
 fn renewed(
     page: &str,
-    present: &str,
+    present: &Digests,
     record: impl Fn(&str) -> Option<String>,
     mut missing: impl FnMut(String),
 ) -> String {
@@ -77,7 +102,7 @@ fn renewed(
         let name = lines.next().unwrap_or_default();
         let rules: Vec<&str> = lines.collect();
         let part = &match record(name) {
-            Some(record) => marked(part, !is_of(&record, present)),
+            Some(record) => marked(part, !is_of(&record, present.of(name))),
             None => part.to_owned(),
         };
         let place = opened(part);
@@ -168,12 +193,26 @@ mod tests {
 
     const RECORD: &str = "$ umbracast evaluate\nmode   F1\npaper  .80\nours   .94\n\nDetection\nours   .99\n";
 
+    fn of_plain(plain: &str) -> Digests {
+        Digests { plain: plain.into(), radio: "77cd".into() }
+    }
+
+    #[test]
+    fn a_record_of_radios_names_another_digest() {
+        let page = "<!-- from record/network.txt\n$ umbracast | mode\n-->\n```text\n```\n";
+        let marks = |digest: &'static str| {
+            let record = move |_: &str| Some(format!("# answers {digest}\n{RECORD}"));
+            renewed(page, &of_plain("12ab"), record, |_| {}).matches("an earlier program").count()
+        };
+        assert_eq!((marks("77cd"), marks("12ab")), (0, 1));
+    }
+
     #[test]
     fn a_block_is_cut_anew_and_the_rest_stays() {
         let page = "Before.\n<!-- from record/a.txt\n$ umbracast | mode | ours\nDetection | *\n-->\n\
                     ```text\nours   .50\n```\nAfter.\n<!-- from record/b.txt -->\n```text\nx\n```\n";
         let record = |name: &str| (name == "record/a.txt").then(|| format!("# answers 12ab\n{RECORD}"));
-        let new = renewed(page, "12ab", record, |m| panic!("{m}"));
+        let new = renewed(page, &of_plain("12ab"), record, |m| panic!("{m}"));
         let block =
             "```text\n$ umbracast evaluate\nmode   F1\nours   .94\n\nDetection\nours   .99\n```\nAfter.";
         assert!(new.contains(block), "{new}");
@@ -186,20 +225,20 @@ mod tests {
         let page =
             "<!-- from record/a.txt\n$ umbracast | mode | ours\n-->\n```text\nours   .50\n```\nAfter.\n";
         let of = |digest: &'static str| move |_: &str| Some(format!("# answers {digest}\n{RECORD}"));
-        let stale = renewed(page, "12ab", of("99ff"), |m| panic!("{m}"));
+        let stale = renewed(page, &of_plain("12ab"), of("99ff"), |m| panic!("{m}"));
         assert_eq!(stale.matches("an earlier program").count(), 1, "{stale}");
         assert!(stale.contains("```text\n$ umbracast evaluate\nmode   F1\nours   .94\n```"), "{stale}");
-        assert_eq!(renewed(&stale, "12ab", of("99ff"), |m| panic!("{m}")), stale);
-        let fresh = renewed(&stale, "12ab", of("12ab"), |m| panic!("{m}"));
+        assert_eq!(renewed(&stale, &of_plain("12ab"), of("99ff"), |m| panic!("{m}")), stale);
+        let fresh = renewed(&stale, &of_plain("12ab"), of("12ab"), |m| panic!("{m}"));
         assert!(!fresh.contains("an earlier program") && fresh.contains("-->\n```text\n"), "{fresh}");
-        let without = renewed(page, "12ab", |_| Some(RECORD.to_owned()), |m| panic!("{m}"));
+        let without = renewed(page, &of_plain("12ab"), |_| Some(RECORD.to_owned()), |m| panic!("{m}"));
         assert!(without.contains("an earlier program"), "{without}");
     }
 
     /// The figures that a stranger sees first are of the present program, and every other block says if it is not.
     #[test]
     fn readme_and_the_first_results_quote_the_present_program() {
-        let present = present_digest().unwrap();
+        let present = Digests::present().unwrap();
         let record = |name: &str| fs::read_to_string(root().join(name)).ok();
         for page in pages() {
             let text = fs::read_to_string(&page).unwrap();
@@ -216,7 +255,7 @@ mod tests {
             let quotes = text.split(MARK).skip(1).take(if first_only { 1 } else { usize::MAX });
             for quote in quotes {
                 let name = quote.lines().next().unwrap_or_default().trim_end_matches("-->").trim();
-                let of_present = record(name).is_some_and(|record| is_of(&record, &present));
+                let of_present = record(name).is_some_and(|record| is_of(&record, present.of(name)));
                 assert!(of_present, "{}: {name} is of an earlier program", page.display());
             }
         }

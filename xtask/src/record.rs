@@ -19,8 +19,8 @@ mod walls;
 
 use std::fs;
 
-use crate::answers;
-use crate::quote;
+use crate::answers::{self, ASKED};
+use crate::quote::{self, Digests};
 use crate::tools::{Result, Scratch, built, data, output, root, target};
 pub use book::{ANSWERS, COMMIT, TOOK};
 use book::{Bench, Book, took_s};
@@ -115,6 +115,9 @@ const JOBS: [Job; 53] = [
     job("locked", "scenes and recordings that nothing was chosen by: every look is kept", 8, Needs::Asking, locked::look),
 ];
 
+/// Those whose figures depend on radios, too.
+pub const RADIO: [&str; 5] = ["network", "network-sweeps", "network-losses", "bindings", "heard"];
+
 /// Other names of the same.
 const ALIASES: [(&str, &str); 3] =
     [("headline", "orca-03-100-scenes"), ("modes", "orca-40-scenes"), ("antipode", "circle-antipode")];
@@ -125,17 +128,17 @@ pub fn run(words: &[&str]) -> Result<()> {
     if let Some(unknown) = flags.iter().find(|flag| !["--dirty", "--again"].contains(flag)) {
         return Err(format!("record: expected --dirty or --again, found {unknown}"));
     }
-    let digest = quote::present_digest()?;
+    let digests = Digests::present()?;
     if names.is_empty() {
         for job in &JOBS {
             let by_name = if job.needs == Needs::Asking { " (by name only)" } else { "" };
-            let (minutes, state) = (minutes(job), state(job, &digest));
+            let (minutes, state) = (minutes(job), state(job, &digests));
             println!("{:20} {minutes:>4} min  {state:16} {}{by_name}", job.name, job.what);
         }
         return Ok(());
     }
     let all = names.contains(&"all");
-    let jobs = to_do(named(&names)?, all, flags.contains(&"--again"), &digest)?;
+    let jobs = to_do(named(&names)?, all, flags.contains(&"--again"), &digests)?;
     println!(
         "{} records to make, about {} min",
         jobs.len(),
@@ -156,7 +159,7 @@ pub fn run(words: &[&str]) -> Result<()> {
     let mut failed = Vec::new();
     for job in jobs {
         let bench = Bench { umbracast: umbracast.clone(), scratch: Scratch::new(job.name)? };
-        let mut book = Book::new(job.name, &commit, &digest, bench);
+        let mut book = Book::new(job.name, &commit, digests.of(job.name), bench);
         match (job.make)(&mut book).and_then(|()| book.close()) {
             Ok(told) => println!("{told}"),
             // One that fails costs its own record, not those of the night after it.
@@ -171,10 +174,10 @@ pub fn run(words: &[&str]) -> Result<()> {
 
 /// What is left of these jobs. With `all`, what was stopped goes on where it was: a record of the present program stays,
 /// and so does one for which this machine lacks something.
-fn to_do(jobs: Vec<&'static Job>, all: bool, again: bool, digest: &str) -> Result<Vec<&'static Job>> {
+fn to_do(jobs: Vec<&'static Job>, all: bool, again: bool, digests: &Digests) -> Result<Vec<&'static Job>> {
     let mut left = Vec::new();
     for job in jobs {
-        if all && !again && made(job).is_some_and(|record| quote::is_of(&record, digest)) {
+        if all && !again && made(job).is_some_and(|record| quote::is_of(&record, digests.of(job.name))) {
             println!("{}: of the present program", job.name);
             continue;
         }
@@ -198,10 +201,10 @@ fn made(job: &Job) -> Option<String> {
 }
 
 /// Which program the record of a job is of.
-fn state(job: &Job, digest: &str) -> &'static str {
+fn state(job: &Job, digests: &Digests) -> &'static str {
     match made(job) {
         None => "not made",
-        Some(record) if quote::is_of(&record, digest) => "present",
+        Some(record) if quote::is_of(&record, digests.of(job.name)) => "present",
         Some(record) if record.lines().any(|line| line.starts_with(COMMIT)) => "earlier program",
         Some(_) => "no commit",
     }
@@ -213,28 +216,39 @@ fn minutes(job: &Job) -> u32 {
     seconds.map_or(job.minutes, |seconds| (seconds / 60.0).ceil() as u32)
 }
 
-/// Whether the program answers as `record/answers.txt` says; `write` keeps what it answers now.
+/// Whether the program answers as is kept; `write` keeps what it answers now.
 pub fn answers(write: bool) -> Result<()> {
     let umbracast = built(&root(), &target())?;
     let moved = moved(&umbracast)?;
-    match (moved.is_empty(), write) {
-        (true, _) => println!("{} answers {}", answers::FILE, quote::present_digest()?),
-        (false, false) => return Err(format!("answers moved:\n{}", moved.join("\n"))),
-        (false, true) => {
-            let data = data()
-                .ok_or("expected UMBRACAST_DATA, for half of the questions are asked of it, found none")?;
-            let found = answers::ask(&umbracast, &root(), Some(&data))?;
-            fs::write(root().join(answers::FILE), &found).map_err(|e| format!("{}: {e}", answers::FILE))?;
-            println!("{} answers {}", answers::FILE, answers::digest(&found));
+    if !moved.is_empty() && !write {
+        return Err(format!("answers moved:\n{}", moved.join("\n")));
+    }
+    if !moved.is_empty() {
+        let data =
+            data().ok_or("expected UMBRACAST_DATA, for half of the questions are asked of it, found none")?;
+        for asked in &ASKED {
+            let found = answers::ask(asked, &umbracast, &root(), Some(&data))?;
+            let kept = fs::read_to_string(root().join(asked.file)).unwrap_or_default();
+            // Answers within the tolerance stay, and with them the digest.
+            if !answers::differences(&kept, &found).is_empty() {
+                fs::write(root().join(asked.file), &found).map_err(|e| format!("{}: {e}", asked.file))?;
+            }
         }
     }
+    let digests = Digests::present()?;
+    println!("answers {}, with radios {}", digests.of("speed"), digests.of(RADIO[0]));
     Ok(())
 }
 
 /// Where the program's answers are not those that are kept.
 fn moved(umbracast: &std::path::Path) -> Result<Vec<String>> {
-    let kept = fs::read_to_string(root().join(answers::FILE)).unwrap_or_default();
-    Ok(answers::differences(&kept, &answers::ask(umbracast, &root(), data().as_deref())?))
+    let mut moved = Vec::new();
+    for asked in &ASKED {
+        let kept = fs::read_to_string(root().join(asked.file)).unwrap_or_default();
+        let found = answers::ask(asked, umbracast, &root(), data().as_deref())?;
+        moved.extend(answers::differences(&kept, &found));
+    }
+    Ok(moved)
 }
 
 fn named(names: &[&str]) -> Result<Vec<&'static Job>> {
@@ -293,7 +307,8 @@ mod tests {
         let job = JOBS.iter().find(|job| job.needs == Needs::Nothing && made(job).is_some()).unwrap();
         let record = made(job).unwrap();
         let digest = record.lines().find_map(|line| line.strip_prefix("# answers ")).unwrap_or("none");
-        let left = |all, again, digest| to_do(vec![job], all, again, digest).unwrap().len();
+        let left =
+            |all, again, digest: &str| to_do(vec![job], all, again, &Digests::both(digest)).unwrap().len();
         assert_eq!(left(true, false, digest), usize::from(digest == "none"));
         assert_eq!((left(true, true, digest), left(false, false, digest)), (1, 1));
         assert_eq!(left(true, false, "another program"), 1);

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use umbracast::decide::Action;
+use umbracast::radio::Surface;
 use umbracast_io::rows::{BindingRow, DecisionRow, LossRow, ReportRow};
 use umbracast_io::tables;
 use umbracast_io::wire::WireRow;
@@ -42,7 +43,7 @@ fn a_site_with_radios_has_tables_of_losses_and_decisions_and_no_other_site_has()
     let (walk, sim) = (folder.join("crossing.csv"), folder.join("sim"));
     fs::write(&walk, CROSSING).expect("writes");
     done(&["simulate", "--trajectories", text(&walk), "--seed", "7", "--out", text(&sim)]);
-    let (out, plain) = (folder.join("out"), folder.join("plain"));
+    let (out, plain, beams) = (folder.join("out"), folder.join("plain"), folder.join("beams"));
     let run = |out: &Path, radio: &str, handover: &str| {
         let access_points =
             [("side", "[14.0, 0.0, 2.0]"), ("north", "[0.0, 14.0, 3.0]")].map(|(name, at)| {
@@ -58,6 +59,11 @@ fn a_site_with_radios_has_tables_of_losses_and_decisions_and_no_other_site_has()
         "[site.handover]\nprocedure = \"nr-ltm\"\n",
     );
     run(&plain, "", "");
+    run(
+        &beams,
+        "radio = { carrier_ghz = 140.0, margin_db = 12.0 }",
+        "[site.handover]\n[site.reflections]\nwalls = \"none\"\nceiling = \"metal\"\nfloor = \"none\"\n",
+    );
     let names = ["side".to_owned(), "north".to_owned()];
     let losses = tables::read::<LossRow>(&out, &names).expect("a table");
     assert!(
@@ -66,9 +72,14 @@ fn a_site_with_radios_has_tables_of_losses_and_decisions_and_no_other_site_has()
     );
     let decisions = tables::read::<DecisionRow>(&out, &names).expect("a table");
     assert!(decisions.iter().any(|row| row.action != Action::Stay && row.target.is_some()), "a change helps");
+    let pointed = tables::read::<DecisionRow>(&beams, &names).expect("a table");
+    let surfaces: Vec<_> =
+        pointed.iter().filter(|row| row.action == Action::Beam).map(|row| row.surface).collect();
+    assert!(surfaces.contains(&Some(Surface::Ceiling)) && surfaces.contains(&None), "{surfaces:?}");
+    assert!(decisions.iter().all(|row| row.action != Action::Beam && row.surface.is_none()));
     let csv = fs::read_to_string(out.join("decisions.csv")).expect("a table");
     assert!(
-        csv.starts_with("scene,frame,time_ns,track,serving,action,target,deadline_s,saved_s,p_out\n"),
+        csv.starts_with("scene,frame,time_ns,track,serving,action,target,surface,deadline_s,saved_s,p_out\n"),
         "{csv}"
     );
     // The same bytes as without radios, but for the configuration and what is of the radio alone.

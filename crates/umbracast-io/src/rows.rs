@@ -9,7 +9,7 @@ use umbracast::decide::Action;
 use umbracast::detect::Detection;
 use umbracast::detect::LEVELS;
 use umbracast::geometry::{Aabb, Obb};
-use umbracast::radio::Binding;
+use umbracast::radio::{Binding, Surface};
 use umbracast::track::Track;
 use umbracast::{Outcome, STEPS};
 
@@ -202,6 +202,8 @@ pub struct DecisionRow {
     pub action: Action,
     /// Where a change goes to, or one that is prepared; null otherwise.
     pub target: Option<u32>,
+    /// What a beam is to be pointed at; null for the device itself.
+    pub surface: Option<Surface>,
     /// Until when a command must have been sent, from the frame's instant; null where nothing comes.
     pub deadline_s: Option<f64>,
     /// Less time in outage than without the action, as expected within the steps.
@@ -320,6 +322,7 @@ pub fn decisions(scene: u32, outcome: &Outcome) -> impl Iterator<Item = Decision
         serving: decision.serving as u32,
         action: decision.action,
         target: decision.target.map(|target| target as u32),
+        surface: decision.surface,
         deadline_s: decision.deadline_s,
         saved_s: decision.saved_s,
         p_out: decision.p_out,

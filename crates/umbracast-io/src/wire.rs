@@ -92,13 +92,16 @@ pub fn fields<R: WireRow>() -> String {
             Cell::F64(_) | Cell::MaybeF64(_) => "float64",
             Cell::Bool(_) => "bool",
             Cell::MaybeBool(_) => "uint8",
-            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_) => "string",
+            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_) | Cell::MaybeSurface(_) => {
+                "string"
+            }
         };
         let remark = match cell {
             Cell::MaybeF64(_) => " # NaN: none",
             Cell::MaybeBool(_) => " # 0 no, 1 yes, 2 unknown",
             Cell::MaybeAccessPoint(_) => " # empty: none",
-            Cell::Action(_) => " # stay, wait, hand-over or prepare",
+            Cell::Action(_) => " # stay, wait, hand-over, prepare or beam",
+            Cell::MaybeSurface(_) => " # floor, ceiling or wall-N; empty: none",
             _ => "",
         };
         text.push_str(&format!("{kind} {name}{remark}\n"));
@@ -146,6 +149,7 @@ pub fn encode<R: WireRow>(time_ns: i64, frame: u64, rows: &[R], access_points: &
             Cell::AccessPoint(v) => e.string(name_of(*v)),
             Cell::MaybeAccessPoint(v) => e.string(v.map_or("", name_of)),
             Cell::Action(v) => e.string(v.name()),
+            Cell::MaybeSurface(v) => e.string(&v.map_or(String::new(), |v| v.to_string())),
         });
     }
     e.finish()
@@ -187,6 +191,10 @@ pub fn decode<R: WireRow>(bytes: &[u8], access_points: &[String]) -> Option<(u64
                     let name = d.string();
                     set(v, Action::ALL.into_iter().find(|action| Some(action.name()) == name))
                 }
+                (_, Cell::MaybeSurface(v)) => match d.string() {
+                    Some("") => set(v, Some(None)),
+                    name => set(v, name.and_then(|name| name.parse().ok()).map(Some)),
+                },
             };
         });
         if !whole {
@@ -278,6 +286,7 @@ impl<R: WireRow> Serialize for JsonRow<'_, R> {
                     object.serialize_entry(name, &v.and_then(|v| access_points.get(v as usize)))
                 }
                 Cell::Action(v) => object.serialize_entry(name, v.name()),
+                Cell::MaybeSurface(v) => object.serialize_entry(name, &v.map(|v| v.to_string())),
             };
         });
         written?;
@@ -309,7 +318,7 @@ pub fn json_schema<R: WireRow>() -> Value {
             Cell::Bool(_) => "boolean".into(),
             Cell::MaybeBool(_) => vec!["boolean", "null"].into(),
             Cell::AccessPoint(_) | Cell::Action(_) => "string".into(),
-            Cell::MaybeAccessPoint(_) => vec!["string", "null"].into(),
+            Cell::MaybeAccessPoint(_) | Cell::MaybeSurface(_) => vec!["string", "null"].into(),
         };
         let mut schema = serde_json::json!({ "type": kind });
         if let Cell::Action(_) = cell {
@@ -380,10 +389,13 @@ mod tests {
 
     #[test]
     fn a_decision_names_its_action_and_its_target_or_none() {
+        use umbracast::radio::Surface;
+
         let wait = DecisionRow { track: 3, serving: 1, action: Action::Wait, ..DecisionRow::default() };
         let leave = DecisionRow { action: Action::HandOver, target: Some(0), deadline_s: Some(0.2), ..wait };
-        let bytes = encode(0, 0, &[wait, leave], &access_points());
-        assert_eq!(decode(&bytes, &access_points()), Some((0, 0, vec![wait, leave])));
+        let beam = DecisionRow { action: Action::Beam, surface: Some(Surface::Wall(2)), ..wait };
+        let bytes = encode(0, 0, &[wait, leave, beam], &access_points());
+        assert_eq!(decode(&bytes, &access_points()), Some((0, 0, vec![wait, leave, beam])));
         let value = serde_json::to_value(Json::whole(&[wait, leave], &access_points())).unwrap();
         assert_eq!((&value[0]["action"], &value[0]["target"]), (&"wait".into(), &Value::Null));
         assert_eq!((&value[1]["action"], &value[1]["target"]), (&"hand-over".into(), &"side".into()));

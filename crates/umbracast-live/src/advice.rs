@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use umbracast::decide::Action;
+use umbracast::radio::Surface;
 use umbracast_io::rows::DecisionRow;
 
 /// Something else to do about one device than in the frame before.
@@ -19,7 +20,7 @@ pub struct Advice {
 
 /// What was to be done about every device in the frame before, by track.
 #[derive(Debug, Clone, Default)]
-pub struct Advised(BTreeMap<u64, (Action, Option<u32>)>);
+pub struct Advised(BTreeMap<u64, (Action, Option<u32>, Option<Surface>)>);
 
 impl Advised {
     /// The decisions that are not those of the frame before. A device stays where it is before its first frame.
@@ -28,7 +29,7 @@ impl Advised {
         let mut now = BTreeMap::new();
         let mut changes = Vec::new();
         for &decision in decisions {
-            let advice = (decision.action, decision.target);
+            let advice = (decision.action, decision.target, decision.surface);
             if self.0.get(&decision.track).copied().unwrap_or_default() != advice {
                 let (serving, target) = (name(decision.serving), decision.target.map(name));
                 changes.push(Advice { decision, serving, target });
@@ -52,6 +53,7 @@ impl Advice {
             "serving": serving,
             "action": decision.action.name(),
             "target": target,
+            "surface": decision.surface.map(|surface| surface.to_string()),
             "deadline_s": decision.deadline_s,
             "saved_s": decision.saved_s,
             "p_out": decision.p_out,

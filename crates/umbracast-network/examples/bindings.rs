@@ -89,7 +89,7 @@ fn scene(people: usize, seed: u64) -> Result<(Vec<Share>, Share), String> {
         Scene::in_hall(strolling(Preset::Orca03, people, RADIUS_M, seed, SECONDS), site, &sensors, seed);
     let ticks = (SECONDS * 100) as usize;
     let airs = [Air::of(site, TruthModel::ModelB)];
-    let counted = Counted { own_body: false, reflections: false };
+    let counted = Counted { own_body: false, reflections_db: 0.0 };
     let [traces] = &Traces::of_scene(site, scene.walkers(), ticks, &airs, counted)[..] else {
         return Err("one air has one truth".to_owned());
     };

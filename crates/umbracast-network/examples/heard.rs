@@ -152,7 +152,7 @@ fn scene(people: usize, seed: u64, carrier_ghz: f64, model: TruthModel) -> Resul
     let sensors = Sensors::new(site, seed).map_err(|e| e.to_string())?;
     let walk = strolling(Preset::Orca03, people, RADIUS_M, seed, SECONDS);
     let mut scene = Scene::in_hall(walk, site, &sensors, seed);
-    let counted = Counted { own_body: true, reflections: false };
+    let counted = Counted { own_body: true, reflections_db: 0.0 };
     let ticks = (SECONDS * 100) as usize;
     let [traces] = &Traces::of_scene(site, scene.walkers(), ticks, &[Air::of(site, model)], counted)[..]
     else {

@@ -100,8 +100,9 @@ fn or_site<T: Copy>(values: &[T]) -> Vec<Option<T>> {
 }
 
 /// The configuration with access points that have radios: those of the site, or else the usual places of the default hall. With
-/// `in_hand` devices are ahead of their owners, whose bodies then count.
-pub fn with_radios(config: &Config, in_hand: bool) -> Config {
+/// `in_hand` devices are ahead of their owners, whose bodies then count; without `beams` nothing reflects, and with them everything
+/// is of concrete unless the site says otherwise.
+pub fn with_radios(config: &Config, in_hand: bool, beams: bool) -> Config {
     let mut config = config.clone();
     let site = &mut config.site;
     if !site.has_radio() {
@@ -113,6 +114,7 @@ pub fn with_radios(config: &Config, in_hand: bool) -> Config {
         site.access_points = PLACES_M.into_iter().enumerate().map(place).collect();
     }
     site.handover.get_or_insert_default();
+    site.reflections = beams.then(|| site.reflections.unwrap_or_default());
     if in_hand && site.ue.forward_m == 0.0 && site.ue.left_m == 0.0 {
         site.ue.forward_m = IN_HAND_M;
     }
@@ -179,7 +181,7 @@ mod tests {
         assert!(
             cases[..9].iter().all(|case| case.foresees_as(&cases[0])) && !cases[9].foresees_as(&cases[0])
         );
-        let hall = with_radios(&Config::for_mode(Mode::Default), true);
+        let hall = with_radios(&Config::for_mode(Mode::Default), true, false);
         assert_eq!((hall.site.access_points.len(), hall.site.ue.forward_m), (8, IN_HAND_M));
         let config = cases[9].config(&hall).unwrap();
         let radio = config.site.access_points[1].radio.unwrap();

@@ -95,7 +95,7 @@ impl<'a> DataSet<'a> {
         recording.finish()?;
         let own_body = site.ue.forward_m != 0.0 || site.ue.left_m != 0.0;
         let airs = [Air::of(site, model)];
-        let counted = Counted { own_body, reflections: false };
+        let counted = Counted { own_body, reflections_db: 0.0 };
         let traces = Traces::of_scene(site, simulated.walkers(), ticks, &airs, counted);
         for traces in &traces {
             self.radio.write(&radio_of(scene, site, traces))?;

@@ -17,11 +17,11 @@ const MOST_BPS_HZ: f64 = 7.4;
 const PING_PONG_S: f64 = 1.0;
 /// A change is needless where the link that was left would not have been out within so long.
 const NEEDLESS_S: f64 = 0.9;
-/// A prepared device changes when the serving link has lost this share of its margin. Chosen on seeds from 132500: earlier (.75,
-/// .85) it also leaves links that do not go out.
-const FALLEN: f64 = 0.95;
 /// Rates are means over so many ticks.
 const WINDOW_TICKS: usize = 10;
+
+/// What a beam at a reflection that is not there loses.
+const SWALLOWED_DB: f64 = 60.0;
 
 /// What a policy asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,8 +36,17 @@ pub enum Order {
     Hold,
     /// As usual, until the next order.
     Release,
-    /// Point the beam at the best reflection of the same access point, or at the access point again.
+    /// The device points the beam at the best reflection of the same access point, or at the access point again.
     Beam(bool),
+    /// The same by a command over the serving link.
+    Point(bool),
+}
+
+/// What a command tells a device.
+#[derive(Debug, Clone, Copy)]
+enum Command {
+    Change(usize),
+    Point(bool),
 }
 
 /// What a policy sees at an instant.
@@ -49,7 +58,7 @@ pub struct View<'a> {
     pub person: usize,
     /// The access point that serves it.
     pub serving: usize,
-    /// By access point, the last report: signal to noise, dB.
+    /// By access point, the last report: signal to noise, dB; of the serving one that of the beam that serves.
     pub reported_db: &'a [f64],
     /// Whether there is a new one.
     pub is_new: bool,
@@ -133,16 +142,20 @@ impl Network {
         self.radios[ap].is_none_or(|radio| traces.reflected_db(tick, ap, person) >= radio.margin_db)
     }
 
-    /// Signal to noise of a link.
-    pub fn snr_db(&self, traces: &Traces, tick: usize, ap: usize, person: usize) -> f64 {
+    /// Signal to noise of a link, straight or by its best reflection.
+    pub fn snr_db(&self, traces: &Traces, tick: usize, ap: usize, person: usize, reflected: bool) -> f64 {
+        let loss_db = match reflected {
+            true => traces.reflected_db(tick, ap, person).min(SWALLOWED_DB),
+            false => traces.loss_db(tick, ap, person),
+        };
         self.radios[ap].map_or(f64::NEG_INFINITY, |radio| {
-            radio.snr_db(traces.length_m(tick, ap, person).max(0.1)) - traces.loss_db(tick, ap, person)
+            radio.snr_db(traces.length_m(tick, ap, person).max(0.1)) - loss_db
         })
     }
 
     /// The access point that a device connects to at an instant.
     pub fn strongest(&self, traces: &Traces, tick: usize, person: usize) -> usize {
-        let snr_db = |ap: &usize| self.snr_db(traces, tick, *ap, person);
+        let snr_db = |ap: &usize| self.snr_db(traces, tick, *ap, person, false);
         self.ways().max_by(|a, b| snr_db(a).total_cmp(&snr_db(b))).unwrap_or_default()
     }
 }
@@ -185,8 +198,9 @@ pub fn drive(
         let is_new = tick.is_multiple_of(REPORT_TICKS);
         if is_new {
             for ap in network.ways() {
+                let beam = reflected && ap == serving;
                 reported_db[ap] =
-                    network.snr_db(traces, tick, ap, person) + REPORT_NOISE_DB * normal(&mut noise);
+                    network.snr_db(traces, tick, ap, person, beam) + REPORT_NOISE_DB * normal(&mut noise);
             }
         }
         let straight_out = network.is_out(traces, tick, serving, person);
@@ -200,8 +214,12 @@ pub fn drive(
             View { tick, person, serving, reported_db: &reported_db, is_new, reflected, out, straight_out };
         match policy(&view) {
             Some(Order::Command(to)) if command.is_none() => {
-                command = Some((tick + ticks_of(costs.command_s), to));
+                command = Some((tick + ticks_of(costs.command_s), Command::Change(to)));
                 held = false;
+            }
+            Some(Order::Point(to_reflection)) if command.is_none() => {
+                command = Some((tick + ticks_of(costs.command_s), Command::Point(to_reflection)));
+                (held, prepared) = (false, None);
             }
             Some(Order::Execute(to)) => change = Some(to),
             Some(Order::Prepare(to)) => {
@@ -219,16 +237,16 @@ pub fn drive(
             _ => {}
         }
         if let Some((to, level_db)) = prepared.filter(|_| is_new)
-            && reported_db[serving] < level_db - FALLEN * network.margin_db(serving)
+            && reported_db[serving] < level_db - costs.leaves_at * network.margin_db(serving)
         {
             change = Some(to);
         }
-        if let Some((_, to)) = command.filter(|(at, _)| *at <= tick) {
+        if let Some((_, told)) = command.filter(|(at, _)| *at <= tick) {
             command = None;
-            if !matches!(phase, Phase::Served) || out {
-                tally.lost_commands += 1;
-            } else {
-                change = Some(to);
+            match told {
+                _ if !matches!(phase, Phase::Served) || out => tally.lost_commands += 1,
+                Command::Change(to) => change = Some(to),
+                Command::Point(to_reflection) => (reflected, out) = (to_reflection, way_out(to_reflection)),
             }
         }
         if let (Some(to), Phase::Served) = (change.filter(|to| *to != serving), &phase) {
@@ -252,12 +270,8 @@ pub fn drive(
             phase = Phase::Lost { until: tick + ticks_of(costs.recovery_s) };
         }
         if serves {
-            let straight_db = network.snr_db(traces, tick, serving, person);
-            let more_db = match reflected {
-                true => traces.loss_db(tick, serving, person) - traces.reflected_db(tick, serving, person),
-                false => 0.0,
-            };
-            window_bps += rate_bps(network, straight_db + more_db, serving);
+            let snr_db = network.snr_db(traces, tick, serving, person, reflected);
+            window_bps += rate_bps(network, snr_db, serving);
         }
         if (tick - begin + 1).is_multiple_of(WINDOW_TICKS) {
             tally.rates_bps.push((window_bps / WINDOW_TICKS as f64) as f32);

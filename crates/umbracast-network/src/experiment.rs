@@ -73,7 +73,7 @@ impl Spec<'_> {
     /// One tally a case and policy, in the order of rows.
     fn scene(&self, seed: u64) -> Result<Vec<Tally>, Error> {
         let seen = self.hall.see(self.crowd, seed)?;
-        let reflections = self.policies.contains(&Policy::Beams);
+        let reflections = self.policies.iter().any(|policy| policy.has_beams());
         let truths = Truths::of(self.hall.config(), &self.cases, &seen, reflections)?;
         let mut forecasts: Option<(Case, Forecasts)> = None;
         let mut tallies = Vec::new();
@@ -108,7 +108,14 @@ impl Spec<'_> {
             let mut foreteller = Foreteller::new(config, self.weights)?;
             Ok(frames.iter().map(|frame| foreteller.foresee(frame, traces)).collect())
         };
-        let ours = [Policy::AsNow, Policy::Foreseen, Policy::Commands, Policy::AtOnce, Policy::Perfect];
+        let ours = [
+            Policy::AsNow,
+            Policy::Foreseen,
+            Policy::ForeseenBeams,
+            Policy::Commands,
+            Policy::AtOnce,
+            Policy::Perfect,
+        ];
         let mut straight_on = config.clone();
         straight_on.forecast.method = ForecastMethod::ConstantVelocity;
         let of_paper = |paper: &Config| {
@@ -137,7 +144,7 @@ struct Forecasts {
 pub(crate) struct Truths(Vec<(Air, usize, Traces)>);
 
 impl Truths {
-    /// Of a scene that was seen, with the ways by walls where somebody asks for `reflections`.
+    /// Of a scene that was seen, with the ways by reflections where somebody asks for `reflections`.
     ///
     /// # Errors
     /// More access points than the site has.
@@ -154,11 +161,16 @@ impl Truths {
                 None => airs.push((config, vec![air])),
             }
         }
+        // A way that loses its margin without anybody is out whoever stands where.
+        let sites = airs.iter().flat_map(|(config, _)| &config.site.access_points);
+        let of_sites = sites.filter_map(|ap| Some(ap.radio?.margin_db));
+        let most_db = cases.iter().filter_map(|case| case.margin_db).chain(of_sites).fold(0.0, f64::max);
+        let reflections_db = if reflections { most_db } else { 0.0 };
         let mut truths = Vec::new();
         for (config, airs) in airs {
             let site = &config.site;
             let own_body = site.ue.forward_m != 0.0 || site.ue.left_m != 0.0;
-            let counted = Counted { own_body, reflections };
+            let counted = Counted { own_body, reflections_db };
             let traces = Traces::of_scene(site, &seen.walkers, seen.ticks, &airs, counted);
             let count = site.access_points.len();
             truths.extend(airs.into_iter().zip(traces).map(|(air, traces)| (air, count, traces)));
@@ -178,6 +190,7 @@ impl Truths {
 fn judge(config: &Config, traces: &Traces, forecasts: &Forecasts, policy: Policy) -> Tally {
     let mut site = config.site.clone();
     site.handover = site.handover.map(|handover| handover_under(policy, handover));
+    site.reflections = site.reflections.filter(|_| policy.has_beams());
     let network = Network {
         radios: site.access_points.iter().map(|ap| ap.radio).collect(),
         costs: site.handover.unwrap_or_default().costs(),
@@ -200,7 +213,9 @@ fn judge(config: &Config, traces: &Traces, forecasts: &Forecasts, policy: Policy
             Policy::A3(tuning) => reactive(tuning, false, false),
             Policy::Conditional(tuning) => reactive(tuning, true, false),
             Policy::Beams => reactive(crate::policy::Tuning::Fast, false, true),
-            Policy::Oracle => oracle(&network, traces, person, BEGIN_TICKS),
+            Policy::Oracle | Policy::OracleBeams => {
+                oracle(&network, traces, person, BEGIN_TICKS, policy == Policy::OracleBeams)
+            }
             Policy::All => best_of_all(&network, traces, person, BEGIN_TICKS),
             _ => {
                 let mut advised = Advised::new(frames, policy, decider.clone(), &network, traces);

@@ -1,7 +1,7 @@
 //! Who decides when a device changes, and by what.
 
 use umbracast::STEPS;
-use umbracast::decide::{Action, Decider, Decision};
+use umbracast::decide::{Action, Decider, Decision, Serving};
 use umbracast::radio::{Loss, Outages};
 
 use crate::device::{Network, Order, REPORT_TICKS, View};
@@ -29,12 +29,16 @@ pub enum Policy {
     Foreseen,
     /// The same where no device can be prepared: every change needs a command.
     Commands,
+    /// The same as forecasts, with beams that are pointed at reflections in time.
+    ForeseenBeams,
     /// The same as forecasts, published at once.
     AtOnce,
     /// Decisions on the true next 0.9 s.
     Perfect,
     /// The least of outage and price of changes, by who knows the whole trace.
     Oracle,
+    /// The same with the ways by a reflection.
+    OracleBeams,
     /// Every access point at once.
     All,
 }
@@ -65,7 +69,7 @@ impl Tuning {
 
 impl Policy {
     /// All of them, in the order of tables.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::Stay,
         Self::A3(Tuning::Fast),
         Self::A3(Tuning::Slow),
@@ -76,12 +80,19 @@ impl Policy {
         Self::Paper,
         Self::ConstantVelocity,
         Self::Foreseen,
+        Self::ForeseenBeams,
         Self::Commands,
         Self::AtOnce,
         Self::Perfect,
         Self::Oracle,
+        Self::OracleBeams,
         Self::All,
     ];
+
+    /// Whether it uses ways by a reflection.
+    pub fn has_beams(self) -> bool {
+        matches!(self, Self::Beams | Self::ForeseenBeams | Self::OracleBeams)
+    }
 
     /// As the command and its tables name it.
     pub fn name(self) -> &'static str {
@@ -96,10 +107,12 @@ impl Policy {
             Self::Paper => "paper",
             Self::ConstantVelocity => "constant-velocity",
             Self::Foreseen => "forecast",
+            Self::ForeseenBeams => "forecast-with-beams",
             Self::Commands => "forecast-commands",
             Self::AtOnce => "forecast-no-age",
             Self::Perfect => "perfect-0.9-s",
             Self::Oracle => "oracle",
+            Self::OracleBeams => "oracle-with-beams",
             Self::All => "all-at-once",
         }
     }
@@ -115,8 +128,25 @@ pub struct Reactive {
     filtered_db: Vec<f64>,
     /// By access point, since when it has been stronger.
     since: Vec<Option<usize>>,
+    recovery: BeamRecovery,
+}
+
+/// How a device recovers from a beam that has failed (3GPP TS 38.321, 5.17): it takes the other way of its access point.
+#[derive(Debug, Default)]
+struct BeamRecovery {
     /// In how many reports in a row the beam was out.
     failed: usize,
+}
+
+impl BeamRecovery {
+    fn order(&mut self, view: &View<'_>) -> Option<Order> {
+        if !view.is_new {
+            return None;
+        }
+        self.failed = if view.out { self.failed + 1 } else { 0 };
+        (self.failed >= FAILED_REPORTS && (!view.reflected || !view.straight_out))
+            .then_some(Order::Beam(!view.reflected))
+    }
 }
 
 impl Reactive {
@@ -130,7 +160,7 @@ impl Reactive {
             beams,
             filtered_db: vec![f64::NAN; access_points],
             since: vec![None; access_points],
-            failed: 0,
+            recovery: BeamRecovery::default(),
         }
     }
 
@@ -159,16 +189,12 @@ impl Reactive {
             self.since.fill(None);
             return Some(if self.conditional { Order::Execute(ap) } else { Order::Command(ap) });
         }
-        self.beam(view)
-    }
-
-    fn beam(&mut self, view: &View<'_>) -> Option<Order> {
-        self.failed = if view.out { self.failed + 1 } else { 0 };
-        match self.beams {
-            true if view.reflected && !view.straight_out => Some(Order::Beam(false)),
-            true if !view.reflected && self.failed >= FAILED_REPORTS => Some(Order::Beam(true)),
-            _ => None,
+        if !self.beams {
+            return None;
         }
+        // The straight way carries more as soon as it is free.
+        let is_free = view.reflected && !view.straight_out;
+        self.recovery.order(view).or(is_free.then_some(Order::Beam(false)))
     }
 }
 
@@ -186,6 +212,7 @@ pub struct Advised<'a> {
     /// See `network`.
     pub traces: &'a Traces,
     next: usize,
+    recovery: BeamRecovery,
 }
 
 impl<'a> Advised<'a> {
@@ -197,11 +224,16 @@ impl<'a> Advised<'a> {
         network: &'a Network,
         traces: &'a Traces,
     ) -> Self {
-        Self { frames, policy, decider, network, traces, next: 0 }
+        Self { frames, policy, decider, network, traces, next: 0, recovery: BeamRecovery::default() }
     }
 
-    /// What it asks for at an instant.
+    /// What it asks for at an instant. A device whose beam failed all the same does not wait for advice.
     pub fn order(&mut self, view: &View<'_>) -> Option<Order> {
+        let recovered = self.recovery.order(view).filter(|_| self.policy.has_beams());
+        self.advice(view).or(recovered)
+    }
+
+    fn advice(&mut self, view: &View<'_>) -> Option<Order> {
         let now_ns = view.tick as i64 * TICK_NS - (self.network.costs.age_s * 1e9) as i64;
         let published = self.frames[self.next..].iter().take_while(|frame| frame.time_ns <= now_ns).count();
         self.next += published;
@@ -211,18 +243,20 @@ impl<'a> Advised<'a> {
             (Action::HandOver, Some(target)) => Order::Command(target),
             (Action::Prepare, Some(target)) if self.network.costs.conditional => Order::Prepare(target),
             (Action::Wait, _) => Order::Hold,
+            (Action::Beam, _) => Order::Point(decision.surface.is_some()),
             _ => Order::Release,
         })
     }
 
     fn advise(&mut self, frame: &Foreseen, view: &View<'_>) -> Option<Decision> {
         let (person, serving) = (view.person, view.serving);
+        let served = Serving { access_point: serving, is_reflected: view.reflected };
         match self.policy {
             Policy::Perfect => self.knowing(frame, person, serving),
             Policy::AsNow => self.as_now(frame, frame.index_of[person]?, serving),
             _ => {
                 let index = frame.index_of[person]?;
-                self.decider.advise(serving, frame.loss(serving, index)?, index, &frame.outages)
+                self.decider.advise(served, frame.loss(serving, index)?, index, &frame.outages)
             }
         }
     }
@@ -242,7 +276,7 @@ impl<'a> Advised<'a> {
                 }
             }
         }
-        self.decider.advise(serving, &loss, 0, &outages)
+        self.decider.advise(Serving::straight(serving), &loss, 0, &outages)
     }
 
     fn as_now(&mut self, frame: &Foreseen, index: usize, serving: usize) -> Option<Decision> {
@@ -254,6 +288,6 @@ impl<'a> Advised<'a> {
                 loss.p_out_now = if ap == serving { 1.0 } else { loss.p_out_now };
             }
         }
-        self.decider.advise(serving, &loss, 0, &outages)
+        self.decider.advise(Serving::straight(serving), &loss, 0, &outages)
     }
 }

@@ -6,7 +6,7 @@ use umbracast::geometry::{DVec2, DVec3};
 use umbracast_sim::body::Walker;
 
 use crate::fresnel::Fresnel;
-use crate::reflection::Wall;
+use crate::reflection::{Plane, planes, reflects};
 pub use crate::silhouette::TruthModel;
 use crate::silhouette::{Body, Outline};
 
@@ -17,8 +17,6 @@ pub const TICK_S: f64 = 0.01;
 
 /// A body farther from a path costs it nothing: its half width and three Fresnel zones of the longest wave.
 const ASIDE_M: f64 = 1.3;
-/// The way by a wall is worked out where the straight one loses so much: nobody asks for it before.
-const REFLECTED_FROM_DB: f64 = 3.0;
 
 /// What losses are worked out for.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,8 +40,8 @@ impl Air {
 pub struct Counted {
     /// The owner's own body.
     pub own_body: bool,
-    /// The ways by a wall. Without them [`Traces::reflected_db`] is infinite.
-    pub reflections: bool,
+    /// Ways by a reflection that lose less than this without anybody. Where there is none, [`Traces::reflected_db`] is infinite.
+    pub reflections_db: f64,
 }
 
 /// Losses of all links of a scene.
@@ -75,8 +73,9 @@ impl Traces {
         counted: Counted,
     ) -> Vec<Self> {
         let fresnel = Fresnel::new();
-        let walls = if counted.reflections { Wall::of_hall(&site.hall) } else { Vec::new() };
-        let view = View { site, airs, own_body: counted.own_body, fresnel: &fresnel, walls };
+        let of = site.reflections.filter(|_| counted.reflections_db > 0.0);
+        let planes = of.map_or(Vec::new(), |of| planes(&site.hall, of));
+        let view = View { site, airs, counted, fresnel: &fresnel, planes };
         let instants: Vec<Instant> =
             (0..ticks).into_par_iter().map(|tick| view.at(walkers, tick as i64 * TICK_NS)).collect();
         let of_air = |air: usize| {
@@ -105,7 +104,7 @@ impl Traces {
         f64::from(self.loss_db[self.at(tick, access_point, person)])
     }
 
-    /// What its best single reflection loses, beside the straight way in sight; infinite while the straight way loses little.
+    /// What its best single reflection loses, beside the straight way in sight; infinite where none was asked for.
     pub fn reflected_db(&self, tick: usize, access_point: usize, person: usize) -> f64 {
         f64::from(self.reflected_db[self.at(tick, access_point, person)])
     }
@@ -136,9 +135,9 @@ struct Instant {
 struct View<'a> {
     site: &'a Site,
     airs: &'a [Air],
-    own_body: bool,
+    counted: Counted,
     fresnel: &'a Fresnel,
-    walls: Vec<Wall>,
+    planes: Vec<Plane>,
 }
 
 impl View<'_> {
@@ -176,11 +175,14 @@ impl View<'_> {
                     );
                 }
                 let mut reflected_db = vec![f64::INFINITY; self.airs.len()];
-                if let Some(ue_m) = ue_m.filter(|_| losses_db.iter().any(|db| *db >= REFLECTED_FROM_DB)) {
-                    for wall in &self.walls {
-                        let Some(way) = wall.reflects(ap_m, ue_m) else { continue };
+                if let Some(ue_m) = ue_m {
+                    for plane in 0..self.planes.len() {
+                        let way = reflects(&self.planes, plane, ap_m, ue_m);
+                        let Some(way) = way.filter(|way| way.loss_db < self.counted.reflections_db) else {
+                            continue;
+                        };
                         ways_db.fill(way.loss_db);
-                        // Bodies stand on this side of the wall: of each unfolded way they meet the leg that is here.
+                        // Bodies stand on this side of the plane: of each unfolded way they meet the leg that is here.
                         for ends_m in [[way.ap_image_m, ue_m], [ap_m, way.ue_image_m]] {
                             self.add_bodies(
                                 &mut outline,
@@ -214,7 +216,9 @@ impl View<'_> {
         losses_db: &mut [f64],
     ) {
         for (of, body) in bodies.iter().enumerate() {
-            let Some(body) = body.as_ref().filter(|_| of != person || self.own_body) else { continue };
+            let Some(body) = body.as_ref().filter(|_| of != person || self.counted.own_body) else {
+                continue;
+            };
             if !outline.look(tx_m, rx_m, body, ASIDE_M) {
                 continue;
             }

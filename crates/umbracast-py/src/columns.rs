@@ -21,6 +21,8 @@ enum Column<'a> {
     MaybeF64(Vec<f64>, Vec<bool>),
     Bool(Vec<Option<bool>>, bool),
     Text(Vec<Option<&'a str>>, bool),
+    /// Names that no list holds; any may be null.
+    Named(Vec<Option<String>>),
 }
 
 /// The columns of rows. `access_points` are the site's names, by index.
@@ -41,6 +43,7 @@ pub fn of_rows<R: Row>(rows: &[R], access_points: &[String]) -> PyResult<RecordB
             Cell::MaybeBool(_) => Column::Bool(Vec::new(), true),
             Cell::AccessPoint(_) | Cell::Action(_) => Column::Text(Vec::new(), false),
             Cell::MaybeAccessPoint(_) => Column::Text(Vec::new(), true),
+            Cell::MaybeSurface(_) => Column::Named(Vec::new()),
         });
     });
     let mut unknown = None;
@@ -68,6 +71,7 @@ pub fn of_rows<R: Row>(rows: &[R], access_points: &[String]) -> PyResult<RecordB
                 values.push(v.and_then(&mut name_of))
             }
             (Some(Column::Text(values, _)), Cell::Action(v)) => values.push(Some(v.name())),
+            (Some(Column::Named(values)), Cell::MaybeSurface(v)) => values.push(v.map(|v| v.to_string())),
             _ => {}
         });
     }
@@ -106,6 +110,7 @@ fn made(column: Column) -> (ArrayRef, bool) {
         }
         Column::Bool(values, maybe) => (Arc::new(BooleanArray::from(values)), maybe),
         Column::Text(values, maybe) => (Arc::new(StringArray::from(values)), maybe),
+        Column::Named(values) => (Arc::new(StringArray::from(values)), true),
     }
 }
 

@@ -224,7 +224,9 @@ pub fn network(book: &mut Book) -> Result<()> {
 
 /// The same over margins, procedures, crowds and access points, devices in the hand, and each model as truth and as predictor.
 pub fn network_sweeps(book: &mut Book) -> Result<()> {
-    let few = "--policies a3-60-40,conditional-60-40,forecast,oracle --carrier 28 --seed 220100 --scenes 4";
+    let few = "--carrier 28 --seed 220100 --scenes 4";
+    let straight = "--policies a3-60-40,conditional-60-40,forecast,oracle";
+    let beams = "--policies a3-60-40,conditional-60-40,a3-with-beams,forecast,forecast-with-beams,oracle,oracle-with-beams";
     for sweep in [
         "--truth edges --margin 5,10,15,20",
         "--truth edges --interruption 3,25,70",
@@ -233,8 +235,10 @@ pub fn network_sweeps(book: &mut Book) -> Result<()> {
         "--truth edges --own-body",
         "--truth model-b,kirchhoff,edges --predictor kirchhoff,model-b,three-edges",
     ] {
+        // Reflections matter where a link can lose more than they do.
+        let policies = if sweep.contains("--margin") { beams } else { straight };
         book.umbracast_says(
-            ["network"].into_iter().chain([sweep, few].into_iter().flat_map(str::split_whitespace)),
+            ["network"].into_iter().chain([sweep, policies, few].into_iter().flat_map(str::split_whitespace)),
         )?;
     }
     Ok(())

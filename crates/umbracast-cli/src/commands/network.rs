@@ -35,14 +35,15 @@ pub fn run(args: &Network, common: &Common) -> Result<Ending, Error> {
     }
     let site = setup::config(Mode::Default, args.site.site.as_deref())?;
     let is_given = site.site.has_radio();
-    let config = with_radios(&site, args.own_body);
+    let policies = if args.policies.is_empty() { Policy::ALL.to_vec() } else { args.policies.clone() };
+    let are_played = !args.losses && args.trace.is_none() && args.dataset.is_none();
+    let beams = are_played && policies.iter().any(|policy| policy.has_beams());
+    let config = with_radios(&site, args.own_body, beams);
     if let Some(folder) = &args.dataset {
         return dataset(args, common, &config, is_given, folder);
     }
-    let policies = if args.policies.is_empty() { Policy::ALL.to_vec() } else { args.policies.clone() };
     let weights = setup::weights(None)?;
-    let paper: Option<&Weights> =
-        (!args.losses && args.trace.is_none() && policies.contains(&Policy::Paper)).then_some(&weights);
+    let paper: Option<&Weights> = (are_played && policies.contains(&Policy::Paper)).then_some(&weights);
     let hall = Hall::new(&config, paper)?;
     let specs = args.people.iter().map(|&people| {
         let first = args.seed.unwrap_or(setup::TEST_SEED);

@@ -3,6 +3,7 @@
 use std::fs;
 
 use umbracast::decide::Action;
+use umbracast::radio::Surface;
 use umbracast_io::rows::{
     BindingRow, DecisionRow, DetectionRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow, ReportRow,
     TrackRow,
@@ -56,6 +57,9 @@ fn table_of<R: Row>(kind: u8) -> Vec<u8> {
                 Cell::AccessPoint(value) => *value = counter % 2,
                 Cell::MaybeAccessPoint(value) => *value = (!counter.is_multiple_of(3)).then_some(counter % 2),
                 Cell::Action(value) => *value = Action::ALL[counter as usize % Action::ALL.len()],
+                Cell::MaybeSurface(value) => {
+                    *value = (!counter.is_multiple_of(3)).then_some(Surface::Wall(counter % 5))
+                }
             }
         });
     }

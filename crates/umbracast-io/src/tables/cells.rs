@@ -4,6 +4,7 @@ use std::fmt;
 
 use umbracast::STEPS;
 use umbracast::decide::Action;
+use umbracast::radio::Surface;
 
 use crate::rows::{
     BindingRow, DecisionRow, DetectionRow, LabelRow, LinkRow, LossRow, MatchRow, PeopleLinkRow, PeopleRow,
@@ -46,12 +47,17 @@ pub enum Cell<'a> {
     MaybeAccessPoint(&'a mut Option<u32>),
     /// What to do; its name in the file.
     Action(&'a mut Action),
+    /// What a beam is pointed at, by name, or null.
+    MaybeSurface(&'a mut Option<Surface>),
 }
 
 impl Cell<'_> {
     /// Whether a table may leave the value empty.
     pub fn may_be_null(&self) -> bool {
-        matches!(self, Self::MaybeBool(_) | Self::MaybeF64(_) | Self::MaybeAccessPoint(_))
+        matches!(
+            self,
+            Self::MaybeBool(_) | Self::MaybeF64(_) | Self::MaybeAccessPoint(_) | Self::MaybeSurface(_)
+        )
     }
 }
 
@@ -298,6 +304,7 @@ impl Row for DecisionRow {
         see(plain("serving"), Cell::AccessPoint(&mut self.serving));
         see(plain("action"), Cell::Action(&mut self.action));
         see(plain("target"), Cell::MaybeAccessPoint(&mut self.target));
+        see(plain("surface"), Cell::MaybeSurface(&mut self.surface));
         see(plain("deadline_s"), Cell::MaybeF64(&mut self.deadline_s));
         see(plain("saved_s"), Cell::F64(&mut self.saved_s));
         see(plain("p_out"), Cell::F64(&mut self.p_out));

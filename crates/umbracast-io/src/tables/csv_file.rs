@@ -43,11 +43,15 @@ impl CsvFile {
                     Cell::I64(v) => write!(text, "{v}"),
                     Cell::F64(v) | Cell::MaybeF64(Some(v)) => write!(text, "{v}"),
                     Cell::Bool(v) | Cell::MaybeBool(Some(v)) => write!(text, "{v}"),
-                    Cell::MaybeBool(None) | Cell::MaybeF64(None) | Cell::MaybeAccessPoint(None) => Ok(()),
+                    Cell::MaybeBool(None)
+                    | Cell::MaybeF64(None)
+                    | Cell::MaybeAccessPoint(None)
+                    | Cell::MaybeSurface(None) => Ok(()),
                     Cell::AccessPoint(v) | Cell::MaybeAccessPoint(Some(v)) => {
                         write!(text, "{}", self.access_points[*v as usize])
                     }
                     Cell::Action(v) => write!(text, "{}", v.name()),
+                    Cell::MaybeSurface(Some(v)) => write!(text, "{v}"),
                 };
                 if written.is_ok() {
                     written = self.writer.write_field(&text);

@@ -179,7 +179,8 @@ fn kind(cell: &Cell) -> &'static str {
         Cell::F64(_) | Cell::MaybeF64(_) => "a number",
         Cell::Bool(_) | Cell::MaybeBool(_) => "true or false",
         Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) => "the name of an access point of the site",
-        Cell::Action(_) => "stay, wait, hand-over or prepare",
+        Cell::Action(_) => "stay, wait, hand-over, prepare or beam",
+        Cell::MaybeSurface(_) => "floor, ceiling or wall-0 and so on",
     }
 }
 
@@ -216,6 +217,10 @@ fn set(cell: Cell, value: &Value, access_points: &[String]) -> bool {
         Cell::Action(to) => match value {
             Value::Text(name) => put(to, Action::ALL.into_iter().find(|action| action.name() == name)),
             _ => false,
+        },
+        Cell::MaybeSurface(to) => match value {
+            Value::Text(name) => put(to, name.parse().ok().map(Some)),
+            _ => put(to, nothing.then_some(None)),
         },
     }
 }

@@ -152,6 +152,7 @@ mod tests {
     };
     use umbracast::STEPS;
     use umbracast::decide::Action;
+    use umbracast::radio::Surface;
 
     fn access_points() -> Vec<String> {
         vec!["side".into(), "centre, north".into()]
@@ -227,7 +228,10 @@ mod tests {
                 Cell::MaybeF64(v) => *v = (!counter.is_multiple_of(3)).then(|| f64::from(counter) / 3.0),
                 Cell::AccessPoint(v) => *v = counter % 2,
                 Cell::MaybeAccessPoint(v) => *v = [None, Some(0), Some(1)][counter as usize % 3],
-                Cell::Action(v) => *v = Action::ALL[counter as usize % 4],
+                Cell::Action(v) => *v = Action::ALL[counter as usize % 5],
+                Cell::MaybeSurface(v) => {
+                    *v = [None, Some(Surface::Floor), Some(Surface::Wall(counter))][counter as usize % 3]
+                }
             }
         };
         let mut rows = vec![R::default(); count];

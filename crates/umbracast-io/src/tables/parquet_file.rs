@@ -17,6 +17,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use umbracast::Error;
 use umbracast::decide::Action;
+use umbracast::radio::Surface;
 
 use super::cells::{Cell, Row};
 use super::pages::column_reader;
@@ -176,9 +177,7 @@ fn fields_of<R: Row>() -> Vec<Field> {
             Cell::I64(_) => (Physical::INT64, None),
             Cell::F64(_) | Cell::MaybeF64(_) => (Physical::DOUBLE, None),
             Cell::Bool(_) | Cell::MaybeBool(_) => (Physical::BOOLEAN, None),
-            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_) => {
-                (Physical::BYTE_ARRAY, Some(LogicalType::String))
-            }
+            _ => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         };
         let needed = if cell.may_be_null() { Repetition::OPTIONAL } else { Repetition::REQUIRED };
         fields.push((name.to_string(), physical, logical, needed));
@@ -219,7 +218,7 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
             Cell::MaybeBool(_) => Column::MaybeBool(Vec::new(), Vec::new()),
             Cell::MaybeF64(_) => Column::MaybeDouble(Vec::new(), Vec::new()),
             Cell::AccessPoint(_) | Cell::Action(_) => Column::Text(Vec::new()),
-            Cell::MaybeAccessPoint(_) => Column::MaybeText(Vec::new(), Vec::new()),
+            Cell::MaybeAccessPoint(_) | Cell::MaybeSurface(_) => Column::MaybeText(Vec::new(), Vec::new()),
         });
     });
     let names: Vec<ByteArray> = access_points.iter().map(|name| name.as_str().into()).collect();
@@ -253,6 +252,10 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
                 }
             }
             (Some(Column::Text(values)), Cell::Action(v)) => values.push(v.name().into()),
+            (Some(Column::MaybeText(values, there)), Cell::MaybeSurface(v)) => {
+                values.extend(v.map(|v| ByteArray::from(v.to_string().as_str())));
+                there.push(i16::from(v.is_some()));
+            }
             _ => {}
         });
     }
@@ -346,6 +349,7 @@ fn read_column(
         Cell::Bool(_) | Cell::MaybeBool(_) => "true or false",
         Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) => "names of access points",
         Cell::Action(_) => "names of actions",
+        Cell::MaybeSurface(_) => "names of surfaces",
     };
     let at = at.ok_or_else(|| Error::new(format!("expected {expected}, found no such column")))?;
     refuse_codec(columns[at].compression())?;
@@ -369,6 +373,9 @@ fn read_column(
         }
         (ColumnReader::BoolColumnReader(r), Cell::Bool(_) | Cell::MaybeBool(_)) => {
             values(r, count, |&v: &bool| Value::Truth(v))
+        }
+        (ColumnReader::ByteArrayColumnReader(r), Cell::MaybeSurface(_)) => {
+            values(r, count, |name: &ByteArray| Value::Text(String::from_utf8_lossy(name.data()).into()))
         }
         (
             ColumnReader::ByteArrayColumnReader(r),
@@ -398,6 +405,11 @@ fn read_column(
         }
     }
     .map_err(broken)?;
+    let is_surface = |value: &Value| !matches!(value, Value::Text(name) if name.parse::<Surface>().is_err());
+    if let Some(row) = values.iter().position(|value| !is_surface(value)) {
+        let found = &values[row];
+        return Err(Error::new(format!("row {row}: expected floor, ceiling or wall-N, found {found}")));
+    }
     let fits = |value: &Value| !matches!((cell, value), (Cell::U32(_), Value::Whole(v)) if u32::try_from(*v).is_err());
     if let Some(row) = values.iter().position(|value| !fits(value)) {
         return Err(Error::new(format!("row {row}: expected 0 to {}, found {}", u32::MAX, values[row])));

@@ -49,6 +49,8 @@ impl Value {
             (Cell::MaybeAccessPoint(to), Self::Whole(v)) => *to = Some(v as u32),
             (Cell::MaybeAccessPoint(to), _) => *to = None,
             (Cell::Action(to), Self::Whole(v)) => *to = Action::ALL[v as usize],
+            (Cell::MaybeSurface(to), Self::Text(name)) => *to = name.parse().ok(),
+            (Cell::MaybeSurface(to), _) => *to = None,
             _ => {}
         }
     }

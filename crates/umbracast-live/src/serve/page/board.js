@@ -1,8 +1,9 @@
 // ---------------------------------------------------------------- beside the view: links, events, sensors
 const ROWS = 60;
-const adviceOf = ({ action, target, deadline_s: s }) => {
+const adviceOf = ({ action, target, surface, deadline_s: s }) => {
   const by = s == null ? "" : `, by ${Math.round(1000 * s)} ms`;
-  return { stay: "serves", wait: "serves; wait: hold timers" }[action] || `${action === "prepare" ? "prepare" : "change to"} ${target}${by}`;
+  const beam = `beam ${surface ? "at the " + surface : "straight again"}${by}`;
+  return { stay: "serves", wait: "serves; wait: hold timers", beam }[action] || `${action === "prepare" ? "prepare" : "change to"} ${target}${by}`;
 };
 const KINDS = { true: "+", false: "\u2013", missed: "!", warning: "\u25b2" };
 

@@ -15,7 +15,7 @@ const DRAWN = ["track", "x_m", "y_m", "vx_mps", "vy_mps", "heading_rad", "height
   ...[3, 6, 9].flatMap(k => [`x_s${k}_m`, `y_s${k}_m`, `cov_xx_s${k}_m2`, `cov_xy_s${k}_m2`, `cov_yy_s${k}_m2`]),
   "access_point", "blocked_now", "blocked_w9", "p_now", "p_own_now", "p_own_w9", "p_hall_now", "p_hall_w9", "p_any_now", "onset_p50_s", ...numbered(1, 9, k => [`p_w${k}`, `p_any_w${k}`]),
   ...[10, 50, 90].flatMap(q => [`loss_now_p${q}_db`, ...numbered(1, 9, k => `loss_s${k}_p${q}_db`)]), "p_out_now", "p_out_w9", "out_onset_p50_s",
-  "serving", "action", "target", "deadline_s", "p_out"];
+  "serving", "action", "target", "surface", "deadline_s", "p_out"];
 function connect() {
   const scheme = location.protocol === "https:" ? "wss://" : "ws://";
   const socket = new WebSocket(scheme + location.host + "/api/live?decimals=4&columns=" + DRAWN);

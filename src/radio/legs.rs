@@ -1,0 +1,122 @@
+//! The straight pieces that ways consist of: one of a straight way, two of one by a reflection.
+
+use super::body::Wave;
+use super::reflection::{Mirror, Mirrors};
+use crate::blockage::trajectories::{Disc, MOMENTS, Trajectories};
+use crate::geometry::{DVec2, DVec3};
+use crate::site::Ue;
+
+/// Those of every straight way, access points first; then two of each way by a reflection.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Legs {
+    pub(super) legs: Vec<Leg>,
+    pub(super) reflected: Vec<Reflected>,
+}
+
+impl Legs {
+    /// Lays them to everybody's device.
+    pub(super) fn lay(
+        &mut self,
+        antennas: &[Option<Antenna>],
+        mirrors: Option<&Mirrors>,
+        ue: &Ue,
+        people: &[Trajectories],
+    ) {
+        self.legs.clear();
+        self.reflected.clear();
+        let with_radio = || antennas.iter().enumerate().filter_map(|(ap, of)| Some((ap, of.as_ref()?)));
+        for (access_point, antenna) in with_radio() {
+            let start_m = antenna.place_m;
+            let leg = |owner| Leg { access_point, owner, start_m, mirror: None, is_folded: false };
+            self.legs.extend((0..people.len()).map(leg));
+        }
+        let Some(mirrors) = mirrors else { return };
+        for (access_point, antenna) in with_radio() {
+            for (owner, q) in people.iter().enumerate() {
+                let height_m = 0.5 * (q.heights_m[0] + q.heights_m[1]);
+                let ue_m = |step: usize| q.mean_m[step].extend(ue.height_share * height_m + q.floor_m[step]);
+                let start_m = antenna.place_m;
+                for mirror in mirrors.within(start_m, ue_m(0), antenna.margin_db) {
+                    let excess_db =
+                        std::array::from_fn(|step| mirrors.excess_db(&mirror, start_m, ue_m(step)));
+                    self.reflected.push(Reflected { access_point, owner, excess_db });
+                    let leg = Leg { access_point, owner, start_m, mirror: Some(mirror), is_folded: true };
+                    self.legs.push(Leg { start_m: mirror.image_m(start_m), mirror: None, ..leg });
+                    self.legs.push(leg);
+                }
+            }
+        }
+    }
+
+    /// How many straight ways there are.
+    pub(super) fn straight(&self) -> usize {
+        self.legs.len() - 2 * self.reflected.len()
+    }
+}
+
+/// An access point with a radio.
+#[derive(Debug, Clone)]
+pub(super) struct Antenna {
+    pub(super) place_m: DVec3,
+    pub(super) wave: Wave,
+    pub(super) margin_db: f64,
+    pub(super) spreads: bool,
+}
+
+/// A straight line from an access point, or its image, to a device, or its image. People are before every mirror, so that those who
+/// meet the line to an image meet the real piece of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leg {
+    pub(super) access_point: usize,
+    pub(super) owner: usize,
+    pub(super) start_m: DVec3,
+    /// Where it ends at an image.
+    pub(super) mirror: Option<Mirror>,
+    /// What of it is below the floor is not there.
+    pub(super) is_folded: bool,
+}
+
+/// A way by a reflection.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reflected {
+    pub(super) access_point: usize,
+    pub(super) owner: usize,
+    /// By step: what it loses without anybody, beside the straight way.
+    pub(super) excess_db: [f64; MOMENTS],
+}
+
+impl Leg {
+    /// Where it ends on the floor's plan, if the device is there.
+    pub(super) fn end_m(&self, ue_m: DVec2) -> DVec2 {
+        self.mirror.map_or(ue_m, |mirror| mirror.image_m(ue_m.extend(0.0)).truncate())
+    }
+
+    /// The least height at which it ends, if the device is between these.
+    pub(super) fn lowest_end_m(&self, heights_m: [f64; 2]) -> f64 {
+        let of_m = |height_m: f64| self.mirror.map_or(height_m, |of| of.image_m(DVec3::Z * height_m).z);
+        of_m(heights_m[0]).min(of_m(heights_m[1]))
+    }
+}
+
+impl Antenna {
+    /// Whether a body within one disc may cost a path from a place to another disc something.
+    pub(super) fn meets(&self, from_m: DVec3, aim: Disc, aim_z: f64, body: Disc, top_m: f64) -> bool {
+        let start_m: DVec2 = from_m.truncate();
+        let way_m = aim.center_m - start_m;
+        let length_m = way_m.length();
+        let (along, off_m) = (way_m / length_m.max(1e-9), body.center_m - start_m);
+        let from_start_m = along.dot(off_m);
+        let room_m = body.radius_m + self.wave.beside_m;
+        if from_start_m < -room_m || from_start_m > length_m + aim.radius_m + room_m {
+            return false;
+        }
+        let far = ((from_start_m + room_m) / length_m.max(1e-9)).clamp(0.0, 1.0);
+        let near = ((from_start_m - room_m) / (length_m + aim.radius_m)).clamp(0.0, 1.0);
+        if along.perp_dot(off_m).abs() > room_m + far * aim.radius_m {
+            return false;
+        }
+        let rises_m = aim_z - from_m.z;
+        let lowest_m = from_m.z + (rises_m * far).min(rises_m * near);
+        lowest_m <= top_m + self.wave.above_m
+    }
+}
