@@ -163,7 +163,10 @@ impl Fader {
         }
         self.legs.lay(&self.radios, self.mirrors.as_ref(), &self.ue, people);
         self.meet(people);
-        let affordable = LOSSES_MAX / self.meetings.len().max(1) / WORD * WORD;
+        // Reflections make nothing coarser that is told of links.
+        let straight = self.legs.straight();
+        let meetings = straight.checked_sub(1).map_or(0, |last| self.ends[last]);
+        let affordable = LOSSES_MAX / meetings.max(1) / WORD * WORD;
         let (samples, asked) = (drawn.min(affordable.max(WORD)), caster.samples_asked());
         self.outages.begin(self.radios.len(), people.len(), samples);
         self.spreads.retain(|&(_, track), _| people.iter().any(|person| person.track == track));
@@ -174,7 +177,6 @@ impl Fader {
         if let Some(beyond) = &mut self.beyond {
             beyond.take(people, self.ue.height_share);
         }
-        let straight = self.legs.straight();
         losses.extend((0..straight).map(|leg| self.of_link(leg, people, [samples, asked])));
         for k in 0..self.legs.reflected.len() {
             self.reflect(self.legs.reflected[k], straight + 2 * k, people, [samples, asked]);
