@@ -33,7 +33,8 @@ pub struct Decision {
     pub action: Action,
     /// Where to: of a change, or of one that should be prepared.
     pub target: Option<usize>,
-    /// What a beam should be pointed at; `None` for the device itself.
+    /// What a beam should be pointed at, where the action is [`Action::Beam`]; `None` for the device itself. Of several reflections
+    /// that are free the likeliest to stay so: a beam search may take another.
     pub surface: Option<Surface>,
     /// Until when the command must have been sent, seconds from the frame's instant. Then the link is likely to be out soon, or
     /// the change would not be over in time. `None` where nothing comes.
@@ -230,13 +231,19 @@ impl Decider {
             saved_s: 0.0,
             p_out: risk.p_out,
         };
+        // The reflection that the beam was pointed at is none any more.
+        if serving.is_reflected && of_serving.is_none() {
+            return Decision { action: Action::Beam, deadline_s: Some(0.0), ..decision };
+        }
         // Who is served by a reflection for nothing had better be served straight.
         if risk.p_out == 0.0 && reflected.is_none() {
             return decision;
         }
-        let onset_s = risk.onset_s.map(|onset_s| onset_s - STEP_S);
-        decision.deadline_s =
-            onset_s.map(|onset_s| (onset_s - costs.interruption_s - costs.command_s - costs.age_s).max(0.0));
+        let deadline_s = |takes_s: f64| {
+            let onset_s = risk.onset_s.map(|onset_s| onset_s - STEP_S);
+            onset_s.map(|onset_s| (onset_s - takes_s - costs.command_s - costs.age_s).max(0.0))
+        };
+        decision.deadline_s = deadline_s(costs.interruption_s);
         let access_points = (0..self.radios.len()).filter(|&ap| self.has_radio(ap));
         let ways = Way::all(access_points, reflection);
         let own = Serving { is_reflected: reflected.is_some(), ..serving };
@@ -249,6 +256,7 @@ impl Decider {
         if let Some(cost_s) = beam_s {
             let to = of_serving.filter(|_| reflected.is_none());
             (decision.action, decision.surface) = (Action::Beam, to.map(|(_, surface)| surface));
+            decision.deadline_s = deadline_s(costs.beam_s);
             decision.saved_s = values.stay_s - cost_s;
         } else if let Some((target, cost_s)) = best {
             (decision.action, decision.target) = (Action::HandOver, Some(target));

@@ -17,6 +17,9 @@ use crate::site::Costs;
 /// straight way is free again.
 const WEAKER_S: f32 = 0.001;
 
+/// A device recovers from a beam that has failed by itself, after two reports 20 ms apart (3GPP TS 38.321, 5.17).
+const RECOVERS_S: f32 = 0.04;
+
 /// A way that may serve the device.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Way {
@@ -139,10 +142,8 @@ impl Programme {
                 let Some(twin) = of.twin.filter(|_| step > 0) else { continue };
                 let (twin_out, twin_s) = (outages.of(ways[twin].index, person, step), &next_s[row(twin)]);
                 for k in 0..samples {
-                    let rest_s = if has(twin_out, k) { STEP_S as f32 - numbers.beam_s } else { 0.0 };
-                    let beam_s = numbers.beam_s + rest_s + twin_s[k];
-                    let lost = numbers.lost_command(has(out, k), has(soon, k));
-                    here_s[k] = here_s[k].min(beam_s + lost * (here_s[k] - beam_s).max(0.0));
+                    let pointed_s = numbers.pointed_s(has(out, k), has(soon, k), has(twin_out, k));
+                    here_s[k] = here_s[k].min(pointed_s + twin_s[k]);
                 }
             }
         }
@@ -166,8 +167,11 @@ impl Programme {
         let value_s = |step: usize, way: usize, k: usize| self.value_s[step * of_step + way * samples + k];
         let (out, soon) = (of(own, 0), of(own, 1));
         let weaker_s = ways[own].weaker_s();
-        let straight_or =
-            |own: usize| (0..ways.len()).filter(move |&way| way == own || !ways[way].serving.is_reflected);
+        let is_other = |way: &usize| {
+            let of = ways[*way].serving;
+            !of.is_reflected && of.access_point != serving.access_point
+        };
+        let others = || (0..ways.len()).filter(is_other);
         let mut changed_s = vec![0.0_f64; ways.len()];
         let mut later_s = vec![0.0_f64; ways.len()];
         let (mut stay, mut held, mut given_up, mut beam, mut later) = (0.0, 0.0, 0.0, 0.0, 0);
@@ -186,14 +190,17 @@ impl Programme {
                 *sum += f64::from(changed_s + lost * (stayed_s - changed_s));
             }
             if let Some(twin) = ways[own].twin {
-                let rest_s = if has(of(twin, 0), k) { STEP_S as f32 - numbers.beam_s } else { 0.0 };
-                let beam_s = numbers.beam_s + rest_s + value_s(1, twin, k);
-                let lost = numbers.lost_command(has(out, k), has(soon, k));
-                beam += f64::from(beam_s + lost * (stayed_s - beam_s));
+                let pointed_s = numbers.pointed_s(has(out, k), has(soon, k), has(of(twin, 0), k));
+                beam += f64::from(pointed_s + value_s(1, twin, k));
             }
             let Some(onset) = (0..MOMENTS).find(|&step| has(of(own, step), k)) else { continue };
-            let least_s = straight_or(own).map(|way| value_s(onset, way, k)).fold(f32::MAX, f32::min);
-            if numbers.change_s + least_s < value_s(onset + 1, own, k) + STEP_S as f32 {
+            let of_others_s = others().map(|way| value_s(onset, way, k)).fold(f32::MAX, f32::min);
+            let least_s = of_others_s.min(value_s(onset, own, k));
+            let stayed_s = value_s(onset + 1, own, k) + STEP_S as f32;
+            let recovered_s = ways[own].twin.map_or(f32::MAX, |twin| {
+                numbers.pointed_s(true, true, has(of(twin, onset), k)) + value_s(onset + 1, twin, k)
+            });
+            if numbers.change_s + least_s < stayed_s.min(recovered_s) {
                 later += 1;
                 later_s
                     .iter_mut()
@@ -202,8 +209,6 @@ impl Programme {
             }
         }
         let mean = |sum: f64| sum / samples as f64;
-        let is_other = |way: &usize| ways[*way].serving.access_point != serving.access_point;
-        let others = || straight_or(own).filter(is_other);
         let best_later = others().min_by(|a, b| later_s[*a].total_cmp(&later_s[*b])).filter(|_| later > 0);
         Values {
             stay_s: mean(stay),
@@ -247,6 +252,13 @@ impl Numbers {
             (true, _) => 1.0,
             (false, true) => self.lost,
         }
+    }
+
+    /// What a step costs in which a beam is pointed elsewhere: by a command, or by the device once its beam has failed.
+    #[inline(always)]
+    fn pointed_s(&self, out: bool, soon: bool, other_out: bool) -> f32 {
+        let rest_s = if other_out { STEP_S as f32 - self.beam_s } else { 0.0 };
+        self.beam_s + rest_s + self.lost_command(out, soon) * RECOVERS_S
     }
 }
 

@@ -133,7 +133,7 @@ fn a_beam_that_is_pointed_elsewhere_is_cheaper_than_a_change() {
         let decision = decider(handover).advise(Serving::straight(0), &loss(0.0, 1.0), 0, &outages).unwrap();
         let beam = (Action::Beam, None, Some(Surface::Ceiling));
         assert_eq!((decision.action, decision.target, decision.surface), beam, "{decision:?}");
-        assert!(decision.saved_s > 0.02, "{decision:?}");
+        assert!(decision.saved_s > 0.015, "{decision:?}");
     }
     with_ceiling(&mut outages, SAMPLES);
     let decision = decider(commands()).advise(Serving::straight(0), &loss(0.0, 1.0), 0, &outages).unwrap();
@@ -148,7 +148,24 @@ fn a_beam_comes_back_to_the_device_when_nobody_is_in_the_way_any_more() {
     let mut decider = decider(commands());
     let decision = decider.advise(reflected, &loss(0.0, 0.0), 0, &outages).unwrap();
     assert_eq!((decision.action, decision.target, decision.surface), (Action::Beam, None, None));
+    let nothing_reflects = Outages::new(3, 1, SAMPLES);
+    let decision = decider.advise(reflected, &loss(0.0, 0.0), 0, &nothing_reflects).unwrap();
+    assert_eq!((decision.action, decision.surface), (Action::Beam, None), "it points at nothing");
     out(&mut outages, 0, 0..=4, SAMPLES);
     let decision = decider.advise(reflected, &loss(1.0, 1.0), 0, &outages).unwrap();
     assert_eq!((decision.action, decision.p_out), (Action::Stay, 0.0), "the straight way is cut as yet");
+}
+
+#[test]
+fn who_is_served_by_a_reflection_prepares_no_change_to_a_link_that_is_out() {
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    // The straight way is out for a moment, then the reflection; the other access points are out all the time.
+    with_ceiling(&mut outages, 0);
+    let (way, _) = outages.reflected(0, 0).unwrap();
+    out(&mut outages, 0, 0..=2, SAMPLES);
+    out(&mut outages, way, 3..=9, SAMPLES);
+    (1..3).for_each(|ap| out(&mut outages, ap, 0..=9, SAMPLES));
+    let reflected = Serving { access_point: 0, is_reflected: true };
+    let decision = decider(Handover::default()).advise(reflected, &loss(1.0, 1.0), 0, &outages).unwrap();
+    assert_eq!((decision.action, decision.target), (Action::Stay, None), "{decision:?}");
 }

@@ -27,7 +27,7 @@ impl Legs {
         let with_radio = || antennas.iter().enumerate().filter_map(|(ap, of)| Some((ap, of.as_ref()?)));
         for (access_point, antenna) in with_radio() {
             let start_m = antenna.place_m;
-            let leg = |owner| Leg { access_point, owner, start_m, mirror: None, is_folded: false };
+            let leg = |owner| Leg { access_point, owner, start_m, mirror: None, ends_at_image: false };
             self.legs.extend((0..people.len()).map(leg));
         }
         let Some(mirrors) = mirrors else { return };
@@ -39,9 +39,11 @@ impl Legs {
                 for mirror in mirrors.within(start_m, ue_m(0), antenna.margin_db) {
                     let excess_db =
                         std::array::from_fn(|step| mirrors.excess_db(&mirror, start_m, ue_m(step)));
+                    let image_m = mirror.image_m(start_m);
                     self.reflected.push(Reflected { access_point, owner, excess_db });
-                    let leg = Leg { access_point, owner, start_m, mirror: Some(mirror), is_folded: true };
-                    self.legs.push(Leg { start_m: mirror.image_m(start_m), mirror: None, ..leg });
+                    let mirror = Some(mirror);
+                    let leg = Leg { access_point, owner, start_m, mirror, ends_at_image: true };
+                    self.legs.push(Leg { start_m: image_m, ends_at_image: false, ..leg });
                     self.legs.push(leg);
                 }
             }
@@ -63,17 +65,16 @@ pub(super) struct Antenna {
     pub(super) spreads: bool,
 }
 
-/// A straight line from an access point, or its image, to a device, or its image. People are before every mirror, so that those who
-/// meet the line to an image meet the real piece of it.
+/// A straight line from an access point, or its image, to a device, or its image. Who is before the mirror and meets a line to an
+/// image meets the real piece of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Leg {
     pub(super) access_point: usize,
     pub(super) owner: usize,
     pub(super) start_m: DVec3,
-    /// Where it ends at an image.
+    /// Of a way by a reflection: what reflects. What of such a line is below the floor is not there.
     pub(super) mirror: Option<Mirror>,
-    /// What of it is below the floor is not there.
-    pub(super) is_folded: bool,
+    pub(super) ends_at_image: bool,
 }
 
 /// A way by a reflection.
@@ -88,13 +89,17 @@ pub(super) struct Reflected {
 impl Leg {
     /// Where it ends on the floor's plan, if the device is there.
     pub(super) fn end_m(&self, ue_m: DVec2) -> DVec2 {
-        self.mirror.map_or(ue_m, |mirror| mirror.image_m(ue_m.extend(0.0)).truncate())
+        self.image().map_or(ue_m, |mirror| mirror.image_m(ue_m.extend(0.0)).truncate())
     }
 
     /// The least height at which it ends, if the device is between these.
     pub(super) fn lowest_end_m(&self, heights_m: [f64; 2]) -> f64 {
-        let of_m = |height_m: f64| self.mirror.map_or(height_m, |of| of.image_m(DVec3::Z * height_m).z);
+        let of_m = |height_m: f64| self.image().map_or(height_m, |of| of.image_m(DVec3::Z * height_m).z);
         of_m(heights_m[0]).min(of_m(heights_m[1]))
+    }
+
+    fn image(&self) -> Option<Mirror> {
+        self.mirror.filter(|_| self.ends_at_image)
     }
 }
 

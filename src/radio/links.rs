@@ -73,6 +73,8 @@ const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 const LIKELY: f64 = 0.5;
 /// Most losses of one sample through one body that a frame works out. Where more would have to be, fewer samples are taken.
 const LOSSES_MAX: usize = 1 << 16;
+/// The same of reflections. One for which there is no room is none.
+const REFLECTED_MAX: usize = 4 * LOSSES_MAX;
 
 /// The stage.
 #[derive(Debug, Clone)]
@@ -116,8 +118,8 @@ impl Fader {
             (at_m - least_m).abs().max((at_m - most_m).abs()).length()
         };
         let farthest_m = site.access_points.iter().map(far_m).fold(0.0, f64::max);
-        // A way by a reflection may be twice as long as the hall.
-        let times = if site.reflections.is_some() { 2.0 } else { 1.0 };
+        // A way by a reflection may be three times as long as the hall.
+        let times = if site.reflections.is_some() { 3.0 } else { 1.0 };
         let longest_m = times * farthest_m.hypot(site.hall.height_m);
         // Radios of one carrier share what is worked out for it.
         let mut waves: Vec<(Radio, Wave)> = Vec::new();
@@ -163,7 +165,10 @@ impl Fader {
         }
         self.legs.lay(&self.radios, self.mirrors.as_ref(), &self.ue, people);
         self.meet(people);
-        let affordable = LOSSES_MAX / self.meetings.len().max(1) / WORD * WORD;
+        // Reflections make nothing coarser that is told of links.
+        let straight = self.legs.straight();
+        let meetings = straight.checked_sub(1).map_or(0, |last| self.ends[last]);
+        let affordable = LOSSES_MAX / meetings.max(1) / WORD * WORD;
         let (samples, asked) = (drawn.min(affordable.max(WORD)), caster.samples_asked());
         self.outages.begin(self.radios.len(), people.len(), samples);
         self.spreads.retain(|&(_, track), _| people.iter().any(|person| person.track == track));
@@ -174,9 +179,15 @@ impl Fader {
         if let Some(beyond) = &mut self.beyond {
             beyond.take(people, self.ue.height_share);
         }
-        let straight = self.legs.straight();
         losses.extend((0..straight).map(|leg| self.of_link(leg, people, [samples, asked])));
+        let mut left = REFLECTED_MAX;
         for k in 0..self.legs.reflected.len() {
+            let [before, after] = [straight + 2 * k, straight + 2 * k + 2].map(|leg| self.ends[leg - 1]);
+            let losses = (after - before) * samples;
+            if losses > left {
+                continue;
+            }
+            left -= losses;
             self.reflect(self.legs.reflected[k], straight + 2 * k, people, [samples, asked]);
         }
     }
@@ -202,7 +213,8 @@ impl Fader {
             };
             for (body, p) in people.iter().enumerate() {
                 let own = body == leg.owner;
-                if (own && reach_m == 0.0) || !near(q.second, p, p.second) {
+                let is_behind = leg.mirror.is_some_and(|of| of.parts(q.second.center_m, p.second.center_m));
+                if (own && reach_m == 0.0) || is_behind || !near(q.second, p, p.second) {
                     continue;
                 }
                 for step in 0..MOMENTS {
@@ -324,7 +336,7 @@ impl Fader {
 
     #[inline(always)]
     fn cross_portably(&mut self, leg: usize, people: &[Trajectories], meeting: Meeting, samples: usize) {
-        let Leg { access_point, owner, start_m, mirror, is_folded } = self.legs.legs[leg];
+        let Leg { access_point, owner, start_m, mirror, ends_at_image } = self.legs.legs[leg];
         let Some(antenna) = &self.radios[access_point] else { return };
         let Meeting { body, step } = meeting;
         let (q, p, wave) = (&people[owner], &people[body], &antenna.wave);
@@ -366,7 +378,7 @@ impl Fader {
                     end_z[k] += up_m[k];
                 }
             }
-            if let Some(mirror) = &mirror {
+            if let Some(mirror) = mirror.filter(|_| ends_at_image) {
                 let [x, y, z] = mirror.normal.to_array().map(|part| part as f32);
                 let offset_m = mirror.off_m(start_m.truncate().extend(0.0)) as f32;
                 for k in 0..WORD {
@@ -387,7 +399,7 @@ impl Fader {
                 let (x, y) = (body_x * cos[k] - body_y * sin[k], body_x * sin[k] + body_y * cos[k]);
                 let path_m = ap_z - slope * from_tx_m - floors_m[1];
                 let is_clear = wave.is_clear(scale, aside_m, from_tx_m, length_m - from_tx_m)
-                    | (is_folded & (path_m < 0.0));
+                    | (mirror.is_some() & (path_m < 0.0));
                 open[k] = if is_clear || k >= n { 0 } else { 1_u32 << k };
                 across.from_tx_m[k] = from_tx_m;
                 across.to_rx_m[k] = length_m - from_tx_m;

@@ -114,9 +114,13 @@ impl Mirrors {
         Self { mirrors: mirrors.collect(), height_m: hall.height_m, walls }
     }
 
-    /// The mirrors over which the way between both places loses less than `margin_db`.
+    /// The mirrors over which the way between both places loses less than `margin_db`, the strongest first.
     pub(super) fn within(&self, ap_m: DVec3, ue_m: DVec3, margin_db: f64) -> impl Iterator<Item = Mirror> {
-        self.mirrors.iter().copied().filter(move |mirror| self.excess_db(mirror, ap_m, ue_m) < margin_db)
+        let excess_db = |mirror: &Mirror| (self.excess_db(mirror, ap_m, ue_m), *mirror);
+        let mut within: Vec<_> =
+            self.mirrors.iter().map(excess_db).filter(|(excess_db, _)| *excess_db < margin_db).collect();
+        within.sort_by(|a, b| a.0.total_cmp(&b.0));
+        within.into_iter().map(|(_, mirror)| mirror)
     }
 
     /// How much less is received by a mirror than on the straight way in sight: the way is longer, and the surface takes its share.
@@ -137,9 +141,11 @@ impl Mirrors {
     }
 
     /// Whether a place of a plane belongs to the surface, and no other wall hides it from both ends. Floor and ceiling are as wide
-    /// as the hall, and hidden where the straight way is.
+    /// as the hall.
     fn is_met(&self, surface: Surface, at_m: DVec3, ends_m: [DVec3; 2]) -> bool {
-        let Surface::Wall(corner) = surface else { return true };
+        let Surface::Wall(corner) = surface else {
+            return !self.walls.iter().any(|wall| cross(*wall, ends_m.map(|end_m| end_m.truncate())));
+        };
         let [from_m, to_m] = self.walls[corner as usize];
         let (along_m, off_m) = (to_m - from_m, at_m.truncate() - from_m);
         let others = || self.walls.iter().enumerate().filter(|(other, _)| *other != corner as usize);
@@ -154,6 +160,11 @@ impl Mirror {
     /// How far a place is before it, along its normal.
     pub(super) fn off_m(&self, at_m: DVec3) -> f64 {
         self.normal.dot(at_m) - self.offset_m
+    }
+
+    /// Whether it is an upright plane between two places of the floor.
+    pub(super) fn parts(&self, a_m: DVec2, b_m: DVec2) -> bool {
+        self.normal.z == 0.0 && self.off_m(a_m.extend(0.0)) * self.off_m(b_m.extend(0.0)) < 0.0
     }
 
     /// The place behind it that looks as if it were this one.

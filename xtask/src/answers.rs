@@ -173,11 +173,8 @@ const QUESTIONS: [Question; 9] = [
 
 /// What a program answers now, question by question; those that need the data only where there is some.
 pub fn ask(asked: &Asked, umbracast: &Path, root: &Path, data: Option<&Path>) -> Result<String, String> {
-    let out = std::env::temp_dir().join(format!(
-        "umbracast-answers-{}-{}",
-        asked.questions.len(),
-        std::process::id()
-    ));
+    let name = asked.file.trim_start_matches("record/").trim_end_matches(".txt");
+    let out = std::env::temp_dir().join(format!("umbracast-{name}-{}", std::process::id()));
     let sim = out.with_extension("sim");
     let mut text = String::new();
     for (name, needs_data, words) in

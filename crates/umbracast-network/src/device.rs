@@ -20,7 +20,7 @@ const NEEDLESS_S: f64 = 0.9;
 /// Rates are means over so many ticks.
 const WINDOW_TICKS: usize = 10;
 
-/// What a beam at a reflection that is not there loses.
+/// What a beam at a reflection that is out loses: nobody looks how much.
 const SWALLOWED_DB: f64 = 60.0;
 
 /// What a policy asks for.
@@ -87,6 +87,10 @@ pub struct Tally {
     pub lost_commands: usize,
     /// Links that were given up.
     pub recoveries: usize,
+    /// How often a beam was pointed elsewhere, and how long nothing was sent meanwhile.
+    pub beams: usize,
+    /// See `beams`.
+    pub beam_ms: u64,
     /// Mean rates of 100 ms, bits a second.
     pub rates_bps: Vec<f32>,
 }
@@ -101,12 +105,20 @@ impl Tally {
         self.needless += other.needless;
         self.lost_commands += other.lost_commands;
         self.recoveries += other.recoveries;
+        self.beams += other.beams;
+        self.beam_ms += other.beam_ms;
         self.rates_bps.extend_from_slice(&other.rates_bps);
     }
 
-    /// Share of the time in outage.
-    pub fn outage(&self) -> f64 {
-        self.out_ticks as f64 / self.ticks.max(1) as f64
+    /// Takes up that a beam is pointed elsewhere.
+    pub(crate) fn point(&mut self, costs: &Costs) {
+        self.beams += 1;
+        self.beam_ms += (costs.beam_s * 1e3).round() as u64;
+    }
+
+    /// Time in outage.
+    pub fn out_ms(&self) -> u64 {
+        (self.out_ticks as f64 * TICK_S * 1e3).round() as u64 + self.beam_ms
     }
 }
 
@@ -145,7 +157,8 @@ impl Network {
     /// Signal to noise of a link, straight or by its best reflection.
     pub fn snr_db(&self, traces: &Traces, tick: usize, ap: usize, person: usize, reflected: bool) -> f64 {
         let loss_db = match reflected {
-            true => traces.reflected_db(tick, ap, person).min(SWALLOWED_DB),
+            true if self.is_reflection_out(traces, tick, ap, person) => SWALLOWED_DB,
+            true => traces.reflected_db(tick, ap, person),
             false => traces.loss_db(tick, ap, person),
         };
         self.radios[ap].map_or(f64::NEG_INFINITY, |radio| {
@@ -209,7 +222,7 @@ pub fn drive(
             false => straight_out,
         };
         let mut out = way_out(reflected);
-        let mut change = None;
+        let (mut change, mut pointed) = (None, None);
         let view =
             View { tick, person, serving, reported_db: &reported_db, is_new, reflected, out, straight_out };
         match policy(&view) {
@@ -230,10 +243,7 @@ pub fn drive(
             }
             Some(Order::Hold) => (held, prepared) = (true, None),
             Some(Order::Release) => (held, prepared) = (false, None),
-            // A beam is switched in 3 ms, less than an instant of the truth.
-            Some(Order::Beam(to_reflection)) => {
-                (reflected, out) = (to_reflection, way_out(to_reflection));
-            }
+            Some(Order::Beam(to_reflection)) => pointed = Some(to_reflection),
             _ => {}
         }
         if let Some((to, level_db)) = prepared.filter(|_| is_new)
@@ -246,8 +256,13 @@ pub fn drive(
             match told {
                 _ if !matches!(phase, Phase::Served) || out => tally.lost_commands += 1,
                 Command::Change(to) => change = Some(to),
-                Command::Point(to_reflection) => (reflected, out) = (to_reflection, way_out(to_reflection)),
+                Command::Point(to_reflection) => pointed = Some(to_reflection),
             }
+        }
+        // Less than an instant of the truth, as a rule.
+        if let Some(to_reflection) = pointed.filter(|to| *to != reflected) {
+            tally.point(costs);
+            (reflected, out) = (to_reflection, way_out(to_reflection));
         }
         if let (Some(to), Phase::Served) = (change.filter(|to| *to != serving), &phase) {
             tally.handovers += 1;

@@ -11,7 +11,7 @@ use crate::device::{Network, Tally, drive};
 use crate::foreseen::{Followed, Foreseen, Foreteller};
 use crate::hall::{Crowd, Hall, Seen};
 use crate::oracle::{best_of_all, oracle};
-use crate::policy::{Advised, Policy, Reactive};
+use crate::policy::{Advised, Policy, Reactive, Tuning};
 use crate::truth::{Air, Counted, Traces};
 
 /// Policies begin when everybody has been followed for so long.
@@ -212,7 +212,8 @@ fn judge(config: &Config, traces: &Traces, forecasts: &Forecasts, policy: Policy
             Policy::Stay => drive(&network, traces, person, BEGIN_TICKS, |_| None),
             Policy::A3(tuning) => reactive(tuning, false, false),
             Policy::Conditional(tuning) => reactive(tuning, true, false),
-            Policy::Beams => reactive(crate::policy::Tuning::Fast, false, true),
+            Policy::Beams => reactive(Tuning::Fast, false, true),
+            Policy::ConditionalBeams => reactive(Tuning::Fast, true, true),
             Policy::Oracle | Policy::OracleBeams => {
                 oracle(&network, traces, person, BEGIN_TICKS, policy == Policy::OracleBeams)
             }

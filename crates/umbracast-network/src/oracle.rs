@@ -76,7 +76,10 @@ pub fn oracle(network: &Network, traces: &Traces, person: usize, begin: usize, b
                 tick = to;
                 continue;
             }
-            Step::Beam(twin) => way = twin,
+            Step::Beam(twin) => {
+                way = twin;
+                tally.point(&network.costs);
+            }
             Step::Stay => {}
         }
         tally.out_ticks += usize::from(out(tick, way));
@@ -109,6 +112,6 @@ mod tests {
         let network = Network { radios: vec![Some(Radio::default()); 2], costs, seed: 1 };
         let [without, with] = [false, true].map(|beams| oracle(&network, &traces, 0, 0, beams));
         assert_eq!((without.handovers, without.out_ticks), (1, 3));
-        assert_eq!((with.handovers, with.out_ticks), (0, 0));
+        assert_eq!((with.handovers, with.beams, with.out_ms()), (0, 1, 3));
     }
 }

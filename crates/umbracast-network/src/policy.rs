@@ -19,6 +19,8 @@ pub enum Policy {
     Conditional(Tuning),
     /// A3, and a beam that fails is pointed at the best reflection of the same access point (3GPP TS 38.321, 5.17).
     Beams,
+    /// The same with a change that is prepared before.
+    ConditionalBeams,
     /// Decisions on what a frame shows, as if nothing moved.
     AsNow,
     /// Decisions on what the paper's method says.
@@ -29,7 +31,7 @@ pub enum Policy {
     Foreseen,
     /// The same where no device can be prepared: every change needs a command.
     Commands,
-    /// The same as forecasts, with beams that are pointed at reflections in time.
+    /// The same as forecasts, with beams that are pointed at reflections in time; one that fails all the same recovers as with A3.
     ForeseenBeams,
     /// The same as forecasts, published at once.
     AtOnce,
@@ -69,13 +71,14 @@ impl Tuning {
 
 impl Policy {
     /// All of them, in the order of tables.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Stay,
         Self::A3(Tuning::Fast),
         Self::A3(Tuning::Slow),
         Self::Conditional(Tuning::Fast),
         Self::Conditional(Tuning::Slow),
         Self::Beams,
+        Self::ConditionalBeams,
         Self::AsNow,
         Self::Paper,
         Self::ConstantVelocity,
@@ -91,7 +94,7 @@ impl Policy {
 
     /// Whether it uses ways by a reflection.
     pub fn has_beams(self) -> bool {
-        matches!(self, Self::Beams | Self::ForeseenBeams | Self::OracleBeams)
+        matches!(self, Self::Beams | Self::ConditionalBeams | Self::ForeseenBeams | Self::OracleBeams)
     }
 
     /// As the command and its tables name it.
@@ -103,6 +106,7 @@ impl Policy {
             Self::Conditional(Tuning::Fast) => "conditional-60-40",
             Self::Conditional(Tuning::Slow) => "conditional-160-160",
             Self::Beams => "a3-with-beams",
+            Self::ConditionalBeams => "conditional-with-beams",
             Self::AsNow => "as-now",
             Self::Paper => "paper",
             Self::ConstantVelocity => "constant-velocity",

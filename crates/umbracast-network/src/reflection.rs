@@ -1,4 +1,5 @@
-//! Single reflections from the walls, the ceiling and the floor of a hall, by images.
+//! Single reflections from the walls, the ceiling and the floor of a hall, by images: the truth's own, which the forecast does not
+//! use.
 
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::site::{Hall, Material, Reflections};

@@ -8,6 +8,7 @@ use crate::device::Tally;
 use crate::experiment::Row;
 use crate::fades::{Compared, STEPS_AHEAD};
 use crate::policy::{Policy, Tuning};
+use crate::truth::TICK_S;
 
 /// Ticks of a minute.
 const MINUTE_TICKS: f64 = 6000.0;
@@ -19,6 +20,8 @@ pub struct Figures {
     pub outage: Figure,
     /// Changes a device and minute.
     pub handovers: Figure,
+    /// Beams pointed elsewhere, a device and minute.
+    pub beams: Figure,
     /// Links given up, a device and minute.
     pub recoveries: Figure,
     /// Commands that the serving link did not carry, a device and minute.
@@ -46,7 +49,7 @@ pub struct Figure {
 
 /// Counts of scenes, which can be pooled.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums([u64; 7]);
+struct Sums([u64; 8]);
 
 impl Pooled for Sums {
     fn plus(&self, other: &Self, times: u64) -> Self {
@@ -56,10 +59,11 @@ impl Pooled for Sums {
 
 impl Sums {
     fn of(tally: &Tally) -> Self {
-        let Tally { ticks, out_ticks, handovers, ping_pongs, needless, lost_commands, recoveries, .. } =
-            *tally;
-        let counts = [ticks, out_ticks, handovers, ping_pongs, needless, lost_commands, recoveries];
-        Self(counts.map(|count| count as u64))
+        let Tally { ticks, handovers, ping_pongs, needless, lost_commands, recoveries, beams, .. } = *tally;
+        let counts = [ticks, 0, handovers, ping_pongs, needless, lost_commands, recoveries, beams];
+        let mut sums = counts.map(|count| count as u64);
+        sums[1] = tally.out_ms();
+        Self(sums)
     }
 
     fn share(&self, of: usize, among: usize) -> Option<f64> {
@@ -79,7 +83,7 @@ impl Pooled for Gap {
 
 impl Gap {
     fn closed(&self) -> Option<f64> {
-        let [from, with, best] = self.0.map(|out_ticks| out_ticks as f64);
+        let [from, with, best] = self.0.map(|out_ms| out_ms as f64);
         (from != best).then(|| (from - with) / (from - best))
     }
 }
@@ -96,13 +100,13 @@ pub fn figures(row: &Row, rows: &[Row]) -> Figures {
     };
     let a_minute =
         |count: usize| figure(&|sums: &Sums| sums.share(count, 0).map(|share| share * MINUTE_TICKS));
-    let out_ticks = |policy: Policy| {
+    let out_ms = |policy: Policy| {
         let row = rows.iter().find(|other| other.case == row.case && other.policy == policy)?;
-        Some(row.scenes.iter().map(|tally| tally.out_ticks as u64).collect::<Vec<_>>())
+        Some(row.scenes.iter().map(Tally::out_ms).collect::<Vec<_>>())
     };
     let gap = |from: Policy| {
-        let (from, best) = (out_ticks(from)?, out_ticks(Policy::Oracle)?);
-        let with = row.scenes.iter().map(|tally| tally.out_ticks as u64);
+        let (from, best) = (out_ms(from)?, out_ms(Policy::Oracle)?);
+        let with = row.scenes.iter().map(Tally::out_ms);
         let scenes: Vec<Gap> = from
             .into_iter()
             .zip(with)
@@ -115,8 +119,9 @@ pub fn figures(row: &Row, rows: &[Row]) -> Figures {
     let mut rates: Vec<f32> = row.scenes.iter().flat_map(|tally| tally.rates_bps.iter().copied()).collect();
     rates.sort_by(f32::total_cmp);
     Figures {
-        outage: figure(&|sums| sums.share(1, 0)),
+        outage: figure(&|sums| sums.share(1, 0).map(|share| share / (TICK_S * 1e3))),
         handovers: a_minute(2),
+        beams: a_minute(7),
         ping_pongs: a_minute(3),
         needless: figure(&|sums| sums.share(4, 2)),
         lost_commands: a_minute(5),
@@ -133,16 +138,17 @@ pub fn to_text(rows: &[Row]) -> String {
     for (i, row) in rows.iter().enumerate() {
         if i == 0 || rows[i - 1].case != row.case {
             text += &format!("{}{}\n", if i == 0 { "" } else { "\n" }, name_of(&row.case));
-            text += "policy               outage %               handovers  lost commands  recoveries  ping-pongs  needless  \
+            text += "policy                 outage %               handovers  beams  lost commands  recoveries  ping-pongs  needless  \
                      worst 1 %  gap to A3 closed     to conditional\n";
         }
         let of = figures(row, rows);
         let gap = |figure: Option<Figure>| figure.map_or("-".to_owned(), |figure| told(figure, 1.0));
         text += &format!(
-            "{:19}  {:21}  {:9.1}  {:13.2}  {:10.2}  {:10.2}  {:8.2}  {:>9}  {:19}  {}\n",
+            "{:21}  {:21}  {:9.1}  {:5.1}  {:13.2}  {:10.2}  {:10.2}  {:8.2}  {:>9}  {:19}  {}\n",
             row.policy.name(),
             told(of.outage, 100.0),
             of.handovers.value,
+            of.beams.value,
             of.lost_commands.value,
             of.recoveries.value,
             of.ping_pongs.value,
@@ -152,8 +158,8 @@ pub fn to_text(rows: &[Row]) -> String {
             gap(of.gap_to_conditional),
         );
     }
-    text += "handovers, lost commands, recoveries and ping-pongs a device and minute; needless: share of handovers; worst 1 %: of the \
-             mean rates of 100 ms; gap: share of the way in outage to the oracle's; brackets: 95 % over scenes\n";
+    text += "handovers, beams pointed elsewhere, lost commands, recoveries and ping-pongs a device and minute; needless: share of handovers; worst 1 %: of the \
+             mean rates of 100 ms; gap: share of the way in outage to the oracle's without beams; brackets: 95 % over scenes\n";
     text
 }
 
@@ -239,6 +245,7 @@ fn columns(row: &Row, rows: &[Row]) -> Vec<(String, Value)> {
     for (name, figure) in [
         ("outage", Some(of.outage)),
         ("handovers_per_min", Some(of.handovers)),
+        ("beams_per_min", Some(of.beams)),
         ("lost_commands_per_min", Some(of.lost_commands)),
         ("recoveries_per_min", Some(of.recoveries)),
         ("ping_pongs_per_min", Some(of.ping_pongs)),
@@ -334,7 +341,7 @@ mod tests {
             text.starts_with("28 GHz, 2 people, 4 access points, margin dB of the site, changes of 25 ms"),
             "{text}"
         );
-        assert!(text.contains("\nforecast             0.83 [0.83, 0.83]"), "{text}");
+        assert!(text.contains("\nforecast               0.83 [0.83, 0.83]"), "{text}");
         let csv = to_csv(&rows);
         assert_eq!(csv.lines().count(), 5);
         assert!(

@@ -52,8 +52,9 @@ pub struct Network {
     /// Models of the truth, by other code than the forecast's: model-b, kirchhoff, edges.
     #[arg(long, default_value = "model-b,edges", value_name = "MODEL", value_delimiter = ',', value_parser = truth)]
     pub truth: Vec<TruthModel>,
-    /// Policies: stay, a3-60-40, a3-160-160, conditional-60-40, conditional-160-160, a3-with-beams, as-now, paper,
-    /// constant-velocity, forecast, forecast-commands, forecast-no-age, perfect-0.9-s, oracle, all-at-once. Default: all.
+    /// Policies: stay, a3-60-40, a3-160-160, conditional-60-40, conditional-160-160, a3-with-beams,
+    /// conditional-with-beams, as-now, paper, constant-velocity, forecast, forecast-with-beams, forecast-commands,
+    /// forecast-no-age, perfect-0.9-s, oracle, oracle-with-beams, all-at-once. Default: all.
     #[arg(long, value_name = "POLICY", value_delimiter = ',', value_parser = policy)]
     pub policies: Vec<Policy>,
     /// Devices are 0.3 m ahead of their owners, whose own bodies then block too.
