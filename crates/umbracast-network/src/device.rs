@@ -149,15 +149,25 @@ impl Network {
         self.radios[ap].is_none_or(|radio| traces.loss_db(tick, ap, person) >= radio.margin_db)
     }
 
-    /// The same of its best reflection.
-    pub fn is_reflection_out(&self, traces: &Traces, tick: usize, ap: usize, person: usize) -> bool {
+    /// The same of the way that a beam takes: straight, or by its best reflection.
+    pub fn is_way_out(
+        &self,
+        traces: &Traces,
+        tick: usize,
+        ap: usize,
+        person: usize,
+        reflected: bool,
+    ) -> bool {
+        if !reflected {
+            return self.is_out(traces, tick, ap, person);
+        }
         self.radios[ap].is_none_or(|radio| traces.reflected_db(tick, ap, person) >= radio.margin_db)
     }
 
-    /// Signal to noise of a link, straight or by its best reflection.
+    /// Signal to noise of such a way.
     pub fn snr_db(&self, traces: &Traces, tick: usize, ap: usize, person: usize, reflected: bool) -> f64 {
         let loss_db = match reflected {
-            true if self.is_reflection_out(traces, tick, ap, person) => SWALLOWED_DB,
+            true if self.is_way_out(traces, tick, ap, person, reflected) => SWALLOWED_DB,
             true => traces.reflected_db(tick, ap, person),
             false => traces.loss_db(tick, ap, person),
         };
@@ -216,11 +226,8 @@ pub fn drive(
                     network.snr_db(traces, tick, ap, person, beam) + REPORT_NOISE_DB * normal(&mut noise);
             }
         }
-        let straight_out = network.is_out(traces, tick, serving, person);
-        let way_out = |reflected: bool| match reflected {
-            true => network.is_reflection_out(traces, tick, serving, person),
-            false => straight_out,
-        };
+        let way_out = |reflected: bool| network.is_way_out(traces, tick, serving, person, reflected);
+        let straight_out = way_out(false);
         let mut out = way_out(reflected);
         let (mut change, mut pointed) = (None, None);
         let view =

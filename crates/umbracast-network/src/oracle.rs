@@ -35,11 +35,9 @@ pub fn oracle(network: &Network, traces: &Traces, person: usize, begin: usize, b
     let change_ticks = ((network.costs.interruption_s / TICK_S).round() as usize).max(1);
     let change = change_ticks as f64 + network.costs.price_s / TICK_S;
     let beam = network.costs.beam_s / TICK_S;
-    let out = |tick: usize, way: usize| match ways[way] {
-        Way { access_point, reflected: false, .. } => {
-            network.is_out(traces, begin + tick, access_point, person)
-        }
-        Way { access_point, .. } => network.is_reflection_out(traces, begin + tick, access_point, person),
+    let out = |tick: usize, way: usize| {
+        let Way { access_point, reflected, .. } = ways[way];
+        network.is_way_out(traces, begin + tick, access_point, person, reflected)
     };
     // By instant and way: the cost from there on.
     let mut value = vec![vec![0.0; ways.len()]; ticks + 1];

@@ -177,7 +177,9 @@ fn fields_of<R: Row>() -> Vec<Field> {
             Cell::I64(_) => (Physical::INT64, None),
             Cell::F64(_) | Cell::MaybeF64(_) => (Physical::DOUBLE, None),
             Cell::Bool(_) | Cell::MaybeBool(_) => (Physical::BOOLEAN, None),
-            _ => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_) | Cell::MaybeSurface(_) => {
+                (Physical::BYTE_ARRAY, Some(LogicalType::String))
+            }
         };
         let needed = if cell.may_be_null() { Repetition::OPTIONAL } else { Repetition::REQUIRED };
         fields.push((name.to_string(), physical, logical, needed));
@@ -374,24 +376,26 @@ fn read_column(
         (ColumnReader::BoolColumnReader(r), Cell::Bool(_) | Cell::MaybeBool(_)) => {
             values(r, count, |&v: &bool| Value::Truth(v))
         }
-        (ColumnReader::ByteArrayColumnReader(r), Cell::MaybeSurface(_)) => {
-            values(r, count, |name: &ByteArray| Value::Text(String::from_utf8_lossy(name.data()).into()))
-        }
         (
             ColumnReader::ByteArrayColumnReader(r),
-            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_),
+            Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) | Cell::Action(_) | Cell::MaybeSurface(_),
         ) => {
             let known: Vec<&str> = match cell {
                 Cell::Action(_) => Action::ALL.iter().map(|action| action.name()).collect(),
+                Cell::MaybeSurface(_) => vec!["floor", "ceiling", "wall-0 and so on"],
                 _ => access_points.iter().map(String::as_str).collect(),
+            };
+            let read = |name: &str| match cell {
+                Cell::MaybeSurface(_) => name.parse::<Surface>().ok().map(|_| Value::Text(name.to_owned())),
+                _ => known.iter().position(|known| *known == name).map(|index| whole(index as i64)),
             };
             let mut unknown = None;
             let found = values(r, count, |name: &ByteArray| {
-                let index = known.iter().position(|known| known.as_bytes() == name.data());
-                if index.is_none() {
-                    unknown = Some(String::from_utf8_lossy(name.data()).into_owned());
-                }
-                whole(index.unwrap_or(0) as i64)
+                let name = String::from_utf8_lossy(name.data());
+                read(&name).unwrap_or_else(|| {
+                    unknown = Some(name.into_owned());
+                    whole(0)
+                })
             });
             if let Some(name) = unknown {
                 let known = known.join(", ");
@@ -405,11 +409,6 @@ fn read_column(
         }
     }
     .map_err(broken)?;
-    let is_surface = |value: &Value| !matches!(value, Value::Text(name) if name.parse::<Surface>().is_err());
-    if let Some(row) = values.iter().position(|value| !is_surface(value)) {
-        let found = &values[row];
-        return Err(Error::new(format!("row {row}: expected floor, ceiling or wall-N, found {found}")));
-    }
     let fits = |value: &Value| !matches!((cell, value), (Cell::U32(_), Value::Whole(v)) if u32::try_from(*v).is_err());
     if let Some(row) = values.iter().position(|value| !fits(value)) {
         return Err(Error::new(format!("row {row}: expected 0 to {}, found {}", u32::MAX, values[row])));
