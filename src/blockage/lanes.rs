@@ -42,7 +42,7 @@ pub(super) fn most_of(numbers: &[f32; WORD]) -> f32 {
 
 /// Samples `word * WORD` and on of an array that has whole words.
 #[inline(always)]
-pub(super) fn word_of(values: &[f32], word: usize) -> &[f32; WORD] {
+pub(crate) fn word_of(values: &[f32], word: usize) -> &[f32; WORD] {
     let (words, _) = values.as_chunks::<WORD>();
     &words[word]
 }

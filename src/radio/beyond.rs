@@ -1,7 +1,7 @@
 //! What becomes of links in the second after the last step, as far as everybody's straight way tells: too little for a probability,
 //! enough to choose between two access points that are both in sight until then.
 
-use crate::blockage::lanes::{WORD, bits_of};
+use crate::blockage::lanes::{WORD, bits_of, word_of};
 use crate::blockage::trajectories::{MOMENTS, Trajectories};
 use crate::elementary::wide;
 use crate::geometry::{DVec2, DVec3};
@@ -116,14 +116,11 @@ impl Straight {
             [base_m.x as f32, base_m.y as f32]
         });
         for (word, bits) in bits.iter_mut().enumerate() {
-            let row = word * WORD..(word + 1) * WORD;
-            let of = |arrays: &[Vec<f32>; 2], axis: usize| -> [f32; WORD] {
-                std::array::from_fn(|lane| arrays[axis][row.start + lane])
-            };
-            let (body, drift, aim, aim_drift) = (&self.off_m, &self.drift_m, &q.off_m, &q.drift_m);
-            let [bx, by, dx, dy] = [of(body, 0), of(body, 1), of(drift, 0), of(drift, 1)];
-            let [ax, ay, ex, ey] = [of(aim, 0), of(aim, 1), of(aim_drift, 0), of(aim_drift, 1)];
-            let (tops_m, ues_m) = (&self.top_m[row.clone()], &q.ue_m[row.clone()]);
+            let [bx, by] = [0, 1].map(|axis| word_of(&self.off_m[axis], word));
+            let [dx, dy] = [0, 1].map(|axis| word_of(&self.drift_m[axis], word));
+            let [ax, ay] = [0, 1].map(|axis| word_of(&q.off_m[axis], word));
+            let [ex, ey] = [0, 1].map(|axis| word_of(&q.drift_m[axis], word));
+            let (tops_m, ues_m) = (word_of(&self.top_m, word), word_of(&q.ue_m, word));
             let mut inside = [0.0; WORD];
             for k in 0..WORD {
                 let (x, y) = (body_m[0] + bx[k] + on * dx[k], body_m[1] + by[k] + on * dy[k]);

@@ -166,48 +166,78 @@ impl Table {
         }
     }
 
-    /// What bodies cost, dB; nothing where a sample's bit is not `open`.
+    /// What bodies cost, dB; nothing where a sample's bit is not `open`. Between the eight points of the grid about each place: what
+    /// looks up runs sample by sample, what works out runs in vector registers.
     #[inline(always)]
     pub(super) fn losses_db(&self, of: &Across<Word>, open: u32) -> Word {
+        const OF_PLACE: usize = PLACES * WIDTHS;
         let Across { from_tx_m, to_rx_m, aside_m, path_m, slope, depth, width, height_m, scale } = of;
-        let mut bits = [0; WORD];
-        let [mut half_m, mut beside_m, mut above_m] = [[0.0; WORD]; 3];
+        let last = self.slices.len() as u32 - 1;
+        let mut numbers = [0_u32; WORD];
+        let [mut wide, mut beside, mut above] = [[0.0; WORD]; 3];
         for k in 0..WORD {
             let size = height_m[k] / USUAL_M;
             let near = 1.0 / from_tx_m[k] + 1.0 / to_rx_m[k];
             let slant = (1.0 + slope[k] * slope[k]).sqrt();
-            bits[k] = (2.0 * self.per_wavelength * near / slant * size * size).to_bits() >> SLICE_BITS;
-            half_m[k] = half_trunk_m(scale[k] / size, depth[k], width[k]);
-            beside_m[k] = aside_m[k].abs() / size;
-            above_m[k] = (height_m[k] - path_m[k]) / size;
+            let bits = (2.0 * self.per_wavelength * near / slant * size * size).to_bits() >> SLICE_BITS;
+            numbers[k] = bits.saturating_sub(self.least_bits).min(last);
+            let half_m = half_trunk_m(scale[k] / size, depth[k], width[k]);
+            wide[k] = held((half_m - HALF_M[0]) * ((WIDTHS - 1) as f32 / (HALF_M[1] - HALF_M[0])), WIDTHS);
+            beside[k] = aside_m[k].abs() / size;
+            above[k] = (height_m[k] - path_m[k]) / size;
         }
-        let (mut losses_db, mut left) = ([0.0; WORD], open);
-        while left != 0 {
-            let k = left.trailing_zeros() as usize;
-            left &= left - 1;
-            losses_db[k] = self.at(bits[k], half_m[k], beside_m[k], above_m[k]);
+        let [mut lowest_m, mut beside_per_m, mut above_per_m] = [[0.0; WORD]; 3];
+        for k in 0..WORD {
+            let slice = &self.slices[numbers[k] as usize];
+            lowest_m[k] = slice.lowest_m;
+            beside_per_m[k] = slice.beside_per_m;
+            above_per_m[k] = slice.above_per_m;
+        }
+        let mut places = [0_u32; WORD];
+        for k in 0..WORD {
+            beside[k] = held(beside[k] * beside_per_m[k], PLACES);
+            above[k] = held((above[k] - lowest_m[k]) * above_per_m[k], PLACES);
+            let (w, b, a) = (wide[k] as i32, beside[k] as i32, above[k] as i32);
+            places[k] = (numbers[k] * PLACES as u32 + b as u32) * OF_PLACE as u32
+                + a as u32 * WIDTHS as u32
+                + w as u32;
+            (wide[k], beside[k], above[k]) = (wide[k] - w as f32, beside[k] - b as f32, above[k] - a as f32);
+        }
+        // Of each place the four pairs of neighbours in width.
+        let mut pairs = [[[0_u16; 2]; WORD]; 4];
+        for k in 0..WORD {
+            let at = places[k] as usize;
+            let losses = &self.losses[at..at + OF_PLACE + WIDTHS + 2];
+            pairs[0][k] = [losses[0], losses[1]];
+            pairs[1][k] = [losses[WIDTHS], losses[WIDTHS + 1]];
+            pairs[2][k] = [losses[OF_PLACE], losses[OF_PLACE + 1]];
+            pairs[3][k] = [losses[OF_PLACE + WIDTHS], losses[OF_PLACE + WIDTHS + 1]];
+        }
+        let mut losses_db = [0.0; WORD];
+        for k in 0..WORD {
+            let near = between(row(pairs[0][k], wide[k]), row(pairs[1][k], wide[k]), above[k]);
+            let far = between(row(pairs[2][k], wide[k]), row(pairs[3][k], wide[k]), above[k]);
+            let db = LEAST_DB + STEP_DB * between(near, far, beside[k]);
+            losses_db[k] = if open >> k & 1 == 1 { db } else { 0.0 };
         }
         losses_db
     }
+}
 
-    /// Between the eight points of the grid about a place.
-    #[inline(always)]
-    fn at(&self, bits: u32, half_m: f32, beside_m: f32, above_m: f32) -> f32 {
-        const OF_PLACE: usize = PLACES * WIDTHS;
-        let number = (bits.saturating_sub(self.least_bits) as usize).min(self.slices.len() - 1);
-        let slice = &self.slices[number];
-        let held = |place: f32, count: usize| smaller(larger(place, 0.0), (count - 1) as f32 - 1e-3);
-        let width = held((half_m - HALF_M[0]) * ((WIDTHS - 1) as f32 / (HALF_M[1] - HALF_M[0])), WIDTHS);
-        let beside = held(beside_m * slice.beside_per_m, PLACES);
-        let above = held((above_m - slice.lowest_m) * slice.above_per_m, PLACES);
-        let (w, b, a) = (width as usize, beside as usize, above as usize);
-        let at = (number * PLACES + b) * OF_PLACE + a * WIDTHS + w;
-        let losses = &self.losses[at..at + OF_PLACE + WIDTHS + 2];
-        let between = |from: f32, to: f32, share: f32| from + share * (to - from);
-        let row = |at: usize| between(f32::from(losses[at]), f32::from(losses[at + 1]), width - w as f32);
-        let plane = |at: usize| between(row(at), row(at + WIDTHS), above - a as f32);
-        LEAST_DB + STEP_DB * between(plane(0), plane(OF_PLACE), beside - b as f32)
-    }
+/// A place of the grid, held within its so many points.
+#[inline(always)]
+fn held(place: f32, count: usize) -> f32 {
+    smaller(larger(place, 0.0), (count - 1) as f32 - 1e-3)
+}
+
+#[inline(always)]
+fn between(from: f32, to: f32, share: f32) -> f32 {
+    from + share * (to - from)
+}
+
+#[inline(always)]
+fn row([from, to]: [u16; 2], share: f32) -> f32 {
+    between(f32::from(from), f32::from(to), share)
 }
 
 /// |E / E0|^2 = |1 - (j / 2) sum|^2 of a trunk and a head: what comes through beside each times what comes through above.

@@ -11,7 +11,7 @@ use super::outages::Outages;
 use super::reflection::Mirrors;
 use crate::blockage::Caster;
 use crate::blockage::draws::Quantiles;
-use crate::blockage::lanes::{WORD, cos_sin, larger, smaller};
+use crate::blockage::lanes::{WORD, cos_sin, larger, smaller, word_of};
 use crate::blockage::probability::chances_of;
 use crate::blockage::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::elementary::wide;
@@ -350,27 +350,24 @@ impl Fader {
         let floors_m = [q.floor_m[step] as f32, p.floor_m[step] as f32];
         for first in (0..samples).step_by(WORD) {
             let n = WORD.min(samples - first);
-            let (mut end_x, mut end_y) = (
-                word(&q.off_m[0], step * q.samples + first, n),
-                word(&q.off_m[1], step * q.samples + first, n),
-            );
-            let (foot_x, foot_y) = (
-                word(&p.off_m[0], step * p.samples + first, n),
-                word(&p.off_m[1], step * p.samples + first, n),
-            );
-            let (mut end_z, height_m) = (word(&q.height_m, first, n), word(&p.height_m, first, n));
-            let width_scale = word(&p.width_scale, first, n);
-            let (cos, sin) = (word(&self.turns[body][0], first, n), word(&self.turns[body][1], first, n));
+            let word = first / WORD;
+            let at = |of: &Trajectories| (step * of.samples + first) / WORD;
+            let [off_x, off_y] = [0, 1].map(|axis| word_of(&q.off_m[axis], at(q)));
+            let [foot_x, foot_y] = [0, 1].map(|axis| word_of(&p.off_m[axis], at(p)));
+            let (ends_m, height_m) = (word_of(&q.height_m, word), word_of(&p.height_m, word));
+            let width_scale = word_of(&p.width_scale, word);
+            let [cos, sin] = [0, 1].map(|part| word_of(&self.turns[body][part], word));
+            let [mut end_x, mut end_y, mut end_z] = [[0.0; WORD]; 3];
             for k in 0..WORD {
-                (end_x[k], end_y[k]) = (aim_x + end_x[k], aim_y + end_y[k]);
-                end_z[k] = share * end_z[k] + floors_m[0];
+                (end_x[k], end_y[k]) = (aim_x + off_x[k], aim_y + off_y[k]);
+                end_z[k] = share * ends_m[k] + floors_m[0];
             }
             if !self.ue.is_on_axis() {
                 let [turn_cos, turn_sin] = &self.turns[owner];
-                let (cos, sin) = (word(turn_cos, first, n), word(turn_sin, first, n));
+                let (cos, sin) = (word_of(turn_cos, word), word_of(turn_sin, word));
                 let [forward_m, left_m, up_m] = &q.device_m;
                 let (forward_m, left_m, up_m) =
-                    (word(forward_m, first, n), word(left_m, first, n), word(up_m, first, n));
+                    (word_of(forward_m, word), word_of(left_m, word), word_of(up_m, word));
                 for k in 0..WORD {
                     let (x, y) = (owner_x * cos[k] - owner_y * sin[k], owner_x * sin[k] + owner_y * cos[k]);
                     end_x[k] += forward_m[k] * x - left_m[k] * y;
@@ -421,14 +418,6 @@ impl Fader {
             }
         }
     }
-}
-
-/// So many numbers from a place on; what is left of the word is zero.
-#[inline(always)]
-fn word(numbers: &[f32], first: usize, count: usize) -> Word {
-    let mut word = [0.0; WORD];
-    word[..count].copy_from_slice(&numbers[first..first + count]);
-    word
 }
 
 /// One standard deviation of the loss about a model that loses so much. A trunk and a head are not the body that walks there, and

@@ -123,7 +123,10 @@ fn changes() -> Vec<Vec<u8>> {
         [&[kind % 6, kind % 2, kind][..], &(u16::from(kind) * 40).to_le_bytes(), &2.5_f64.to_le_bytes()]
             .concat()
     });
+    let of_kind = |kind: u8| [&[1, 0, kind][..], &[0; 10]].concat();
     let mut all: Vec<Vec<u8>> = (0..4).map(|mode| vec![mode]).collect();
+    // Points of a scan that has lost its beams.
+    all.push([vec![0], of_kind(19), of_kind(8)].concat());
     all.push(std::iter::once(1).chain(one_of_each).collect());
     all.extend((0..KINDS).map(|kind| {
         let value = f64::from(f32::from_bits(0x40a0_0000)).to_le_bytes();
@@ -240,12 +243,8 @@ fn change_cloud(cloud: &mut Cloud, kind: u8, at: usize, value: &[u8]) {
 /// The points of a scan, as a driver gives them.
 fn points(scan: &Scan) -> Vec<SensorPoint> {
     let Cloud::Organised(image) = &scan.cloud else { return Vec::new() };
-    let beams = image.beams.len().max(1);
-    let rays = image
-        .range_m
-        .iter()
-        .enumerate()
-        .filter(|(ray, range_m)| **range_m > 0.0 && ray / beams < image.columns.len());
+    let (beams, most) = (image.beams.len().max(1), image.beams.len() * image.columns.len());
+    let rays = image.range_m.iter().take(most).enumerate().filter(|(_, range_m)| **range_m > 0.0);
     let point = |(ray, range_m): (usize, &f32)| {
         let (c, b) = (ray / beams, ray % beams);
         let position_m = image.point_m(c, b, f64::from(*range_m)).as_vec3().to_array();
