@@ -6,6 +6,7 @@ use umbracast::decide::Decider;
 use umbracast::forecast::Weights;
 use umbracast::{Config, Error};
 
+use crate::bound::carriers;
 use crate::case::{Case, handover_under};
 use crate::device::{Network, Tally, drive};
 use crate::foreseen::{Followed, Foreseen, Foreteller};
@@ -87,7 +88,8 @@ impl Spec<'_> {
                 forecasts = Some((*case, self.forecasts(&config, &seen, traces, paper)?));
             }
             if let Some((_, forecasts)) = &forecasts {
-                tallies.extend(self.policies.iter().map(|policy| judge(&config, traces, forecasts, *policy)));
+                let scene = Scene { config: &config, traces, seen: &seen, seed };
+                tallies.extend(self.policies.iter().map(|policy| scene.judge(forecasts, *policy)));
             }
         }
         Ok(tallies)
@@ -112,6 +114,7 @@ impl Spec<'_> {
             Policy::AsNow,
             Policy::Foreseen,
             Policy::ForeseenBeams,
+            Policy::Bound,
             Policy::Commands,
             Policy::AtOnce,
             Policy::Perfect,
@@ -186,43 +189,60 @@ impl Truths {
     }
 }
 
-/// What all devices of a scene come to under a policy.
-fn judge(config: &Config, traces: &Traces, forecasts: &Forecasts, policy: Policy) -> Tally {
-    let mut site = config.site.clone();
-    site.handover = site.handover.map(|handover| handover_under(policy, handover));
-    site.reflections = site.reflections.filter(|_| policy.has_beams());
-    let network = Network {
-        radios: site.access_points.iter().map(|ap| ap.radio).collect(),
-        costs: site.handover.unwrap_or_default().costs(),
-        seed: REPORTS_SEED,
-    };
-    let decider = Decider::new(&site);
-    let frames = match policy {
-        Policy::Paper => &forecasts.paper,
-        Policy::ConstantVelocity => &forecasts.constant_velocity,
-        _ => &forecasts.ours,
-    };
-    let mut sum = Tally::default();
-    for person in 0..traces.people {
-        let reactive = |tuning, conditional, beams| {
-            let mut reactive = Reactive::new(tuning, conditional, beams, network.radios.len());
-            drive(&network, traces, person, BEGIN_TICKS, |view| reactive.order(view))
+/// A scene in one case.
+struct Scene<'a> {
+    config: &'a Config,
+    traces: &'a Traces,
+    seen: &'a Seen,
+    seed: u64,
+}
+
+impl Scene<'_> {
+    /// What all devices come to under a policy.
+    fn judge(&self, forecasts: &Forecasts, policy: Policy) -> Tally {
+        let (config, traces) = (self.config, self.traces);
+        let mut site = config.site.clone();
+        site.handover = site.handover.map(|handover| handover_under(policy, handover));
+        site.reflections = site.reflections.filter(|_| policy.has_beams());
+        let network = Network {
+            radios: site.access_points.iter().map(|ap| ap.radio).collect(),
+            costs: site.handover.unwrap_or_default().costs(),
+            seed: REPORTS_SEED,
         };
-        sum.add(&match policy {
-            Policy::Stay => drive(&network, traces, person, BEGIN_TICKS, |_| None),
-            Policy::A3(tuning) => reactive(tuning, false, false),
-            Policy::Conditional(tuning) => reactive(tuning, true, false),
-            Policy::Beams => reactive(Tuning::Fast, false, true),
-            Policy::ConditionalBeams => reactive(Tuning::Fast, true, true),
-            Policy::Oracle | Policy::OracleBeams => {
-                oracle(&network, traces, person, BEGIN_TICKS, policy == Policy::OracleBeams)
-            }
-            Policy::All => best_of_all(&network, traces, person, BEGIN_TICKS),
-            _ => {
-                let mut advised = Advised::new(frames, policy, decider.clone(), &network, traces);
-                drive(&network, traces, person, BEGIN_TICKS, |view| advised.order(view))
-            }
-        });
+        let decider = Decider::new(&site);
+        let frames = match policy {
+            Policy::Paper => &forecasts.paper,
+            Policy::ConstantVelocity => &forecasts.constant_velocity,
+            _ => &forecasts.ours,
+        };
+        let carriers =
+            (policy == Policy::Bound).then(|| carriers(&site, &self.seen.ours, frames, traces, self.seed));
+        let mut sum = Tally::default();
+        for person in 0..traces.people {
+            let reactive = |tuning, conditional, beams| {
+                let mut reactive = Reactive::new(tuning, conditional, beams, network.radios.len());
+                drive(&network, traces, person, BEGIN_TICKS, |view| reactive.order(view))
+            };
+            sum.add(&match policy {
+                Policy::Stay => drive(&network, traces, person, BEGIN_TICKS, |_| None),
+                Policy::A3(tuning) => reactive(tuning, false, false),
+                Policy::Conditional(tuning) => reactive(tuning, true, false),
+                Policy::Beams => reactive(Tuning::Fast, false, true),
+                Policy::ConditionalBeams => reactive(Tuning::Fast, true, true),
+                Policy::Oracle | Policy::OracleBeams => {
+                    oracle(&network, traces, person, BEGIN_TICKS, policy == Policy::OracleBeams)
+                }
+                Policy::All => best_of_all(&network, traces, person, BEGIN_TICKS),
+                _ => {
+                    let advised = Advised::new(frames, policy, decider.clone(), &network, traces);
+                    let mut advised = match &carriers {
+                        Some(carriers) => advised.bound(carriers),
+                        None => advised,
+                    };
+                    drive(&network, traces, person, BEGIN_TICKS, |view| advised.order(view))
+                }
+            });
+        }
+        sum
     }
-    sum
 }

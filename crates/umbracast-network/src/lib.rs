@@ -11,6 +11,7 @@ pub mod truth;
 pub mod foreseen;
 pub mod device;
 pub mod reports;
+pub mod bound;
 pub mod oracle;
 pub mod policy;
 pub mod case;

@@ -4,6 +4,7 @@ use umbracast::STEPS;
 use umbracast::decide::{Action, Decider, Decision, Serving};
 use umbracast::radio::{Loss, Outages};
 
+use crate::bound::Carriers;
 use crate::device::{Network, Order, REPORT_TICKS, View};
 use crate::foreseen::Foreseen;
 use crate::truth::{TICK_NS, TICK_S, Traces};
@@ -29,7 +30,10 @@ pub enum Policy {
     ConstantVelocity,
     /// Decisions on forecasts.
     Foreseen,
-    /// The same where no device can be prepared: every change needs a command.
+    /// The same where it has to be found out from the power heard whose each device is. Until that is known, it changes as
+    /// `Conditional(Fast)` does.
+    Bound,
+    /// The same as forecasts where no device can be prepared: every change needs a command.
     Commands,
     /// The same as forecasts, with beams that are pointed at reflections in time; one that fails all the same recovers as with A3.
     ForeseenBeams,
@@ -71,7 +75,7 @@ impl Tuning {
 
 impl Policy {
     /// All of them, in the order of tables.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Stay,
         Self::A3(Tuning::Fast),
         Self::A3(Tuning::Slow),
@@ -84,6 +88,7 @@ impl Policy {
         Self::ConstantVelocity,
         Self::Foreseen,
         Self::ForeseenBeams,
+        Self::Bound,
         Self::Commands,
         Self::AtOnce,
         Self::Perfect,
@@ -112,6 +117,7 @@ impl Policy {
             Self::ConstantVelocity => "constant-velocity",
             Self::Foreseen => "forecast",
             Self::ForeseenBeams => "forecast-with-beams",
+            Self::Bound => "forecast-bound",
             Self::Commands => "forecast-commands",
             Self::AtOnce => "forecast-no-age",
             Self::Perfect => "perfect-0.9-s",
@@ -217,6 +223,8 @@ pub struct Advised<'a> {
     pub traces: &'a Traces,
     next: usize,
     recovery: BeamRecovery,
+    /// Of [`Policy::Bound`]: who is found to carry whose device, and what decides where nobody is.
+    bound: Option<(&'a Carriers, Reactive)>,
 }
 
 impl<'a> Advised<'a> {
@@ -228,13 +236,26 @@ impl<'a> Advised<'a> {
         network: &'a Network,
         traces: &'a Traces,
     ) -> Self {
-        Self { frames, policy, decider, network, traces, next: 0, recovery: BeamRecovery::default() }
+        let recovery = BeamRecovery::default();
+        Self { frames, policy, decider, network, traces, next: 0, recovery, bound: None }
+    }
+
+    /// Whose devices are is as it was found out, not as it is.
+    pub fn bound(self, carriers: &'a Carriers) -> Self {
+        let reactive = Reactive::new(Tuning::Fast, true, false, self.network.radios.len());
+        Self { bound: Some((carriers, reactive)), ..self }
     }
 
     /// What it asks for at an instant. A device whose beam failed all the same does not wait for advice.
     pub fn order(&mut self, view: &View<'_>) -> Option<Order> {
         let recovered = self.recovery.order(view).filter(|_| self.policy.has_beams());
-        self.advice(view).or(recovered)
+        let advice = self.advice(view);
+        let reactive = self.bound.as_mut().and_then(|(carriers, reactive)| {
+            let order = reactive.order(view);
+            let carrier = self.next.checked_sub(1).and_then(|frame| carriers[frame][view.person]);
+            order.filter(|_| carrier.is_none())
+        });
+        advice.or(recovered).or(reactive)
     }
 
     fn advice(&mut self, view: &View<'_>) -> Option<Order> {
@@ -259,7 +280,8 @@ impl<'a> Advised<'a> {
             Policy::Perfect => self.knowing(frame, person, serving),
             Policy::AsNow => self.as_now(frame, frame.index_of[person]?, serving),
             _ => {
-                let index = frame.index_of[person]?;
+                let index_of = self.bound.as_ref().map(|(carriers, _)| &carriers[self.next - 1]);
+                let index = index_of.unwrap_or(&frame.index_of)[person]?;
                 self.decider.advise(served, frame.loss(serving, index)?, index, &frame.outages)
             }
         }

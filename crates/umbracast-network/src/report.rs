@@ -138,13 +138,13 @@ pub fn to_text(rows: &[Row]) -> String {
     for (i, row) in rows.iter().enumerate() {
         if i == 0 || rows[i - 1].case != row.case {
             text += &format!("{}{}\n", if i == 0 { "" } else { "\n" }, name_of(&row.case));
-            text += "policy                 outage %               handovers  beams  lost commands  recoveries  ping-pongs  needless  \
+            text += "policy                  outage %               handovers  beams  lost commands  recoveries  ping-pongs  needless  \
                      worst 1 %  gap to A3 closed     to conditional\n";
         }
         let of = figures(row, rows);
         let gap = |figure: Option<Figure>| figure.map_or("-".to_owned(), |figure| told(figure, 1.0));
         text += &format!(
-            "{:21}  {:21}  {:9.1}  {:5.1}  {:13.2}  {:10.2}  {:10.2}  {:8.2}  {:>9}  {:19}  {}\n",
+            "{:22}  {:21}  {:9.1}  {:5.1}  {:13.2}  {:10.2}  {:10.2}  {:8.2}  {:>9}  {:19}  {}\n",
             row.policy.name(),
             told(of.outage, 100.0),
             of.handovers.value,

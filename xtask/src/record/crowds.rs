@@ -225,7 +225,7 @@ pub fn network(book: &mut Book) -> Result<()> {
 /// The same over margins, procedures, crowds and access points, devices in the hand, and each model as truth and as predictor.
 pub fn network_sweeps(book: &mut Book) -> Result<()> {
     let few = "--carrier 28 --seed 220100 --scenes 4";
-    let straight = "--policies a3-60-40,conditional-60-40,forecast,oracle";
+    let straight = "--policies a3-60-40,conditional-60-40,forecast,forecast-bound,oracle";
     let beams = "--policies a3-60-40,conditional-60-40,a3-with-beams,forecast,forecast-with-beams,oracle,oracle-with-beams";
     for sweep in [
         "--truth edges --margin 5,10,15,20",

@@ -53,7 +53,7 @@ pub struct Network {
     #[arg(long, default_value = "model-b,edges", value_name = "MODEL", value_delimiter = ',', value_parser = truth)]
     pub truth: Vec<TruthModel>,
     /// Policies: stay, a3-60-40, a3-160-160, conditional-60-40, conditional-160-160, a3-with-beams,
-    /// conditional-with-beams, as-now, paper, constant-velocity, forecast, forecast-with-beams, forecast-commands,
+    /// conditional-with-beams, as-now, paper, constant-velocity, forecast, forecast-with-beams, forecast-bound, forecast-commands,
     /// forecast-no-age, perfect-0.9-s, oracle, oracle-with-beams, all-at-once. Default: all.
     #[arg(long, value_name = "POLICY", value_delimiter = ',', value_parser = policy)]
     pub policies: Vec<Policy>,
