@@ -341,7 +341,7 @@ mod tests {
             text.starts_with("28 GHz, 2 people, 4 access points, margin dB of the site, changes of 25 ms"),
             "{text}"
         );
-        assert!(text.contains("\nforecast               0.83 [0.83, 0.83]"), "{text}");
+        assert!(text.contains("\nforecast                0.83 [0.83, 0.83]"), "{text}");
         let csv = to_csv(&rows);
         assert_eq!(csv.lines().count(), 5);
         assert!(
