@@ -35,7 +35,7 @@ pub struct Health {
     /// Foreground points dropped because there were more than the configured limit in one frame.
     pub points_over_limit: u64,
     /// Frames in which so many people could come in each other's way that fewer samples were cast than the configuration
-    /// says: nobody was left out, probabilities are coarser.
+    /// says, or losses were worked out of fewer: nobody was left out, probabilities are coarser.
     pub frames_with_fewer_samples: u64,
     /// Times that a sensor was found to hang elsewhere than it was thought to, by the floor and the walls it sees. Its pose is
     /// put right while the program runs; `umbracast calibrate` puts it right in the site file.

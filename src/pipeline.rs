@@ -288,7 +288,8 @@ impl Pipeline {
         self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
         self.listener.sharpen(o.time_ns, &o.tracks, &self.caster, &self.binder, &mut o.blockages);
         self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
-        o.health.frames_with_fewer_samples += u64::from(self.caster.took_fewer_samples());
+        let fewer = self.caster.took_fewer_samples() || self.fader.took_fewer_samples();
+        o.health.frames_with_fewer_samples += u64::from(fewer);
         o
     }
 

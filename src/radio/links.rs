@@ -99,6 +99,7 @@ pub struct Fader {
     beyond: Option<Beyond>,
     beyond_bits: Vec<u32>,
     outages: Outages,
+    takes_fewer: bool,
 }
 
 /// A body that may cost a leg something at a step.
@@ -151,6 +152,7 @@ impl Fader {
             beyond: site.handover.map(|_| Beyond::default()),
             beyond_bits: Vec::new(),
             outages: Outages::default(),
+            takes_fewer: false,
         }
     }
 
@@ -159,6 +161,7 @@ impl Fader {
     pub fn fade(&mut self, caster: &Caster, losses: &mut Vec<Loss>) {
         losses.clear();
         self.outages.begin(0, 0, 0);
+        self.takes_fewer = false;
         let Some((people, drawn)) = caster.drawn() else { return };
         if self.radios.iter().all(Option::is_none) || people.is_empty() {
             return;
@@ -170,6 +173,7 @@ impl Fader {
         let meetings = straight.checked_sub(1).map_or(0, |last| self.ends[last]);
         let affordable = LOSSES_MAX / meetings.max(1) / WORD * WORD;
         let (samples, asked) = (drawn.min(affordable.max(WORD)), caster.samples_asked());
+        self.takes_fewer = samples < drawn;
         self.outages.begin(self.radios.len(), people.len(), samples);
         self.spreads.retain(|&(_, track), _| people.iter().any(|person| person.track == track));
         if self.turns.len() < people.len() {
@@ -190,6 +194,11 @@ impl Fader {
             left -= losses;
             self.reflect(self.legs.reflected[k], straight + 2 * k, people, [samples, asked]);
         }
+    }
+
+    /// Whether so many people stood in each other's links that the last frame's losses are of fewer samples than were cast.
+    pub fn took_fewer_samples(&self) -> bool {
+        self.takes_fewer
     }
 
     /// The samples of the last frame: in which each way is out, and when.

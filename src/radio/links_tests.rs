@@ -103,6 +103,21 @@ fn the_spread_of_real_fades_widens_what_is_told() {
 
 /// Random crowds: every sample's loss is that of the exact model over everybody, so nobody who matters is left out.
 #[test]
+fn a_crowd_in_each_others_links_loses_by_fewer_samples_and_says_so() {
+    let crowd = |side: u64| -> Vec<Track> {
+        let place = |id: u64| DVec2::new((id % side) as f64, (id / side) as f64) * 0.8;
+        (0..side * side).map(|id| somebody(id, place(id), DVec2::new(1.0, 0.3))).collect()
+    };
+    let takes_fewer = |people: &[Track]| {
+        let (caster, fader, _) = faded(&config(true), people);
+        let (_, drawn) = caster.drawn().unwrap();
+        (fader.took_fewer_samples(), fader.outages().samples() < drawn)
+    };
+    assert_eq!(takes_fewer(&crowd(2)), (false, false));
+    assert_eq!(takes_fewer(&crowd(7)), (true, true));
+}
+
+#[test]
 fn losses_are_those_of_everybody_asked_one_by_one() {
     let mut random = Pcg64::seed_from_u64(7);
     let mut fades = 0;

@@ -338,7 +338,8 @@ impl Chain {
             self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
             self.listener.sharpen(o.time_ns, &o.tracks, caster, &self.binder, &mut o.blockages);
             self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
-            self.fewer_samples += u64::from(caster.took_fewer_samples());
+            let fewer = caster.took_fewer_samples() || self.fader.took_fewer_samples();
+            self.fewer_samples += u64::from(fewer);
             o.health.frames_with_fewer_samples =
                 o.health.frames_with_fewer_samples.saturating_add(self.fewer_samples);
             let (mut tracks, mut links) = (Vec::new(), Vec::new());
