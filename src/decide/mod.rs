@@ -10,6 +10,7 @@ use crate::site::{Costs, Site};
 use crate::track::Track;
 use crate::{STEP_S, STEPS};
 
+pub use programme::Serving;
 use programme::{Programme, Way};
 
 /// What a network should do about the device of one person.
@@ -39,9 +40,10 @@ pub struct Decision {
     /// Until when the command must have been sent, seconds from the frame's instant. Then the link is likely to be out soon, or
     /// the change would not be over in time. `None` where nothing comes.
     pub deadline_s: Option<f64>,
-    /// How much less time in outage is expected than without this action, seconds, within the next 0.9 s.
+    /// How much less this action is expected to cost than none, seconds of outage: that of the next 0.9 s, interruptions, prices,
+    /// and a change that is due soon after.
     pub saved_s: f64,
-    /// The probability that the serving link is out within that time.
+    /// The probability that the serving link is out within the next 0.9 s.
     pub p_out: f64,
 }
 
@@ -63,28 +65,6 @@ pub enum Action {
     Prepare,
     /// Point the beam of the serving access point at a surface, or at the device again.
     Beam,
-}
-
-/// How a device is served.
-///
-/// ```
-/// use umbracast::decide::Serving;
-///
-/// assert_eq!(Serving::straight(2), Serving { access_point: 2, is_reflected: false });
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Serving {
-    /// By which access point.
-    pub access_point: usize,
-    /// Whether its beam is pointed at the best reflection.
-    pub is_reflected: bool,
-}
-
-impl Serving {
-    /// By a beam that is pointed at the device.
-    pub fn straight(access_point: usize) -> Self {
-        Self { access_point, is_reflected: false }
-    }
 }
 
 impl Action {

@@ -6,7 +6,6 @@
 //! where waiting costs nothing. After the last step everybody is taken to walk straight on for a second: whose link is cut then
 //! will have to change once more. Access points behind one person fail together, for their samples are the same.
 
-use super::Serving;
 use crate::STEP_S;
 use crate::blockage::lanes::WORD;
 use crate::blockage::trajectories::MOMENTS;
@@ -19,6 +18,28 @@ const WEAKER_S: f32 = 0.001;
 
 /// A device recovers from a beam that has failed by itself, after two reports 20 ms apart (3GPP TS 38.321, 5.17).
 const RECOVERS_S: f32 = 0.04;
+
+/// How a device is served.
+///
+/// ```
+/// use umbracast::decide::Serving;
+///
+/// assert_eq!(Serving::straight(2), Serving { access_point: 2, is_reflected: false });
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Serving {
+    /// By which access point.
+    pub access_point: usize,
+    /// Whether its beam is pointed at the best reflection.
+    pub is_reflected: bool,
+}
+
+impl Serving {
+    /// By a beam that is pointed at the device.
+    pub fn straight(access_point: usize) -> Self {
+        Self { access_point, is_reflected: false }
+    }
+}
 
 /// A way that may serve the device.
 #[derive(Debug, Clone, Copy)]

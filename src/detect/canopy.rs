@@ -1,7 +1,6 @@
 //! What is carried above the head, such as an umbrella, or raised hands: wide, over one trunk that is not.
 
-use super::evidence::POINTS_MIN;
-use super::part::Part;
+use super::part::{POINTS_MIN, Part};
 use crate::geometry::{Aabb, DVec3};
 
 /// An open umbrella is so high from the rim to the top, and somewhat less than a hand is higher than the head.

@@ -5,7 +5,7 @@ use super::arms::{ALONE_M, ARM_M, have_one_head, is_arm};
 use super::canopy::{is_overhead, without_canopy};
 use super::means::{PASSES, means, one_more, people_if};
 use super::memory::{Memory, PEOPLE_OF_CLUSTER};
-use super::part::Part;
+use super::part::{POINTS_MIN, Part};
 use super::{Cluster, Prior};
 use crate::geometry::{DVec2, DVec3};
 
@@ -18,8 +18,6 @@ const EXPECTED_HALVES_M: f64 = 0.3;
 const EXPECTED_M: f64 = 0.3;
 /// What ends below this height is legs alone: the hips of most adults.
 pub(super) const FULL_BODY_TOP_M: f64 = 0.9;
-/// Least points of a person.
-pub(super) const POINTS_MIN: usize = 5;
 /// Parts whose means are nearer than this are one person: nobody's body axis comes nearer to another's.
 const ONE_PERSON_M: f64 = 0.33;
 /// A low part nearer than this to a person is a leg: half a stride.

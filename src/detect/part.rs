@@ -3,6 +3,9 @@
 use super::Cluster;
 use crate::geometry::{DVec2, DVec3};
 
+/// Least points of a person.
+pub(super) const POINTS_MIN: usize = 5;
+
 /// Some points, before it is known whether they are somebody.
 #[derive(Debug, Clone)]
 pub(super) struct Part {

@@ -4,7 +4,7 @@ use super::cluster::PlanGrid;
 use super::dp_means::MergeMean;
 use super::features::away;
 use super::memory::Memory;
-use super::part::Part;
+use super::part::{POINTS_MIN, Part};
 use super::{Cluster, Point, Prior, above_floor, dp_means, evidence};
 use crate::Site;
 use crate::config::{ClusterMethod, DetectConfig, Mechanism};
@@ -27,8 +27,7 @@ struct Radius {
 
 /// A body is 0.26 m deep: both sides seen must stay together. At 20 m a person has few returns; 16 points lose 3 % of
 /// the people.
-const OURS: Radius =
-    Radius { radius_m: 0.2, per_range: 0.005, shift_m: 0.1, points_min: evidence::POINTS_MIN };
+const OURS: Radius = Radius { radius_m: 0.2, per_range: 0.005, shift_m: 0.1, points_min: POINTS_MIN };
 /// As hdl_people_tracking has it.
 const ADAPTED: Radius = Radius { radius_m: 0.2, per_range: 0.0, shift_m: 0.0, points_min: 16 };
 

@@ -6,6 +6,8 @@ mod remembered;
 mod gaussian;
 #[doc(hidden)] // Assignments, for scores that match tracks with people.
 pub mod association;
+#[doc(hidden)] // Measurements, for the fit of its numbers.
+pub mod outline;
 #[doc(hidden)] // What tests and ablations turn.
 pub mod numbers;
 mod sway;
@@ -14,8 +16,6 @@ mod limb_phase;
 #[doc(hidden)] // For fits that need to know who is in free sight.
 pub mod visibility;
 mod height;
-#[doc(hidden)] // Measurements, for the fit of its numbers.
-pub mod outline;
 mod heading;
 mod followed;
 mod origin;

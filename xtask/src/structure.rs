@@ -1,5 +1,5 @@
 //! `structure`: the files of the workspace and what they use of one another, as a picture and in words. Both are made
-//! from the code, and a test says if they are out of date.
+//! from the code; `--check` says if the picture is out of date.
 
 mod tokens;
 mod modules;
@@ -58,4 +58,18 @@ fn words(graph: &Graph) -> String {
         text += &format!("against the order: {} uses {}\n", name(from), name(to));
     }
     text.trim_end().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_the_runtime_use_one_another_in_no_circle_and_never_against_the_order() {
+        let graph = Graph::of_workspace(&root()).expect("the workspace is read");
+        let of_runtime = |file: usize| graph.files[file].krate == 0;
+        let circles = graph.circles.iter().filter(|circle| of_runtime(circle[0])).count();
+        let backward = graph.backward.iter().filter(|(from, _)| of_runtime(*from)).count();
+        assert_eq!((circles, backward), (0, 0), "{}", words(&graph));
+    }
 }

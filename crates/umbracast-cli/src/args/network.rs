@@ -23,7 +23,7 @@ pub struct Network {
     /// Number of scenes. Fewer than five give no intervals.
     #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: u32,
-    /// Seconds of a scene; the first 15 are not scored.
+    /// Seconds of a scene; the first 1.5 are not scored.
     #[arg(long, default_value_t = 40, value_name = "S", value_parser = clap::value_parser!(u32).range(20..=3600))]
     pub seconds: u32,
     /// Seed of the first scene; each next scene has the next number. Test seeds begin at 200000.
