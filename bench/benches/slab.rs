@@ -12,11 +12,14 @@ use umbracast::geometry::{Aabb, DVec3};
 
 const AP_M: DVec3 = DVec3::new(12.0, 0.0, 3.0);
 
-/// People stand on a grid of a metre; the box of one is asked about the segment to the next.
+/// People stand on a grid of a metre. The box of one is asked about the segment to somebody a metre behind him, or to anybody.
 fn cases() -> Vec<(Aabb, DVec3)> {
     let place = |i: u32| DVec3::new(f64::from(i % 25) - 12.0, f64::from(i / 25) * 0.5 - 10.0, 0.0);
     let case = |i: u32| {
-        let (box_m, to_m) = (place(i), place((i * 7 + 3) % 1000) + DVec3::new(0.2, 0.1, 0.9));
+        let box_m = place(i);
+        let behind_m = box_m + (box_m - AP_M).with_z(0.0).normalize();
+        let foot_m = if i % 2 == 0 { behind_m } else { place((i * 7 + 3) % 1000) };
+        let to_m = foot_m + DVec3::new(0.2, 0.1, 0.9);
         let half_m = DVec3::new(0.25, 0.25, 0.0);
         (Aabb { min_m: box_m - half_m, max_m: box_m + half_m + DVec3::new(0.0, 0.0, 1.75) }, to_m)
     };
