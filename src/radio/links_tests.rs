@@ -101,7 +101,6 @@ fn the_spread_of_real_fades_widens_what_is_told() {
     assert!((spread_db(40.0, true) - 7.0_f32.hypot(7.2)).abs() < 1e-5);
 }
 
-/// Random crowds: every sample's loss is that of the exact model over everybody, so nobody who matters is left out.
 #[test]
 fn a_crowd_in_each_others_links_loses_by_fewer_samples_and_says_so() {
     let crowd = |side: u64| -> Vec<Track> {
@@ -117,6 +116,7 @@ fn a_crowd_in_each_others_links_loses_by_fewer_samples_and_says_so() {
     assert_eq!(takes_fewer(&crowd(7)), (true, true));
 }
 
+/// Random crowds: every sample's loss is that of the exact model over everybody, so nobody who matters is left out.
 #[test]
 fn losses_are_those_of_everybody_asked_one_by_one() {
     let mut random = Pcg64::seed_from_u64(7);

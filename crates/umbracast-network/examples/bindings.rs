@@ -16,7 +16,7 @@ use umbracast::site::{AccessPoint, Radio};
 use umbracast::track::Track;
 use umbracast::{Config, Health, Mode, Pipeline};
 use umbracast_eval::run::chain::{empty_frames, push};
-use umbracast_network::reports::{self, LATE_NS};
+use umbracast_network::reports;
 use umbracast_network::truth::{Air, Counted, TICK_NS, Traces, TruthModel};
 use umbracast_sim::crowd::{Preset, strolling};
 use umbracast_sim::scene::Scene;
@@ -96,7 +96,7 @@ fn scene(people: usize, seed: u64) -> Result<(Vec<Share>, Share), String> {
     let device_of = |person: usize| FIRST_DEVICE + (person * 7 + 3) as u64 % people as u64;
     let reports = reports::of_scene(site, traces, seed, device_of);
     let mut assembler = Assembler::new(site).map_err(|e| e.to_string())?;
-    let (mut health, mut sent) = (Health::default(), 0);
+    let (mut health, mut waiting) = (Health::default(), &reports[..]);
     // One network hears what LiDARs see; for the other, tracks are swapped.
     let [mut plain, mut swapped] = [Binder::new(site), Binder::new(site)];
     let (mut bindings, mut swaps) = (Vec::new(), Swaps::default());
@@ -105,10 +105,8 @@ fn scene(people: usize, seed: u64) -> Result<(Vec<Share>, Share), String> {
         push(&mut assembler, &frame.packets, &mut health);
         while let Some(frame) = assembler.pop() {
             let outcome = pipeline.step(&frame);
-            let arrived =
-                reports[sent..].iter().take_while(|r| r.time_ns + LATE_NS <= outcome.time_ns).count();
-            [&mut plain, &mut swapped].iter_mut().for_each(|b| b.hear(&reports[sent..sent + arrived]));
-            sent += arrived;
+            let arrived = reports::take_arrived(&mut waiting, outcome.time_ns);
+            [&mut plain, &mut swapped].iter_mut().for_each(|b| b.hear(arrived));
             let now_s = outcome.time_ns as f64 * 1e-9;
             let tick = ((outcome.time_ns / TICK_NS) as usize).min(ticks - 1);
             plain.bind(outcome.time_ns, &outcome.tracks, &outcome.losses, &mut bindings);

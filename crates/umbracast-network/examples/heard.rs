@@ -18,7 +18,7 @@ use umbracast::{Config, Health, Mode, Pipeline, STEPS};
 use umbracast_eval::run::chain::{empty_frames, push};
 use umbracast_eval::score::bootstrap::Pooled;
 use umbracast_eval::score::counts::Counts;
-use umbracast_network::reports::{self, LATE_NS};
+use umbracast_network::reports;
 use umbracast_network::truth::{Air, Counted, Traces, TruthModel};
 use umbracast_sim::crowd::{Preset, strolling};
 use umbracast_sim::scene::{Scene, SceneFrame};
@@ -161,15 +161,13 @@ fn scene(people: usize, seed: u64, carrier_ghz: f64, model: TruthModel) -> Resul
     let device_of = |person: usize| (person as u64 * 7 + 3 + seed) % people as u64;
     let reports = reports::of_scene(site, traces, seed, device_of);
     let mut assembler = Assembler::new(site).map_err(|e| e.to_string())?;
-    let (mut health, mut sent) = (Health::default(), 0);
+    let (mut health, mut waiting) = (Health::default(), &reports[..]);
     let (mut truth, mut told) = (Vec::new(), Vec::new());
     while let Some(frame) = scene.next_frame() {
         push(&mut assembler, &frame.packets, &mut health);
         truth.push(blocked(&frame, people, site.access_points.len()));
         while let Some(frame) = assembler.pop() {
-            let arrived = reports[sent..].iter().take_while(|r| r.time_ns + LATE_NS <= frame.time_ns).count();
-            hears.hear(&reports[sent..sent + arrived]);
-            sent += arrived;
+            hears.hear(reports::take_arrived(&mut waiting, frame.time_ns));
             let at = truth.iter().position(|(time_ns, _)| *time_ns == frame.time_ns);
             let both =
                 [deaf.step(&frame), hears.step(&frame)].map(|o| (o.tracks.clone(), o.blockages.clone()));

@@ -4,7 +4,7 @@ use umbracast::Site;
 use umbracast::radio::{Binder, Binding};
 
 use crate::foreseen::{Followed, Foreseen};
-use crate::reports::{self, LATE_NS};
+use crate::reports;
 use crate::truth::Traces;
 
 /// A device is taken to be carried by who does so at least so likely. Chosen on the scenes of seeds 140060 to 140062, where such a
@@ -25,11 +25,9 @@ pub fn carriers(
 ) -> Carriers {
     let device_of = |person: usize| person as u64;
     let reports = reports::of_scene(site, traces, seed, device_of);
-    let (mut binder, mut bindings, mut sent) = (Binder::new(site), Vec::new(), 0);
+    let (mut binder, mut bindings, mut waiting) = (Binder::new(site), Vec::new(), &reports[..]);
     let of_frame = |(frame, said): (&Followed, &Foreseen)| {
-        let arrived = reports[sent..].iter().take_while(|r| r.time_ns + LATE_NS <= frame.time_ns).count();
-        binder.hear(&reports[sent..sent + arrived]);
-        sent += arrived;
+        binder.hear(reports::take_arrived(&mut waiting, frame.time_ns));
         binder.bind(frame.time_ns, &frame.tracks, &said.losses, &mut bindings);
         let carrier = |person: usize| {
             // Bindings of a device stand likeliest first.

@@ -46,3 +46,11 @@ pub fn of_scene(site: &Site, traces: &Traces, seed: u64, device_of: impl Fn(usiz
     reports.sort_by_key(|report| report.time_ns);
     reports
 }
+
+/// Takes those reports of a scene that have arrived at an instant from the front of those that have not.
+pub fn take_arrived<'a>(waiting: &mut &'a [Report], time_ns: i64) -> &'a [Report] {
+    let count = waiting.iter().take_while(|report| report.time_ns + LATE_NS <= time_ns).count();
+    let (arrived, still_waiting) = waiting.split_at(count);
+    *waiting = still_waiting;
+    arrived
+}
