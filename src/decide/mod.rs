@@ -32,7 +32,7 @@ pub struct Decision {
     pub serving: usize,
     /// What to do.
     pub action: Action,
-    /// Where to: of a change, or of one that should be prepared, be it for the case that the beam is pointed too late.
+    /// Where to: of a change, or of one that should be prepared.
     pub target: Option<usize>,
     /// What a beam should be pointed at, where the action is [`Action::Beam`]; `None` for the device itself. Of several reflections
     /// that are free the likeliest to stay so: a beam search may take another.
@@ -127,7 +127,8 @@ impl Decider {
         let known = self.serving.get(&track);
         let is_news = |known: &Known| heard_ns > known.since_ns && access_point != known.serving.access_point;
         if known.is_none_or(is_news) {
-            self.serving.insert(track, Known { serving: Serving::straight(access_point), since_ns: heard_ns });
+            self.serving
+                .insert(track, Known { serving: Serving::straight(access_point), since_ns: heard_ns });
         }
     }
 
@@ -177,9 +178,10 @@ impl Decider {
                     let since_ns = time_ns.saturating_add((takes_s * 1e9) as i64);
                     Known { serving: Serving::straight(target), since_ns }
                 }
-                (Action::Beam, _) => {
-                    Known { serving: Serving { is_reflected: decision.surface.is_some(), ..serving }, ..known }
-                }
+                (Action::Beam, _) => Known {
+                    serving: Serving { is_reflected: decision.surface.is_some(), ..serving },
+                    ..known
+                },
                 _ => known,
             };
             self.serving.insert(track.id, then);
@@ -262,7 +264,6 @@ impl Decider {
         if let Some(cost_s) = beam_s {
             let to = of_serving.filter(|_| reflected.is_none());
             (decision.action, decision.surface) = (Action::Beam, to.map(|(_, surface)| surface));
-            decision.target = values.later.filter(|(_, share)| *share >= LIKELY).map(|(target, _)| target);
             decision.deadline_s = deadline_s(costs.beam_s);
             decision.saved_s = values.stay_s - cost_s;
         } else if let Some((target, cost_s)) = best {

@@ -108,7 +108,8 @@ fn a_device_is_served_as_it_was_advised_until_the_network_says_otherwise() {
     let mut outages = Outages::new(3, 1, SAMPLES);
     out(&mut outages, 0, 1..=5, SAMPLES);
     let track = Track { confirmed: true, ..Track::new(7, DVec2::ZERO, DVec2::ZERO) };
-    let losses = [0, 1, 2].map(|ap| Loss { p_out: [f64::from(u8::from(ap == 0)); STEPS], ..Loss::clear(ap, 7) });
+    let losses =
+        [0, 1, 2].map(|ap| Loss { p_out: [f64::from(u8::from(ap == 0)); STEPS], ..Loss::clear(ap, 7) });
     let (mut decider, mut decisions) = (decider(commands()), vec![]);
     let mut serving_at = |frame: i64, heard: Option<(usize, i64)>| {
         if let Some((access_point, heard_ms)) = heard {

@@ -62,7 +62,8 @@ pub(super) struct Antenna {
     pub(super) place_m: DVec3,
     pub(super) wave: Wave,
     pub(super) margin_db: f64,
-    pub(super) spreads: bool,
+    /// How much wider the spread of real fades is told than at 28 GHz; `None` where it is not told.
+    pub(super) fades: Option<f32>,
 }
 
 /// A straight line from an access point, or its image, to a device, or its image. Who is before the mirror and meets a line to an
@@ -106,7 +107,15 @@ impl Leg {
 impl Antenna {
     /// Whether a body within one disc, so wide and so high, may cost a path from a place to another disc something. Errs on the side
     /// of asking the samples: [`Wave::is_clear`] of none that is left out would be false.
-    pub(super) fn meets(&self, from_m: DVec3, aim: Disc, aim_z: f64, body: Disc, half_m: f64, top_m: f64) -> bool {
+    pub(super) fn meets(
+        &self,
+        from_m: DVec3,
+        aim: Disc,
+        aim_z: f64,
+        body: Disc,
+        half_m: f64,
+        top_m: f64,
+    ) -> bool {
         let start_m: DVec2 = from_m.truncate();
         let way_m = aim.center_m - start_m;
         let length_m = way_m.length().max(1e-9);

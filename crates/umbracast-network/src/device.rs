@@ -38,8 +38,8 @@ pub enum Order {
     Release,
     /// The device points the beam at the best reflection of the same access point, or at the access point again.
     Beam(bool),
-    /// The same by a command over the serving link; and the change that is prepared besides.
-    Point(bool, Option<usize>),
+    /// The same by a command over the serving link.
+    Point(bool),
 }
 
 /// What a command tells a device.
@@ -232,25 +232,20 @@ pub fn drive(
         let (mut change, mut pointed) = (None, None);
         let view =
             View { tick, person, serving, reported_db: &reported_db, is_new, reflected, out, straight_out };
-        // The level to fall from is the best that was heard while being prepared.
-        let prepare = |target: Option<usize>, prepared: &mut Option<(usize, f64)>| {
-            let before_db = prepared.map_or(f64::NEG_INFINITY, |(_, level_db)| level_db);
-            *prepared = target.map(|to| (to, before_db.max(reported_db[serving])));
-        };
         match policy(&view) {
             Some(Order::Command(to)) if command.is_none() => {
                 command = Some((tick + ticks_of(costs.command_s), Command::Change(to)));
                 held = false;
             }
-            Some(Order::Point(to_reflection, fallback)) => {
-                command = command
-                    .or_else(|| Some((tick + ticks_of(costs.command_s), Command::Point(to_reflection))));
-                prepare(fallback, &mut prepared);
-                held = false;
+            Some(Order::Point(to_reflection)) if command.is_none() => {
+                command = Some((tick + ticks_of(costs.command_s), Command::Point(to_reflection)));
+                (held, prepared) = (false, None);
             }
             Some(Order::Execute(to)) => change = Some(to),
             Some(Order::Prepare(to)) => {
-                prepare(Some(to), &mut prepared);
+                // The level to fall from is the best that was heard while being prepared.
+                let before = prepared.map_or(f64::NEG_INFINITY, |(_, level_db)| level_db);
+                prepared = Some((to, before.max(reported_db[serving])));
                 held = false;
             }
             Some(Order::Hold) => (held, prepared) = (true, None),
@@ -275,9 +270,6 @@ pub fn drive(
         if let Some(to_reflection) = pointed.filter(|to| *to != reflected) {
             tally.point(costs);
             (reflected, out) = (to_reflection, way_out(to_reflection));
-            // Nothing was heard over the other way yet.
-            reported_db[serving] = f64::NEG_INFINITY;
-            prepared = prepared.map(|(to, _)| (to, f64::NEG_INFINITY));
         }
         if let (Some(to), Phase::Served) = (change.filter(|to| *to != serving), &phase) {
             tally.handovers += 1;

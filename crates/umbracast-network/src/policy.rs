@@ -268,10 +268,7 @@ impl<'a> Advised<'a> {
             (Action::HandOver, Some(target)) => Order::Command(target),
             (Action::Prepare, Some(target)) if self.network.costs.conditional => Order::Prepare(target),
             (Action::Wait, _) => Order::Hold,
-            (Action::Beam, target) => Order::Point(
-                decision.surface.is_some(),
-                target.filter(|_| self.network.costs.conditional),
-            ),
+            (Action::Beam, _) => Order::Point(decision.surface.is_some()),
             _ => Order::Release,
         })
     }
