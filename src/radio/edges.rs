@@ -8,8 +8,8 @@ use crate::elementary::{cos_sin_f32, ln_f32, wide};
 /// Passages that are worked out together.
 const WORD: usize = 32;
 
-/// A screen that stands for a body: [`double_knife_edge`](super::models::double_knife_edge) with powers that add, or, where it has
-/// a top, [`three_edges`](super::models::three_edges) of their average, for many bodies. The loss is that of these functions to 1e-4 dB.
+/// A screen that stands for a body, for many bodies: [`double_knife_edge`](super::models::double_knife_edge) with powers that
+/// add, or, where it has a top, [`three_edges`](super::models::three_edges) with their average. Losses are those to 1e-4 dB.
 ///
 /// ```
 /// use umbracast::{geometry::{DVec2, DVec3}, radio::Passage};
@@ -77,12 +77,11 @@ impl KnifeEdges {
         fn of_word(&self, of: &Word) -> [f64; WORD] = of_word_wide or of_word_portable
     }
 
-    /// Where edges are is worked out in double precision, also the phase: far out a turn of it is a small part of the whole.
+    /// Where edges are is worked out in double precision, and so is the phase, of which far from an edge only the last turn counts.
     #[inline(always)]
     fn of_word_portable(&self, of: &Word) -> [f64; WORD] {
         let half_m = 0.5 * self.width_m;
-        // Fresnel's parameter of each edge, positive where the path is covered, and its phase. The edge on the other side of the body's
-        // axis is always covered.
+        // Fresnel's parameter of each edge, positive where it covers the path, and the phase. The far side of a body always does.
         let [mut near, mut far, mut top] = [[0.0_f32; WORD]; 3];
         let [mut near_turns, mut top_turns] = [[0.0_f32; WORD]; 2];
         for k in 0..WORD {
@@ -127,8 +126,8 @@ fn nu_and_turns(nu: f64) -> (f32, f32) {
 /// Farther from the edge, less than 1e-9 of the power or all of it arrives.
 const FARTHEST: f32 = 1e4;
 
-/// What comes round an edge, as a share of the power in free space: (1/2 - C)^2 / 2 + (1/2 - S)^2 / 2. With the auxiliary functions f
-/// and g (Abramowitz and Stegun, 7.3.9 and 7.3.10) this is (f^2 + g^2) / 2 behind the edge; before it the wave itself adds.
+/// What comes round an edge, as a share of the power in free space: ((1/2 - C)^2 + (1/2 - S)^2) / 2. With the auxiliary functions
+/// f and g (Abramowitz and Stegun, 7.3.9 and 7.3.10) this is (f^2 + g^2) / 2 behind the edge; before it the wave itself adds.
 #[inline(always)]
 fn round_edge(nu: f32, turns: f32) -> f32 {
     // Quotients of polynomials that are f and g to 1e-6 of f. As no coefficient is negative, nothing cancels.

@@ -11,15 +11,15 @@ use crate::elementary::wide;
 /// A pair that is not allowed.
 pub const FORBIDDEN: f64 = f64::INFINITY;
 
-/// A column is taken from somebody so many times for each row, before what is left is left to paths: prices may fall by ever less.
-/// Bids are cheap, and the last paths lead over half of a matrix.
+/// Columns are taken from a row so many times for each row, before what is left is left to paths: prices may fall by ever less.
+/// A bid is cheap, and the last paths lead over half of a matrix.
 const BIDS: usize = 32;
 
 /// Gives rows to columns so that the sum of the costs is the least; `cost(r, c)` may be [`FORBIDDEN`], and a row
 /// that stays alone costs nothing, so only pairs below zero are made. Returns each row's column.
 ///
-/// Row reduction, then shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016) over the pairs below zero.
-/// Which of equal sums is taken depends on the order of rows and columns alone.
+/// Row reduction, then shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016) over the pairs below
+/// zero. Which of equal sums is taken depends on the order of rows and columns alone.
 pub fn optimal(rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
     let mut assignment = Assignment::default();
     assignment.optimal(rows, columns, cost);
@@ -61,8 +61,8 @@ impl Assignment {
         self.solve(&[], columns);
     }
 
-    /// [`optimal`] of a matrix that has so many columns, row after row. Of a long row only the cheapest pairs are looked at, and more of
-    /// them as soon as one of the others could be made (after LAPMOD: Volgenant 1996). The sum is the least all the same.
+    /// [`optimal`] of a matrix that has so many columns, row after row. Of a long row only the cheapest pairs are looked at, and
+    /// more of them as soon as one of the others could be made (after LAPMOD: Volgenant 1996). The sum is the least all the same.
     pub fn of_matrix(&mut self, costs: &[f64], columns: usize) {
         self.lists.clear();
         self.lists.add_cheapest(costs, columns);
@@ -90,8 +90,8 @@ impl Assignment {
         }
     }
 
-    /// Augmenting row reduction: every row takes the column that it wants most, whose price falls until the row's second choice is as
-    /// good. A row that had the column then looks for another. That settles most conflicts without a path.
+    /// Augmenting row reduction: every row takes the column that it wants most, whose price falls until the row's second choice
+    /// is as good. A row that had the column then looks for another. That settles most conflicts without a path.
     #[inline(always)]
     fn outbid(&mut self, costs: &[f64]) {
         let Self { column_of, row_of, row_price, column_price, lists, .. } = self;
