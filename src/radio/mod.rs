@@ -3,6 +3,7 @@
 pub mod fresnel;
 mod passage;
 pub mod models;
+mod edges;
 mod kirchhoff;
 mod body;
 mod reflection;
@@ -16,6 +17,7 @@ mod bindings;
 mod listener;
 
 pub use bindings::{Binder, Binding};
+pub use edges::KnifeEdges;
 pub use links::{Fader, Loss};
 pub use listener::Listener;
 pub use outages::Outages;
