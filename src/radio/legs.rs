@@ -62,8 +62,7 @@ pub(super) struct Antenna {
     pub(super) place_m: DVec3,
     pub(super) wave: Wave,
     pub(super) margin_db: f64,
-    /// How much wider the spread of real fades is told than at 28 GHz; `None` where it is not told.
-    pub(super) fades: Option<f32>,
+    pub(super) spreads: bool,
 }
 
 /// A straight line from an access point, or its image, to a device, or its image. Who is before the mirror and meets a line to an
@@ -130,7 +129,7 @@ impl Antenna {
             return false;
         }
         // Where the zone is widest between the two.
-        let widest_m = (0.5 * longest_m).clamp(near_m, far_m).clamp(0.0, longest_m);
+        let widest_m = (0.5 * longest_m).max(near_m).min(far_m).clamp(0.0, longest_m);
         let zone_m = self.wave.zone_m(widest_m, longest_m);
         if aside_m > body.radius_m + half_m + zone_m + turn * from_start_m.abs() {
             return false;

@@ -136,8 +136,8 @@ impl Fader {
                 waves.push((radio, wave.clone()));
                 wave
             });
-            let fades = radio.fade_spread.then(|| wider(radio.carrier_ghz));
-            Some(Antenna { place_m: ap.position(), wave, margin_db: radio.margin_db, fades })
+            let Radio { margin_db, fade_spread: spreads, .. } = radio;
+            Some(Antenna { place_m: ap.position(), wave, margin_db, spreads })
         };
         Self {
             radios: site.access_points.iter().map(&mut antenna).collect(),
@@ -330,7 +330,7 @@ impl Fader {
         });
         for of_step in self.losses_db.chunks_exact_mut(samples) {
             for (db, deeper) in of_step.iter_mut().zip(&*spread) {
-                *db += deeper * spread_db(*db, antenna.fades);
+                *db += deeper * spread_db(*db, antenna.spreads);
             }
         }
         Some(antenna.margin_db)
@@ -441,21 +441,17 @@ impl Fader {
 /// One standard deviation of the loss about a model that loses so much. A trunk and a head are not the body that walks there, and
 /// models of one body differ: in simulation two models of walking meshes scatter by 5 to 7 dB about ours at the bodies' true
 /// places, about fades (`umbracast network --losses`). With `fades` the spread of real fades is added: residuals of 1001 passages
-/// past a 5G millimetre-wave cell (IMMERSE, TU Dortmund 2024) are 1.5 + 0.9 sqrt(loss) dB, up to 6. A fifth more is told, and [`wider`],
-/// for the loss that it is taken of is not known itself. Both were chosen on seeds from 132700 so that eight of ten losses lie within
-/// the 10 and 90 % told. Where a body costs next to nothing, so does the spread.
-fn spread_db(model_db: f32, fades: Option<f32>) -> f32 {
+/// past a 5G millimetre-wave cell (IMMERSE, TU Dortmund 2024) are 1.5 + 0.9 sqrt(loss) dB, up to 6. A fifth more is told, for the loss
+/// that it is taken of is not known itself. Both were chosen on seeds from 132700 so that eight of ten losses lie within the 10 and
+/// 90 % told. Where a body costs next to nothing, so does the spread.
+fn spread_db(model_db: f32, fades: bool) -> f32 {
     let positive_db = larger(model_db, 0.0);
     let of_shape_db = smaller(1.8 * positive_db.sqrt(), 7.0);
-    let Some(wider) = fades else { return of_shape_db };
-    let of_fades_db = wider * smaller(1.8 + 1.1 * positive_db.sqrt(), 7.2) * smaller(2.0 * positive_db, 1.0);
+    if !fades {
+        return of_shape_db;
+    }
+    let of_fades_db = smaller(1.8 + 1.1 * positive_db.sqrt(), 7.2) * smaller(2.0 * positive_db, 1.0);
     (of_shape_db * of_shape_db + of_fades_db * of_fades_db).sqrt()
-}
-
-/// How much more of the spread is told than at 28 GHz: the shorter the wave, the less the models of a body agree. Chosen on seeds from
-/// 140110 at 60 and 140 GHz.
-fn wider(carrier_ghz: f64) -> f32 {
-    (carrier_ghz / 28.0).powf(0.25) as f32
 }
 
 fn quantiles_db(of_step: &[f32], sorted_db: &mut Vec<f32>) -> [f64; 3] {

@@ -95,10 +95,10 @@ fn the_spread_of_real_fades_widens_what_is_told() {
     let (none_db, shape_db, both_db) = (width_of(&losses), width_db(false), width_db(true));
     assert!(both_db > none_db + 5.0, "{both_db} {none_db}");
     assert!(both_db > shape_db + 2.0 && shape_db > none_db, "{both_db} {shape_db} {none_db}");
-    assert_eq!([None, Some(1.0)].map(|fades| spread_db(0.0, fades)), [0.0; 2]);
-    assert_eq!((spread_db(4.0, None), spread_db(40.0, None)), (3.6, 7.0));
-    assert!((spread_db(4.0, Some(1.0)) - 3.6_f32.hypot(4.0)).abs() < 1e-5);
-    assert!((spread_db(40.0, Some(wider(28.0))) - 7.0_f32.hypot(7.2)).abs() < 1e-5);
+    assert_eq!([false, true].map(|fades| spread_db(0.0, fades)), [0.0; 2]);
+    assert_eq!((spread_db(4.0, false), spread_db(40.0, false)), (3.6, 7.0));
+    assert!((spread_db(4.0, true) - 3.6_f32.hypot(4.0)).abs() < 1e-5);
+    assert!((spread_db(40.0, true) - 7.0_f32.hypot(7.2)).abs() < 1e-5);
 }
 
 #[test]
