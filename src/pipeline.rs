@@ -160,8 +160,8 @@ impl Pipeline {
         self.background.learn_empty(&self.mountings.follow(&frame.usable(health), health));
     }
 
-    /// Takes what access points heard of devices since the last step, and which of them serve whom. Reports may be half a second late; what is of no use is skipped
-    /// and counted ([`Binder::skipped`]).
+    /// Takes what access points heard of devices since the last step, and which of them serve whom. Reports may be half a second
+    /// late; what is of no use is skipped and counted ([`Binder::skipped`]).
     ///
     /// ```
     /// use umbracast::{Config, Pipeline, radio::Report};
