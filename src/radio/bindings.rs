@@ -9,23 +9,12 @@
 use std::collections::BTreeMap;
 
 use super::level::Level;
-use super::report::{Report, Served};
+use super::report::{Binding, Report, Served};
 use crate::Site;
 use crate::geometry::DVec2;
 use crate::radio::Loss;
 use crate::site::{Radio, Ue};
 use crate::track::Track;
-
-/// How likely a device is carried by a person.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Binding {
-    /// As its reports name it.
-    pub device: u64,
-    /// The person.
-    pub track: u64,
-    /// The probability. Those of a device sum to less than 1 where it may be with nobody who is followed.
-    pub p: f64,
-}
 
 /// What a link lost as it was heard, if the device is carried by the person.
 #[derive(Debug, Clone, Copy, PartialEq)]

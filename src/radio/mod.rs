@@ -16,11 +16,11 @@ mod level;
 mod bindings;
 mod listener;
 
-pub use bindings::{Binder, Binding};
+pub use bindings::Binder;
 pub use edges::KnifeEdges;
 pub use links::{Fader, Loss};
 pub use listener::Listener;
 pub use outages::Outages;
 pub use passage::{Passage, Rectangle};
 pub use reflection::{Reflection, Surface, reflections};
-pub use report::{Report, Served};
+pub use report::{Binding, Report, Served};

@@ -1,4 +1,4 @@
-//! What a network says of its devices.
+//! What a network says of its devices, and what is made of it.
 
 /// What one access point heard of one device.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,17 @@ pub struct Report {
     pub power_dbm: f64,
     /// Whether this access point is said to serve the device.
     pub serves: bool,
+}
+
+/// How likely a device is carried by a person.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Binding {
+    /// As its reports name it.
+    pub device: u64,
+    /// The person.
+    pub track: u64,
+    /// The probability. Those of a device sum to less than 1 where it may be with nobody who is followed.
+    pub p: f64,
 }
 
 /// Which access point serves a person's device, as reports say.
