@@ -115,7 +115,7 @@ fn a_device_is_served_as_it_was_advised_until_the_network_says_otherwise() {
         if let Some((access_point, heard_ms)) = heard {
             decider.serve(&Served { track: 7, access_point, heard_ns: heard_ms * 1_000_000 });
         }
-        decider.decide(frame * 100_000_000, &[track.clone()], &losses, &outages, &mut decisions);
+        decider.decide(frame * 100_000_000, std::slice::from_ref(&track), &losses, &outages, &mut decisions);
         (decisions[0].serving, decisions[0].action)
     };
     assert_eq!(serving_at(1, None), (1, Action::Stay), "nobody said, so the likeliest to stay in sight");
