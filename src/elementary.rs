@@ -117,6 +117,20 @@ fn exp_f32<const FUSED: bool>(x: f32) -> f32 {
     p * two_to_n
 }
 
+/// The natural logarithm of a positive number that is not subnormal, to 2e-7 of the larger of it and 1, as [`ln`].
+#[inline(always)]
+pub(crate) fn ln_f32(x: f32) -> f32 {
+    const ONE: u32 = 127 << 23;
+    const ROOT_OF_HALF: u32 = std::f32::consts::FRAC_1_SQRT_2.to_bits();
+    let n = x.to_bits().wrapping_add(ONE - ROOT_OF_HALF) >> 23;
+    let m = f32::from_bits(x.to_bits().wrapping_sub((n << 23).wrapping_sub(ONE)));
+    let t = (m - 1.0) / (m + 1.0);
+    let t2 = t * t;
+    // t is within 0.172: the first term left out is 2e-9.
+    let sum = (((1.0 / 9.0 * t2 + 1.0 / 7.0) * t2 + 1.0 / 5.0) * t2 + 1.0 / 3.0) * t2;
+    (n as i32 - 127) as f32 * std::f32::consts::LN_2 + 2.0 * (t + t * sum)
+}
+
 /// Cosine and sine of an angle of a few turns, to 1e-6.
 #[inline(always)]
 pub(crate) fn cos_sin_f32(rad: f32) -> (f32, f32) {
@@ -165,6 +179,14 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 3e-7, "exp({x}) = {found}, expected {expected}");
             let (found, expected) = (f64::from(tanh_f32::<false>(x)), f64::from(x).tanh());
             assert!((found - expected).abs() < 3e-7, "tanh({x}) = {found}, expected {expected}");
+        }
+        for i in -4000..=4000 {
+            let x = (i as f32 * 0.02).exp();
+            let (found, expected) = (f64::from(ln_f32(x)), f64::from(x).ln());
+            assert!(
+                (found - expected).abs() < 2e-7 * expected.abs().max(1.0),
+                "ln({x}) = {found}, expected {expected}"
+            );
         }
         assert_eq!(sigmoid_f32::<false>(1000.0), 1.0);
         assert!(sigmoid_f32::<false>(-1000.0) < 1e-37);

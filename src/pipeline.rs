@@ -160,15 +160,15 @@ impl Pipeline {
         self.background.learn_empty(&self.mountings.follow(&frame.usable(health), health));
     }
 
-    /// Takes what access points heard of devices since the last step. Reports may be half a second late; what is of no use is skipped
-    /// and counted ([`Binder::skipped`]).
+    /// Takes what access points heard of devices since the last step, and which of them serve whom. Reports may be half a second
+    /// late; what is of no use is skipped and counted ([`Binder::skipped`]).
     ///
     /// ```
     /// use umbracast::{Config, Pipeline, radio::Report};
     ///
     /// let mut pipeline = Pipeline::new(&Config::default(), None)?;
     /// // Access points of the default site have no radio, so nothing can be made of it.
-    /// pipeline.hear(&[Report { time_ns: 0, access_point: 0, device: 7, power_dbm: -61.0 }]);
+    /// pipeline.hear(&[Report { time_ns: 0, access_point: 0, device: 7, power_dbm: -61.0, serves: false }]);
     /// assert_eq!(pipeline.binder().skipped(), 1);
     /// # Ok::<(), umbracast::Error>(())
     /// ```
@@ -287,7 +287,8 @@ impl Pipeline {
         self.fader.fade(&self.caster, &mut o.losses);
         self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
         self.listener.sharpen(o.time_ns, &o.tracks, &self.caster, &self.binder, &mut o.blockages);
-        self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
+        self.binder.served().for_each(|served| self.decider.serve(&served));
+        self.decider.decide(o.time_ns, &o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
         let fewer = self.caster.took_fewer_samples() || self.fader.took_fewer_samples();
         o.health.frames_with_fewer_samples += u64::from(fewer);
         o

@@ -5,10 +5,10 @@ mod real_data;
 use std::collections::BTreeMap;
 
 use umbracast::geometry::{DVec2, DVec3};
-use umbracast::radio::Passage;
 use umbracast::radio::models::{
     Stand, Sum, double_knife_edge, kirchhoff, kirchhoff_mean, model_b, model_b_of,
 };
+use umbracast::radio::{KnifeEdges, Passage};
 
 #[test]
 fn every_vector_is_met_to_a_thousandth_of_a_db() {
@@ -49,6 +49,11 @@ fn every_vector_is_met_to_a_thousandth_of_a_db() {
         };
         let expected_db = number("loss_db");
         assert!((loss_db - expected_db).abs() < 1e-3, "{line}: found {loss_db}");
+        if kind == "dked_power" {
+            let mut of_many_db = Vec::new();
+            KnifeEdges { wavelength_m, width_m, top_m: None }.losses_db([Some(passage)], &mut of_many_db);
+            assert!((of_many_db[0] - expected_db).abs() < 1e-3, "{line}: found {of_many_db:?}");
+        }
         *counts.entry(kind.to_owned()).or_default() += 1;
     }
     assert_eq!(counts.values().sum::<usize>(), 2457, "{counts:?}");

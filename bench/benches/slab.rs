@@ -18,7 +18,7 @@ fn cases() -> Vec<(Aabb, DVec3)> {
     let case = |i: u32| {
         let box_m = place(i);
         let behind_m = box_m + (box_m - AP_M).with_z(0.0).normalize();
-        let foot_m = if i % 2 == 0 { behind_m } else { place((i * 7 + 3) % 1000) };
+        let foot_m = if i.is_multiple_of(2) { behind_m } else { place((i * 7 + 3) % 1000) };
         let to_m = foot_m + DVec3::new(0.2, 0.1, 0.9);
         let half_m = DVec3::new(0.25, 0.25, 0.0);
         (Aabb { min_m: box_m - half_m, max_m: box_m + half_m + DVec3::new(0.0, 0.0, 1.75) }, to_m)

@@ -5,7 +5,7 @@ mod programme;
 use std::collections::BTreeMap;
 
 use crate::blockage::probability::chances_of;
-use crate::radio::{Loss, Outages, Surface};
+use crate::radio::{Loss, Outages, Served, Surface};
 use crate::site::{Costs, Site};
 use crate::track::Track;
 use crate::{STEP_S, STEPS};
@@ -87,13 +87,15 @@ impl Action {
 const LIKELY: f64 = 0.05;
 
 /// The stage. It remembers which access point serves whom, and takes it that its advice is followed unless it is told otherwise.
+///
+/// What was heard before an advised change could be over says nothing against it.
 #[derive(Debug, Clone)]
 pub struct Decider {
     costs: Option<Costs>,
     radios: Vec<bool>,
     places_m: Vec<crate::geometry::DVec3>,
     reflects: bool,
-    serving: BTreeMap<u64, Serving>,
+    serving: BTreeMap<u64, Known>,
     programme: Programme,
 }
 
@@ -111,9 +113,23 @@ impl Decider {
         }
     }
 
-    /// Tells which access point serves a person's device, with a beam that is pointed at it.
-    pub fn serve(&mut self, track: u64, access_point: usize) {
-        self.serving.insert(track, Serving::straight(access_point));
+    /// Tells which access point serves a person's device. Where that is another one than was taken, its beam is pointed at the
+    /// device.
+    ///
+    /// ```
+    /// use umbracast::{Config, decide::Decider, radio::Served};
+    ///
+    /// let mut decider = Decider::new(&Config::default().site);
+    /// decider.serve(&Served { track: 3, access_point: 1, heard_ns: 1_000_000_000 });
+    /// ```
+    pub fn serve(&mut self, served: &Served) {
+        let &Served { track, access_point, heard_ns } = served;
+        let known = self.serving.get(&track);
+        let is_news = |known: &Known| heard_ns > known.since_ns && access_point != known.serving.access_point;
+        if known.is_none_or(is_news) {
+            self.serving
+                .insert(track, Known { serving: Serving::straight(access_point), since_ns: heard_ns });
+        }
     }
 
     /// Everybody has another number from now on.
@@ -124,13 +140,14 @@ impl Decider {
     /// Decider::new(&Config::default().site).renumber(|track| track + 1000);
     /// ```
     pub fn renumber(&mut self, number: impl Fn(u64) -> u64) {
-        self.serving =
-            std::mem::take(&mut self.serving).into_iter().map(|(id, ap)| (number(id), ap)).collect();
+        let serving = std::mem::take(&mut self.serving);
+        self.serving = serving.into_iter().map(|(id, known)| (number(id), known)).collect();
     }
 
     /// One decision for each confirmed track, in their order. `losses` and `outages` are of the same frame.
     pub fn decide(
         &mut self,
+        time_ns: i64,
         tracks: &[Track],
         losses: &[Loss],
         outages: &Outages,
@@ -145,16 +162,27 @@ impl Decider {
         self.serving.retain(|id, _| confirmed().any(|track| track.id == *id));
         for (person, track) in confirmed().enumerate() {
             let loss_of = |ap: usize| losses.iter().find(|l| l.track == track.id && l.access_point == ap);
-            let known = self.serving.get(&track.id).copied().filter(|of| self.has_radio(of.access_point));
-            let best = || self.best(track, &loss_of).map(Serving::straight);
-            let Some(serving) = known.or_else(best) else { continue };
-            self.serving.insert(track.id, serving);
+            let known = self.serving.get(&track.id).filter(|of| self.has_radio(of.serving.access_point));
+            let best = || {
+                let serving = Serving::straight(self.best(track, &loss_of)?);
+                Some(Known { serving, since_ns: i64::MIN })
+            };
+            let Some(known) = known.copied().or_else(best) else { continue };
+            let serving = known.serving;
+            self.serving.insert(track.id, known);
             let Some(loss) = loss_of(serving.access_point) else { continue };
             let decision = self.of_device(&costs, serving, loss, person, outages);
             let then = match (decision.action, decision.target) {
-                (Action::HandOver, Some(target)) => Serving::straight(target),
-                (Action::Beam, _) => Serving { is_reflected: decision.surface.is_some(), ..serving },
-                _ => serving,
+                (Action::HandOver, Some(target)) => {
+                    let takes_s = costs.age_s + costs.command_s + costs.interruption_s;
+                    let since_ns = time_ns.saturating_add((takes_s * 1e9) as i64);
+                    Known { serving: Serving::straight(target), since_ns }
+                }
+                (Action::Beam, _) => Known {
+                    serving: Serving { is_reflected: decision.surface.is_some(), ..serving },
+                    ..known
+                },
+                _ => known,
             };
             self.serving.insert(track.id, then);
             decisions.push(decision);
@@ -249,6 +277,14 @@ impl Decider {
         }
         decision
     }
+}
+
+/// How a device is served, as far as is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Known {
+    serving: Serving,
+    /// What was heard until then says nothing about it: a change was under way, or later reports have told.
+    since_ns: i64,
 }
 
 /// How likely the way that serves a device is out.

@@ -1,6 +1,7 @@
 use super::*;
 use crate::Config;
-use crate::radio::Surface;
+use crate::geometry::DVec2;
+use crate::radio::{Served, Surface};
 use crate::site::{AccessPoint, Handover, Radio, Reflections};
 
 /// Three access points with radios, of which changes cost what these procedures do.
@@ -104,12 +105,28 @@ fn a_short_outage_of_all_is_sat_out() {
 
 #[test]
 fn a_device_is_served_as_it_was_advised_until_the_network_says_otherwise() {
-    let mut decider = decider(commands());
-    decider.serve(7, 2);
-    assert_eq!(decider.serving.get(&7), Some(&Serving::straight(2)));
+    let mut outages = Outages::new(3, 1, SAMPLES);
+    out(&mut outages, 0, 1..=5, SAMPLES);
+    let track = Track { confirmed: true, ..Track::new(7, DVec2::ZERO, DVec2::ZERO) };
+    let losses =
+        [0, 1, 2].map(|ap| Loss { p_out: [f64::from(u8::from(ap == 0)); STEPS], ..Loss::clear(ap, 7) });
+    let (mut decider, mut decisions) = (decider(commands()), vec![]);
+    let mut serving_at = |frame: i64, heard: Option<(usize, i64)>| {
+        if let Some((access_point, heard_ms)) = heard {
+            decider.serve(&Served { track: 7, access_point, heard_ns: heard_ms * 1_000_000 });
+        }
+        decider.decide(frame * 100_000_000, std::slice::from_ref(&track), &losses, &outages, &mut decisions);
+        (decisions[0].serving, decisions[0].action)
+    };
+    assert_eq!(serving_at(1, None), (1, Action::Stay), "nobody said, so the likeliest to stay in sight");
+    assert_eq!(serving_at(2, Some((0, 150))), (0, Action::HandOver));
+    assert_eq!(serving_at(3, Some((0, 190))), (1, Action::Stay), "heard before the change was advised");
+    assert_eq!(serving_at(4, Some((0, 390))), (0, Action::HandOver), "it was not made");
+    assert_eq!(serving_at(5, Some((2, 480))), (2, Action::Stay), "another was");
+    assert_eq!(serving_at(6, Some((0, 470))), (2, Action::Stay), "a report that came late");
     let mut without = Decider::new(&Config::default().site);
     let mut decisions = vec![];
-    without.decide(&[], &[], &Outages::new(1, 0, SAMPLES), &mut decisions);
+    without.decide(0, &[], &[], &Outages::new(1, 0, SAMPLES), &mut decisions);
     assert!(
         decisions.is_empty()
             && without.advise(Serving::straight(0), &loss(0.0, 0.0), 0, &Outages::new(1, 1, 1)).is_none()

@@ -96,8 +96,14 @@ impl CloudLimits {
         let mut out_of_range = 0;
         for (chunk, points) in cloud.chunks(LANES).enumerate() {
             let seen = Seen::of(points, self.azimuths as f32, self.elevations.per_rad as f32);
-            for (k, point) in points.iter().enumerate() {
-                let range_m = seen.range_m[k];
+            let mut left = self.not_of_hall(&seen, [least_m, most_m]);
+            if points.len() < LANES {
+                left &= (1 << points.len()) - 1;
+            }
+            while left != 0 {
+                let k = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let (point, range_m) = (&points[k], seen.range_m[k]);
                 // Written so that NaN is out of range.
                 if !(range_m >= least_m && range_m <= most_m) {
                     out_of_range += 1;
@@ -105,9 +111,8 @@ impl CloudLimits {
                 }
                 let azimuth = inside(seen.azimuth[k])
                     .unwrap_or_else(|| ranges.bin(azimuth_of_cdeg(point.position_m)) as usize);
-                let steep = point.position_m[2].abs() > STEEP * range_m;
                 let elevation = inside(seen.elevation[k])
-                    .filter(|_| !steep)
+                    .filter(|_| !is_steep(point.position_m[2], range_m))
                     .unwrap_or_else(|| self.elevations.bin(point.position_m[2], range_m));
                 let limit_m = self.limits_m[azimuth * self.elevations.bins + elevation];
                 if limit_m.is_nan() {
@@ -120,6 +125,52 @@ impl CloudLimits {
         }
         Some(out_of_range)
     }
+
+    /// A bit for each point that is not seen at once to belong to the hall: it is out of range, near the edge of a bin, steep, from
+    /// where nothing came back before, or new.
+    #[inline(always)]
+    fn not_of_hall(&self, seen: &Seen, [least_m, most_m]: [f32; 2]) -> u32 {
+        let mut places = [0_u32; LANES];
+        for k in 0..LANES {
+            let (azimuth_bin, azimuth_past) = whole_and_past(seen.azimuth[k]);
+            let (elevation_bin, elevation_past) = whole_and_past(seen.elevation[k]);
+            let is_inside = |past: f32| (past > EDGE) & (past < 1.0 - EDGE);
+            let range_m = seen.range_m[k];
+            let is_sure = is_inside(azimuth_past)
+                & is_inside(elevation_past)
+                & !is_steep(seen.z_m[k], range_m)
+                & (range_m >= least_m)
+                & (range_m <= most_m);
+            let place = azimuth_bin.wrapping_mul(self.elevations.bins as u32).wrapping_add(elevation_bin);
+            places[k] = if is_sure { place } else { u32::MAX };
+        }
+        // Looked up one by one; where a place is not sure there is none.
+        let mut limits_m = [0.0; LANES];
+        for k in 0..LANES {
+            limits_m[k] = self.limits_m.get(places[k] as usize).copied().unwrap_or(f32::NAN);
+        }
+        // Written so that NaN is no limit to be beyond.
+        let mut left = [0; LANES];
+        for k in 0..LANES {
+            left[k] = if seen.range_m[k] >= limits_m[k] { 0 } else { 1_u32 << k };
+        }
+        left.iter().fold(0, |all, bit| all | bit)
+    }
+}
+
+/// The whole part of a number from 0 on, and what is past it. Near the next whole number the part may be one off; what is past it
+/// is then near 0 or 1 all the same, or beyond.
+#[inline(always)]
+fn whole_and_past(number: f32) -> (u32, f32) {
+    /// Adding it to a number below it rounds to a whole one, which then stands in the low bits.
+    const WHOLE: f32 = 8_388_608.0;
+    let shifted = number - 0.5 + WHOLE;
+    (shifted.to_bits().wrapping_sub(WHOLE.to_bits()), number - (shifted - WHOLE))
+}
+
+#[inline(always)]
+fn is_steep(z_m: f32, range_m: f32) -> bool {
+    z_m.abs() > STEEP * range_m
 }
 
 /// The bin that a number of bins lies in; `None` near an edge.
@@ -133,6 +184,7 @@ fn inside(bins: f32) -> Option<usize> {
 /// How points look from the sensor: in bins, from the edge of the first.
 struct Seen {
     range_m: [f32; LANES],
+    z_m: [f32; LANES],
     azimuth: [f32; LANES],
     elevation: [f32; LANES],
 }
@@ -153,7 +205,7 @@ impl Seen {
             // Half a bin, for bins are centred on their multiples, and the first that stays empty.
             elevation[k] = (angle_rad(z[k], flat_m) + FRAC_PI_2) * per_rad + 1.5;
         }
-        Self { range_m, azimuth, elevation }
+        Self { range_m, z_m: z, azimuth, elevation }
     }
 }
 
@@ -224,6 +276,33 @@ mod tests {
             }
         }
         assert!(told > points.len() / 2, "{told}");
+    }
+
+    #[test]
+    fn a_point_is_of_the_hall_at_once_only_where_its_exact_bin_says_so() {
+        let (ranges, elevations) = (RangeModel::new(1.0), Elevations::of_deg(0.5));
+        // Every other bin is unknown, as on a chessboard: a neighbour always answers otherwise.
+        let is_known = |azimuth: usize, elevation: usize| (azimuth + elevation).is_multiple_of(2);
+        let places = (0..ranges.bins()).flat_map(|a| (0..elevations.bins).map(move |e| (a, e)));
+        let limits_m = places.map(|(a, e)| if is_known(a, e) { 1.0 } else { f32::NAN }).collect();
+        let limits = CloudLimits { limits_m, azimuths: ranges.bins(), elevations };
+        // Between the middle of a bin and its edge.
+        let points: Vec<SensorPoint> = directions()
+            .map(|[x, y, z]| [x + 0.02 * y, y - 0.02 * x, z + 0.01])
+            .map(|position_m| SensorPoint { position_m, time_ns: 0, reflectivity: 0.0 })
+            .collect();
+        let mut settled = 0;
+        for points in points.chunks_exact(LANES) {
+            let seen = Seen::of(points, ranges.bins() as f32, elevations.per_rad as f32);
+            let left = limits.not_of_hall(&seen, [0.5, 100.0]);
+            for (k, point) in points.iter().enumerate().filter(|(k, _)| left >> k & 1 == 0) {
+                let azimuth = ranges.bin(azimuth_of_cdeg(point.position_m)) as usize;
+                let elevation = elevations.bin(point.position_m[2], seen.range_m[k]);
+                assert!(is_known(azimuth, elevation), "{point:?}");
+                settled += 1;
+            }
+        }
+        assert!(settled > points.len() / 3, "{settled}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::RangeInclusive;
 
-use super::clock::{Clock, near};
+use super::clock::{Clock, Now, near};
 use super::model::TIME_LIMIT_NS;
 use super::packet::decode;
 use super::{Cloud, Column, Frame, Model, Packet, RangeImage, Scan, sensor_model};
@@ -52,8 +52,8 @@ pub struct Assembler {
     /// By frame, then by sensor.
     open: BTreeMap<i64, BTreeMap<usize, RangeImage>>,
     closed: VecDeque<Frame>,
-    /// Time and time of reception of the packet taken last whose clock did not jump.
-    now: Option<(i64, i64)>,
+    /// Where the packets so far put the time.
+    now: Option<Now>,
     /// Where the packet before would have taken the time, more than a frame ahead: believed when a second says so.
     leap_ns: Option<i64>,
     /// From the clock that sensors share to the time of the frames.
@@ -181,7 +181,7 @@ impl Assembler {
             health.packets_not_understood += 1;
             return;
         }
-        let leaps = self.now.is_some_and(|(now_ns, _)| first_ns.saturating_sub(now_ns) > STEP_NS);
+        let leaps = self.now.is_some_and(|now| first_ns.saturating_sub(now.time_ns) > STEP_NS);
         if leaps && !self.leap_ns.is_some_and(|leap_ns| near(first_ns, leap_ns)) {
             health.clock_jumps += u64::from(!jumped);
             self.leap_ns = Some(first_ns);
@@ -193,7 +193,7 @@ impl Assembler {
         let before_ns = intake.clock.newest_ns;
         intake.clock.newest_ns = before_ns.max(Some(last_ns));
         if !jumped {
-            self.now = Some((first_ns, received_ns));
+            self.now = Some(Now::after(self.now, first_ns, received_ns));
         }
         let (next, number) = (self.next, frame_number(self.origin_ns, first_ns));
         self.store(sensor, &model, before_ns, health);

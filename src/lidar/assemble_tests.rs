@@ -329,6 +329,27 @@ fn a_host_that_stands_still_makes_no_jump_of_the_time_of_arrival() {
     frames[1..28].iter().for_each(assert_whole);
 }
 
+/// It was taken for a clock that was set: from then on the frames were older than they said, by as much as was lost, and a tracker
+/// on another host had no use for them.
+#[test]
+fn a_host_that_stood_still_for_seconds_goes_on_in_time() {
+    // What comes in two seconds finds room to wait, what comes in the third is lost.
+    let stood_still = |mut all: Vec<(usize, Packet)>| {
+        all.retain(|(_, p)| !(3000 * MS..4000 * MS).contains(&p.time_ns));
+        for (_, packet) in all.iter_mut().filter(|(_, p)| (1000 * MS..3000 * MS).contains(&p.time_ns)) {
+            packet.time_ns = 4000 * MS;
+        }
+        all
+    };
+    for west in [packets(0, 6000 * MS), Vec::new()] {
+        let (frames, health) = assemble(&stood_still(both(packets(0, 6000 * MS), west)));
+        let indices: Vec<u64> = frames.iter().map(|frame| frame.index).collect();
+        assert_eq!((indices.first(), indices.last()), (Some(&0), Some(&59)), "{health:?}");
+        assert!((30..40).filter(|index| indices.contains(index)).count() < 3, "{indices:?}");
+        assert_eq!(health.clock_jumps, 1, "all time leaps");
+    }
+}
+
 #[test]
 fn sensors_that_share_a_clock_stay_together_when_it_is_set() {
     let of_sensor = |jump_ns: i64| {

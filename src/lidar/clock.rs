@@ -13,6 +13,38 @@ const FASTER: i64 = 100;
 /// still.
 const WAIT_NS: i64 = 10 * STEP_NS;
 
+/// Where the packets so far put the time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Now {
+    /// Of the packet taken last whose clock did not jump.
+    pub time_ns: i64,
+    received_ns: i64,
+    /// From its time to its reception, of the packet that came soonest: [`SLOWER`] lets it be forgotten.
+    soonest_ns: i64,
+}
+
+impl Now {
+    /// After a packet of this time.
+    pub fn after(before: Option<Self>, time_ns: i64, received_ns: i64) -> Self {
+        let took_ns = received_ns.saturating_sub(time_ns);
+        let soonest_ns = before.map_or(took_ns, |now| {
+            let passed_ns = received_ns.saturating_sub(now.received_ns).max(0);
+            now.soonest_ns.saturating_add(passed_ns / SLOWER).min(took_ns)
+        });
+        Self { time_ns, received_ns, soonest_ns }
+    }
+
+    /// The time of a packet that was under way for as long as the last one.
+    fn expected_ns(self, received_ns: i64) -> i64 {
+        self.time_ns.saturating_add(received_ns.saturating_sub(self.received_ns).max(0))
+    }
+
+    /// The time of a packet that was under way for as long as the one that came soonest.
+    fn prompt_ns(self, received_ns: i64) -> i64 {
+        received_ns.saturating_sub(self.soonest_ns)
+    }
+}
+
 /// One sensor's clock.
 #[derive(Debug)]
 pub(super) struct Clock {
@@ -29,13 +61,15 @@ impl Clock {
     }
 
     /// The shift for a packet whose first and last column this clock puts at `own_ns`, and whether the clock jumped.
-    /// `now` is the time and the time of reception of the packet before, of any sensor; `shared_shift_ns` that of the
-    /// clock that sensors share.
+    /// `now` is of the packet before, of any sensor; `shared_shift_ns` that of the clock that sensors share.
+    ///
+    /// A host that stood still receives at once what waited for it, and what did not find room is lost: the first packet after
+    /// the gap is as prompt as any before it stood still. Its clock did not jump.
     pub fn settle(
         &self,
         own_ns: (i64, i64),
         received_ns: i64,
-        now: Option<(i64, i64)>,
+        now: Option<Now>,
         shared_shift_ns: &mut i64,
     ) -> (i64, bool) {
         let (first_ns, last_ns) = own_ns;
@@ -44,10 +78,11 @@ impl Clock {
         if self.source == TimeSource::Arrival {
             return self.of_arrival(last_ns, received_ns, runs_on);
         }
-        let Some((now_ns, now_received_ns)) = now else { return (0, false) };
-        let expected_ns = now_ns.saturating_add(received_ns.saturating_sub(now_received_ns).max(0));
+        let Some(now) = now else { return (0, false) };
+        let expected_ns = now.expected_ns(received_ns);
         let shared = self.source == TimeSource::Ptp;
-        if runs_on || near(time_ns, expected_ns) {
+        let catches_up = time_ns > now.time_ns && near(time_ns, now.prompt_ns(received_ns));
+        if runs_on || near(time_ns, expected_ns) || catches_up {
             (self.shift_ns, false)
         } else if shared && near(first_ns.saturating_add(*shared_shift_ns), expected_ns) {
             (*shared_shift_ns, true)

@@ -9,35 +9,12 @@
 use std::collections::BTreeMap;
 
 use super::level::Level;
+use super::report::{Binding, Report, Served};
 use crate::Site;
 use crate::geometry::DVec2;
 use crate::radio::Loss;
 use crate::site::{Radio, Ue};
 use crate::track::Track;
-
-/// What one access point heard of one device.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Report {
-    /// When it was heard.
-    pub time_ns: i64,
-    /// Which access point of the site.
-    pub access_point: usize,
-    /// The network's name of the device.
-    pub device: u64,
-    /// Received power of the reference signal, dBm.
-    pub power_dbm: f64,
-}
-
-/// How likely a device is carried by a person.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Binding {
-    /// As its reports name it.
-    pub device: u64,
-    /// The person.
-    pub track: u64,
-    /// The probability. Those of a device sum to less than 1 where it may be with nobody who is followed.
-    pub p: f64,
-}
 
 /// What a link lost as it was heard, if the device is carried by the person.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,8 +38,9 @@ impl Heard {
 
 /// Less likely bindings are not told.
 const LEAST_P: f64 = 0.01;
-/// Who carries a device at least so likely is heard with it.
+/// Who carries a device at least so likely is heard with it, and is served as it is.
 const MAY_P: f64 = 0.2;
+const SERVED_P: f64 = 0.5;
 /// Devices that are followed at most; reports of others are skipped.
 const DEVICES_MAX: usize = 4096;
 /// Reports that wait for a frame at most: half a second of every device and eight access points, every 20 ms, would be more, but no
@@ -123,6 +101,8 @@ struct Seen {
 #[derive(Debug, Clone)]
 struct Device {
     heard_ns: i64,
+    /// The last report of an access point that serves it: when, and which.
+    served: Option<(i64, usize)>,
     /// State 0 is nobody; the others are the tracks of `tracks`.
     p: Vec<f64>,
     /// The same, given that most people carry one device.
@@ -210,6 +190,9 @@ impl Binder {
             let unheard = || Device::new(report.time_ns, self.radios.len());
             let device = self.devices.entry(report.device).or_insert_with(unheard);
             device.heard_ns = device.heard_ns.max(report.time_ns);
+            if report.serves {
+                device.served = device.served.max(Some((report.time_ns, report.access_point)));
+            }
         }
         self.devices.retain(|_, device| time_ns - device.heard_ns < FORGOTTEN_NS);
         let Some(now) = self.frames.last() else { return };
@@ -231,6 +214,21 @@ impl Binder {
             device.note(of_device(&heard, *name), &self.frames, self.radios.len(), &mut self.heard);
         }
         self.heard.sort_by_key(|heard| (heard.access_point, heard.track));
+    }
+
+    /// Which access points serve whom, as far as reports said so and it is known who carries their devices.
+    ///
+    /// ```
+    /// use umbracast::{Config, radio::Binder};
+    ///
+    /// assert_eq!(Binder::new(&Config::default().site).served().count(), 0, "nothing was heard");
+    /// ```
+    pub fn served(&self) -> impl Iterator<Item = Served> {
+        self.devices.values().filter_map(|device| {
+            let (heard_ns, access_point) = device.served?;
+            let state = (1..device.told.len()).find(|&state| device.told[state] > SERVED_P)?;
+            Some(Served { track: device.tracks[state - 1], access_point, heard_ns })
+        })
     }
 
     /// Keeps what a frame says, and of the frames before as many as late reports may ask for.
@@ -325,6 +323,7 @@ impl Device {
     fn new(heard_ns: i64, access_points: usize) -> Self {
         Self {
             heard_ns,
+            served: None,
             p: vec![1.0],
             told: vec![1.0],
             tracks: Vec::new(),

@@ -72,6 +72,8 @@ fn heard(seconds: i64, named: impl Fn(u64, i64) -> Option<u64>) -> (Binder, Vec<
                     access_point,
                     device: 900 - person,
                     power_dbm: power_dbm.round(),
+                    // Served by the access point of his own number.
+                    serves: access_point as u64 == person % 4,
                 });
             }
         }
@@ -97,6 +99,10 @@ fn devices_are_found_on_those_who_carry_them_after_a_blind_start() {
     }
     let sums = bindings.chunk_by(|a, b| a.device == b.device).map(|of| of.iter().map(|b| b.p).sum::<f64>());
     assert!(sums.into_iter().all(|sum| sum < 1.0 + 1e-9));
+    let served: Vec<(u64, usize)> = binder.served().map(|of| (of.track, of.access_point)).collect();
+    let mut expected: Vec<(u64, usize)> = (0..PEOPLE).map(|person| (person, person as usize % 4)).collect();
+    expected.reverse(); // Devices are numbered the other way round.
+    assert_eq!(served, expected);
     // Those before the first frame.
     assert_eq!(binder.skipped(), PEOPLE * 4 * 5);
 }
@@ -133,7 +139,7 @@ fn a_device_is_found_again_whose_person_was_lost_and_found_under_another_id() {
 #[test]
 fn broken_reports_are_counted_and_cost_nobody_anything() {
     let mut binder = Binder::new(&site());
-    let whole = Report { time_ns: 0, access_point: 0, device: 1, power_dbm: -60.0 };
+    let whole = Report { time_ns: 0, access_point: 0, device: 1, power_dbm: -60.0, serves: false };
     let year_ns = 365 * 86_400 * 1_000_000_000;
     binder.hear(&[
         Report { access_point: 9, ..whole },
@@ -151,7 +157,7 @@ fn broken_reports_are_counted_and_cost_nobody_anything() {
 #[test]
 fn one_batch_of_devices_too_many_is_skipped_beyond_those_that_are_followed() {
     let (mut binder, mut bindings) = (Binder::new(&site()), Vec::new());
-    let report = |device| Report { time_ns: 0, access_point: 0, device, power_dbm: -60.0 };
+    let report = |device| Report { time_ns: 0, access_point: 0, device, power_dbm: -60.0, serves: false };
     let many: Vec<Report> = (0..2 * DEVICES_MAX as u64).map(report).collect();
     binder.hear(&many);
     binder.bind(0, &[somebody(1, DVec2::ZERO, DVec2::ZERO)], &[Loss::clear(0, 1)], &mut bindings);

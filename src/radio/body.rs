@@ -20,9 +20,6 @@ const ADULT_M: [f32; 2] = [0.5, 1.75];
 pub(super) struct Wave {
     per_wavelength: f32,
     model: Model,
-    /// A body loses nothing worth telling when its axis is farther from a path, and when the path is so high above its head.
-    pub(super) beside_m: f64,
-    pub(super) above_m: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -38,15 +35,10 @@ enum Model {
     ThreeEdges,
 }
 
-/// No trunk that carries nothing reaches farther from its axis, whatever its width scale.
-const WIDEST_M: f64 = 0.5;
-
 impl Wave {
     /// Of links up to so long.
     pub(super) fn new(radio: &Radio, longest_m: f64) -> Self {
         let wavelength_m = radio.wavelength_m();
-        // The first Fresnel zone half way, sqrt(lambda d / 4): half a zone beyond an edge a path is as free as any.
-        let zone_m = 0.5 * (wavelength_m * longest_m).sqrt();
         let per_wavelength = (1.0 / wavelength_m) as f32;
         let model = match radio.loss_model {
             LossModel::Kirchhoff => Model::Kirchhoff(Arc::new(Table::new(per_wavelength, longest_m as f32))),
@@ -56,7 +48,22 @@ impl Wave {
             LossModel::KnifeEdges => Model::KnifeEdges,
             LossModel::ThreeEdges => Model::ThreeEdges,
         };
-        Self { per_wavelength, model, beside_m: WIDEST_M + 1.5 * zone_m, above_m: 1.5 * zone_m }
+        Self { per_wavelength, model }
+    }
+
+    /// Half of what a body shows of itself at most, whichever way it faces.
+    #[inline(always)]
+    pub(super) fn half_m(scale: f32) -> f32 {
+        larger(TRUNK_M[1], 0.5 * ADULT_M[0]) * scale
+    }
+
+    /// So far beyond an edge a body costs nothing that is worth telling, at a place of a path that is so long.
+    pub(super) fn zone_m(&self, from_start_m: f64, length_m: f64) -> f64 {
+        // Of the table's widest slice; Fresnel's parameter is sqrt(2 / lambda (1 / d1 + 1 / d2)) for a metre.
+        const OF_SLICE: f64 = 1.1;
+        let product_m2 = from_start_m * (length_m - from_start_m).max(0.0);
+        let nu_m = (product_m2 / (2.0 * f64::from(self.per_wavelength) * length_m)).sqrt();
+        OF_SLICE * f64::from(CLEAR_NU) * nu_m
     }
 
     /// How much wider a body is than a usual one.
@@ -69,7 +76,7 @@ impl Wave {
     #[inline(always)]
     pub(super) fn is_clear(&self, scale: f32, aside_m: f32, from_tx_m: f32, to_rx_m: f32) -> bool {
         // Beyond the trunk's edge by CLEAR_NU of Fresnel's parameter, sqrt(2 / lambda (1 / d1 + 1 / d2)), squared.
-        let beyond_m = aside_m.abs() - larger(TRUNK_M[1], 0.5 * ADULT_M[0]) * scale;
+        let beyond_m = aside_m.abs() - Self::half_m(scale);
         let lengths_m = from_tx_m + to_rx_m;
         let is_beside = (beyond_m > 0.0)
             & (2.0 * self.per_wavelength * lengths_m * beyond_m * beyond_m

@@ -104,24 +104,40 @@ impl Leg {
 }
 
 impl Antenna {
-    /// Whether a body within one disc may cost a path from a place to another disc something.
-    pub(super) fn meets(&self, from_m: DVec3, aim: Disc, aim_z: f64, body: Disc, top_m: f64) -> bool {
+    /// Whether a body within one disc, so wide and so high, may cost a path from a place to another disc something. Errs on the side
+    /// of asking the samples: [`Wave::is_clear`] of none that is left out would be false.
+    pub(super) fn meets(
+        &self,
+        from_m: DVec3,
+        aim: Disc,
+        aim_z: f64,
+        body: Disc,
+        half_m: f64,
+        top_m: f64,
+    ) -> bool {
         let start_m: DVec2 = from_m.truncate();
         let way_m = aim.center_m - start_m;
-        let length_m = way_m.length();
-        let (along, off_m) = (way_m / length_m.max(1e-9), body.center_m - start_m);
-        let from_start_m = along.dot(off_m);
-        let room_m = body.radius_m + self.wave.beside_m;
-        if from_start_m < -room_m || from_start_m > length_m + aim.radius_m + room_m {
+        let length_m = way_m.length().max(1e-9);
+        let (along, off_m) = (way_m / length_m, body.center_m - start_m);
+        let (from_start_m, aside_m) = (along.dot(off_m), along.perp_dot(off_m).abs());
+        // The way to a sample of the aim turns by as much as this, and takes the body's place along it with it.
+        let turn = aim.radius_m / length_m;
+        let along_m = body.radius_m + turn * aside_m + turn * turn * off_m.length();
+        let longest_m = length_m + aim.radius_m;
+        let [near_m, far_m] = [from_start_m - along_m, from_start_m + along_m];
+        if far_m < 0.0 || near_m > longest_m {
             return false;
         }
-        let far = ((from_start_m + room_m) / length_m.max(1e-9)).clamp(0.0, 1.0);
-        let near = ((from_start_m - room_m) / (length_m + aim.radius_m)).clamp(0.0, 1.0);
-        if along.perp_dot(off_m).abs() > room_m + far * aim.radius_m {
+        // Where the zone is widest between the two.
+        let widest_m = (0.5 * longest_m).max(near_m).min(far_m).clamp(0.0, longest_m);
+        let zone_m = self.wave.zone_m(widest_m, longest_m);
+        if aside_m > body.radius_m + half_m + zone_m + turn * from_start_m.abs() {
             return false;
         }
+        let far = (far_m / (length_m - aim.radius_m).max(1e-9)).clamp(0.0, 1.0);
+        let near = (near_m / longest_m).clamp(0.0, 1.0);
         let rises_m = aim_z - from_m.z;
         let lowest_m = from_m.z + (rises_m * far).min(rises_m * near);
-        lowest_m <= top_m + self.wave.above_m
+        lowest_m <= top_m + zone_m
     }
 }

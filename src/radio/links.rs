@@ -89,6 +89,8 @@ pub struct Fader {
     spreads: BTreeMap<(usize, u64), Vec<f32>>,
     legs: Legs,
     meetings: Vec<Meeting>,
+    /// By person: half of what the widest sample shows.
+    halves_m: Vec<f64>,
     /// By leg: one past its last meeting.
     ends: Vec<usize>,
     /// By person: cosine and sine of the turn of each sample's trunk from the heading. Empty until it is asked for.
@@ -145,6 +147,7 @@ impl Fader {
             spreads: BTreeMap::new(),
             legs: Legs::default(),
             meetings: Vec::new(),
+            halves_m: Vec::new(),
             ends: Vec::new(),
             turns: Vec::new(),
             losses_db: Vec::new(),
@@ -210,20 +213,26 @@ impl Fader {
     fn meet(&mut self, people: &[Trajectories]) {
         self.meetings.clear();
         self.ends.clear();
+        self.halves_m.clear();
+        self.halves_m.extend(people.iter().map(|p| {
+            let scales = p.height_m.iter().zip(&p.width_scale).map(|(h, width)| Wave::scale(*h, *width));
+            f64::from(Wave::half_m(scales.fold(0.0, larger)))
+        }));
         let [reach_m, rises_m] = self.ue.reach_m();
         for leg in &self.legs.legs {
             let Some(antenna) = &self.radios[leg.access_point] else { continue };
             let q = &people[leg.owner];
             let heights_m = [0, 1].map(|most| self.ue.height_share * q.heights_m[most] + q.floors_m[most]);
             let lowest_m = leg.lowest_end_m([heights_m[0] - rises_m, heights_m[1] + rises_m]);
-            let near = |aim: Disc, p: &Trajectories, body: Disc| {
+            let near = |aim: Disc, p: usize, body: Disc| {
                 let aim = Disc { center_m: leg.end_m(aim.center_m), radius_m: aim.radius_m + reach_m };
-                antenna.meets(leg.start_m, aim, lowest_m, body, p.floors_m[1] + p.heights_m[1])
+                let top_m = people[p].floors_m[1] + people[p].heights_m[1];
+                antenna.meets(leg.start_m, aim, lowest_m, body, self.halves_m[p], top_m)
             };
             for (body, p) in people.iter().enumerate() {
                 let own = body == leg.owner;
                 let is_behind = leg.mirror.is_some_and(|of| of.parts(q.second.center_m, p.second.center_m));
-                if (own && reach_m == 0.0) || is_behind || !near(q.second, p, p.second) {
+                if (own && reach_m == 0.0) || is_behind || !near(q.second, body, p.second) {
                     continue;
                 }
                 for step in 0..MOMENTS {
@@ -231,7 +240,7 @@ impl Fader {
                         center_m: of.mean_m[step],
                         radius_m: of.spread[step].radius_m,
                     };
-                    if own || near(at(q), p, at(p)) {
+                    if own || near(at(q), body, at(p)) {
                         self.meetings.push(Meeting { body, step });
                     }
                 }

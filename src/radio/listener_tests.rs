@@ -32,6 +32,7 @@ fn step<'a>(
             access_point: 0,
             device,
             power_dbm: in_sight_dbm - lost_db.unwrap_or_default(),
+            serves: false,
         };
         let reports: Vec<Report> = (0..5).map(report).filter(|report| report.time_ns >= 0).collect();
         pipeline.hear(if lost_db.is_some() { &reports } else { &[] });

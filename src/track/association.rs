@@ -3,16 +3,23 @@
 //! The assignment is written by hand. Its algorithm allows rows without a partner and forbidden pairs, and looks at no others than
 //! those that are allowed; crates for square matrices have none of this.
 
+use super::frontier::{Frontier, refill, smaller};
+use super::shortlist::{Lists, Pair};
 use crate::detect::Detection;
+use crate::elementary::wide;
 
 /// A pair that is not allowed.
 pub const FORBIDDEN: f64 = f64::INFINITY;
 
+/// Columns are taken from a row so many times for each row, before what is left is left to paths: prices may fall by ever less.
+/// A bid is cheap, and the last paths lead over half of a matrix.
+const BIDS: usize = 32;
+
 /// Gives rows to columns so that the sum of the costs is the least; `cost(r, c)` may be [`FORBIDDEN`], and a row
 /// that stays alone costs nothing, so only pairs below zero are made. Returns each row's column.
 ///
-/// Row reduction, then shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016) over the pairs below zero. Which of equal
-/// sums is taken depends on the order of rows and columns alone.
+/// Row reduction, then shortest augmenting paths with potentials (Jonker and Volgenant 1987; Crouse 2016) over the pairs below
+/// zero. Which of equal sums is taken depends on the order of rows and columns alone.
 pub fn optimal(rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
     let mut assignment = Assignment::default();
     assignment.optimal(rows, columns, cost);
@@ -25,24 +32,15 @@ pub struct Assignment {
     /// Each row's column.
     pub column_of: Vec<Option<usize>>,
     row_of: Vec<Option<usize>>,
-    /// Pairs below zero, row after row, and where each row's begin.
-    pairs: Vec<Pair>,
-    starts: Vec<usize>,
+    lists: Lists,
     row_price: Vec<f64>,
+    /// From 0 down.
     column_price: Vec<f64>,
-    /// Of the path that is looked for: from its row to every column, over which row, and whether that is settled.
-    distance: Vec<f64>,
+    /// Of the path that is looked for: the columns within reach, the row that each is reached from, and those that are settled with
+    /// their distances.
+    frontier: Frontier,
     came_from: Vec<usize>,
-    done: Vec<bool>,
-    /// Columns that are not infinitely far; those that are settled come first.
-    reached: Vec<usize>,
-}
-
-/// A column that a row may have.
-#[derive(Debug, Clone, Copy)]
-struct Pair {
-    column: usize,
-    cost: f64,
+    settled: Vec<(usize, f64)>,
 }
 
 /// Where a path ends.
@@ -56,47 +54,63 @@ enum End {
 impl Assignment {
     /// [`optimal`], into `column_of`. Every cost is asked once.
     pub fn optimal(&mut self, rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) {
-        self.pairs.clear();
-        self.starts.clear();
+        self.lists.clear();
         for r in 0..rows {
-            self.starts.push(self.pairs.len());
-            let pairs = (0..columns).map(|column| Pair { column, cost: cost(r, column) });
-            self.pairs.extend(pairs.filter(|pair| pair.cost < 0.0));
+            self.lists.add((0..columns).map(|c| cost(r, c)));
         }
-        self.starts.push(self.pairs.len());
+        self.solve(&[], columns);
+    }
+
+    /// [`optimal`] of a matrix that has so many columns, row after row. Of a long row only the cheapest pairs are looked at, and
+    /// more of them as soon as one of the others could be made (after LAPMOD: Volgenant 1996). The sum is the least all the same.
+    pub fn of_matrix(&mut self, costs: &[f64], columns: usize) {
+        self.lists.clear();
+        self.lists.add_cheapest(costs, columns);
+        self.solve(costs, columns);
+    }
+
+    wide! {
+        /// Gives rows to columns. `costs` is the matrix that the lists are of; nothing is asked of it where they are complete.
+        fn solve(&mut self, costs: &[f64], columns: usize) = solve_wide or solve_portable
+    }
+
+    #[inline(always)]
+    fn solve_portable(&mut self, costs: &[f64], columns: usize) {
+        let rows = self.lists.len();
         refill(&mut self.column_of, rows, None);
-        refill(&mut self.row_of, columns, None);
         refill(&mut self.row_price, rows, 0.0);
         refill(&mut self.column_price, columns, 0.0);
-        refill(&mut self.distance, columns, f64::INFINITY);
+        refill(&mut self.row_of, columns, None);
         refill(&mut self.came_from, columns, 0);
-        refill(&mut self.done, columns, false);
-        self.outbid(rows);
+        self.outbid(costs);
         for r in 0..rows {
-            if self.column_of[r].is_none() && self.starts[r] < self.starts[r + 1] {
-                self.augment(r);
+            if self.column_of[r].is_none() && !self.lists.pairs(r).is_empty() {
+                self.augment(r, costs);
             }
         }
     }
 
-    /// Augmenting row reduction: every row takes the column that it wants most, whose price falls until the row's second choice is as
-    /// good. A row that had the column then looks for another. That settles most conflicts without a path.
-    fn outbid(&mut self, rows: usize) {
-        let Self { column_of, row_of, pairs, starts, row_price, column_price, .. } = self;
-        // Prices may fall by ever less. What is left then is left to paths.
-        let mut more = 4 * rows;
+    /// Augmenting row reduction: every row takes the column that it wants most, whose price falls until the row's second choice
+    /// is as good. A row that had the column then looks for another. That settles most conflicts without a path.
+    #[inline(always)]
+    fn outbid(&mut self, costs: &[f64]) {
+        let Self { column_of, row_of, row_price, column_price, lists, .. } = self;
+        let rows = column_of.len();
+        let mut more = BIDS * rows;
         for first in 0..rows {
             let mut row = first;
             loop {
                 // To stay alone costs nothing and is free to all.
                 let (mut best, mut second, mut wanted) = (0.0, 0.0, None);
-                for &Pair { column, cost } in &pairs[starts[row]..starts[row + 1]] {
+                for &Pair { column, cost } in lists.pairs(row) {
                     let asked = cost - column_price[column];
-                    if asked < best {
-                        (second, best, wanted) = (best, asked, Some(column));
-                    } else if asked < second {
-                        second = asked;
-                    }
+                    second = smaller(if asked < best { best } else { asked }, second);
+                    wanted = if asked < best { Some(column) } else { wanted };
+                    best = smaller(asked, best);
+                }
+                if second > lists.others(row) {
+                    lists.extend(row, costs, column_price);
+                    continue;
                 }
                 row_price[row] = second;
                 let Some(column) = wanted else { break };
@@ -114,74 +128,92 @@ impl Assignment {
     }
 
     /// Gives a row a column, or leaves one alone, whichever costs least together.
-    fn augment(&mut self, start: usize) {
-        let (end, length) = self.shortest(start);
-        self.row_price[start] += length;
-        for &c in self.reached.iter().take_while(|&&c| self.done[c]) {
-            if let Some(owner) = self.row_of[c] {
-                self.row_price[owner] += length - self.distance[c];
-                self.column_price[c] -= length - self.distance[c];
+    #[inline(always)]
+    fn augment(&mut self, start: usize, costs: &[f64]) {
+        let (end, length) = self.shortest(start, costs);
+        let Self { column_of, row_of, row_price, column_price, came_from, settled, .. } = self;
+        row_price[start] += length;
+        for (c, distance) in settled.drain(..) {
+            if let Some(owner) = row_of[c] {
+                row_price[owner] += length - distance;
+                column_price[c] -= length - distance;
             }
         }
         let mut column = match end {
             End::Free(column) => Some(column),
-            End::Alone(row) => self.column_of[row].take(),
+            End::Alone(row) => column_of[row].take(),
         };
         while let Some(c) = column {
-            let row = self.came_from[c];
-            self.row_of[c] = Some(row);
-            column = self.column_of[row].replace(c);
-        }
-        for c in self.reached.drain(..) {
-            (self.distance[c], self.done[c]) = (f64::INFINITY, false);
+            let row = came_from[c];
+            row_of[c] = Some(row);
+            column = column_of[row].replace(c);
         }
     }
 
     /// Dijkstra from a row over reduced costs to the nearest column that is free, or row that may as well stay alone.
-    fn shortest(&mut self, start: usize) -> (End, f64) {
-        let Self {
-            row_of, pairs, starts, row_price, column_price, distance, came_from, done, reached, ..
-        } = self;
-        let (mut row, mut so_far, mut settled) = (start, 0.0, 0);
+    #[inline(always)]
+    fn shortest(&mut self, start: usize, costs: &[f64]) -> (End, f64) {
+        self.frontier.begin(self.column_price.len());
+        let (mut row, mut so_far) = (start, 0.0);
         let (mut alone, mut alone_row) = (f64::INFINITY, start);
+        // How near the nearest end is that is known, and how near pairs may lead that are not listed.
+        let (mut end, mut others) = (f64::INFINITY, f64::INFINITY);
         loop {
-            if so_far - row_price[row] < alone {
-                (alone, alone_row) = (so_far - row_price[row], row);
+            let off = so_far - self.row_price[row];
+            if off < alone {
+                (alone, alone_row) = (off, row);
+                end = smaller(end, alone);
             }
-            let off = so_far - row_price[row];
-            for &Pair { column, cost } in &pairs[starts[row]..starts[row + 1]] {
-                let through = off + cost - column_price[column];
-                if through < distance[column] && !done[column] {
-                    if distance[column] == f64::INFINITY {
-                        reached.push(column);
-                    }
-                    (distance[column], came_from[column]) = (through, row);
-                }
+            self.look(row, off, &mut end);
+            others = smaller(others, off + self.lists.others(row));
+            let mut nearest = self.frontier.nearest();
+            while others < nearest.map_or(alone, |(distance, _)| smaller(distance, alone)) {
+                others = self.look_again(start, others, costs, &mut end);
+                nearest = self.frontier.nearest();
             }
-            let nearer = |a: usize, b: usize| {
-                let (a, b) = ((distance[reached[a]], reached[a]), (distance[reached[b]], reached[b]));
-                a.0 < b.0 || (a.0 == b.0 && a.1 < b.1)
-            };
-            let nearest = (settled..reached.len()).reduce(|a, b| if nearer(b, a) { b } else { a });
-            let Some(nearest) = nearest.filter(|&nearest| distance[reached[nearest]] <= alone) else {
+            let Some((distance, column)) = nearest.filter(|&(distance, _)| distance <= alone) else {
                 return (End::Alone(alone_row), alone);
             };
-            reached.swap(settled, nearest);
-            let column = reached[settled];
-            so_far = distance[column];
-            match row_of[column] {
-                Some(owner) => row = owner,
-                None => return (End::Free(column), so_far),
-            }
-            done[column] = true;
-            settled += 1;
+            so_far = distance;
+            let Some(owner) = self.row_of[column] else { return (End::Free(column), so_far) };
+            row = owner;
+            self.frontier.settle(column);
+            self.settled.push((column, so_far));
         }
     }
-}
 
-fn refill<T: Clone>(memory: &mut Vec<T>, n: usize, value: T) {
-    memory.clear();
-    memory.resize(n, value);
+    /// Shortens paths by going on over a row. No path is kept that is longer than to the nearest end.
+    #[inline(always)]
+    fn look(&mut self, row: usize, off: f64, end: &mut f64) {
+        let Self { row_of, column_price, lists, frontier, came_from, .. } = self;
+        for &Pair { column, cost } in lists.pairs(row) {
+            let through = off + cost - column_price[column];
+            if through <= *end && frontier.shorten(column, through) {
+                came_from[column] = row;
+                if row_of[column].is_none() {
+                    *end = through;
+                }
+            }
+        }
+    }
+
+    /// Lists more pairs of the rows whose others may lead as near as `least`. Returns how near others may lead then.
+    #[cold]
+    fn look_again(&mut self, start: usize, least: f64, costs: &[f64], end: &mut f64) -> f64 {
+        let mut others = f64::INFINITY;
+        for i in 0..=self.settled.len() {
+            let from = i.checked_sub(1).map(|last| self.settled[last]);
+            let (row, so_far) =
+                from.map_or((start, 0.0), |(c, so_far)| (self.row_of[c].unwrap_or(start), so_far));
+            let off = so_far - self.row_price[row];
+            if off + self.lists.others(row) <= least {
+                self.lists.extend(row, costs, &self.column_price);
+                self.look(row, off, end);
+            }
+            others = smaller(others, off + self.lists.others(row));
+        }
+        others
+    }
 }
 
 /// Indices of the detections that are numbers, in an order that does not depend on the one they came in.
@@ -258,6 +290,44 @@ mod tests {
             }
             let best = brute_force(&cost, 0, &mut vec![false; columns]);
             assert!((sum - best).abs() < 1e-9, "{sum} against {best} for {cost:?}");
+        }
+    }
+
+    /// What an assignment costs, if it gives no column twice.
+    fn sum(costs: &[f64], columns: usize, column_of: &[Option<usize>]) -> f64 {
+        let mut taken = vec![false; columns];
+        let pairs = column_of.iter().enumerate().filter_map(|(r, c)| c.map(|c| (r, c)));
+        pairs
+            .map(|(r, c)| {
+                assert!(!std::mem::replace(&mut taken[c], true), "column {c} given twice");
+                costs[r * columns + c]
+            })
+            .sum()
+    }
+
+    #[test]
+    fn a_matrix_costs_the_same_whether_all_pairs_are_looked_at_or_the_cheapest() {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(2);
+        let mut short = Assignment::default();
+        let kinds: [fn(f64, f64, f64) -> f64; 6] = [
+            |noise, _, _| noise - 1.0,
+            // All want the same, and lists of the cheapest are too short.
+            |noise, r, c| -r * c + 1e-3 * noise,
+            |noise, _, c| c - 40.0 + 0.1 * noise,
+            // Many equal ones.
+            |noise, _, _| (5.0 * noise).floor() - 4.0,
+            |_, _, _| -1.0,
+            |noise, r, c| if noise < 0.2 { FORBIDDEN } else { (r - c).abs() - 20.0 + noise },
+        ];
+        let sides = [(0, 5), (5, 0), (3, 200), (200, 3), (40, 97), (97, 40), (120, 120)];
+        let all = sides.iter().flat_map(|side| kinds.map(|kind| (*side, kind)));
+        for ((rows, columns), kind) in all.cycle().take(10 * sides.len() * kinds.len()) {
+            let cost = |i: usize, noise: f64| kind(noise, (i / columns) as f64, (i % columns) as f64);
+            let costs: Vec<f64> = (0..rows * columns).map(|i| cost(i, rng.random_range(0.0..1.0))).collect();
+            short.of_matrix(&costs, columns);
+            let all = optimal(rows, columns, |r, c| costs[r * columns + c]);
+            let (found, least) = (sum(&costs, columns, &short.column_of), sum(&costs, columns, &all));
+            assert!((found - least).abs() < 1e-9 * (1.0 + least.abs()), "{found}, not {least}");
         }
     }
 

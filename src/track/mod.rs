@@ -4,6 +4,8 @@
 
 mod remembered;
 mod gaussian;
+mod frontier;
+mod shortlist;
 #[doc(hidden)] // Assignments, for scores that match tracks with people.
 pub mod association;
 #[doc(hidden)] // Measurements, for the fit of its numbers.

@@ -62,7 +62,8 @@ pub fn empty_frames(
     };
     let Some(empty) = empty else { return Ok((Vec::new(), None)) };
     tell_captures(&empty, site, common);
-    empty.all_frames(site, health)
+    let all: Vec<usize> = (0..site.sensors.len()).collect();
+    empty.empty_frames(site, &all, health)
 }
 
 /// What access points heard in a scene: as a table has it, else as the recording holds it.

@@ -128,6 +128,8 @@ fn reports_of_a_file_say_who_carries_a_device() {
         let words = ["run", text(&sim), "--site", text(&site), "--csv", "--out", text(out), "--reports"];
         umbracast(&[&words[..], &[text(reports)]].concat()).output().expect("runs")
     };
+    let of_access_points = fs::read_to_string(&site).expect("was written");
+    fs::write(&site, of_access_points + "[site.handover]\n").expect("writes");
     // Device 17 comes nearer to `north` as nobody but the second person does, who walks away from `side`.
     let reports = folder.join("reports.csv");
     let heard = |k: i64| {
@@ -135,11 +137,8 @@ fn reports_of_a_file_say_who_carries_a_device() {
         let (x_m, y_m) = (1.0 - s, 0.3);
         let loss_db = |ap: [f64; 2]| 20.0 * ((ap[0] - x_m).hypot(ap[1] - y_m)).log10();
         let time_ns = k * 100_000_000;
-        format!(
-            "{time_ns},17,side,{:.2}\n{time_ns},17,north,{:.2}\n",
-            -30.0 - loss_db([14.0, 0.0]),
-            -30.0 - loss_db([0.0, 14.0])
-        )
+        let powers = [-30.0 - loss_db([14.0, 0.0]), -30.0 - loss_db([0.0, 14.0])];
+        format!("{time_ns},17,side,{:.2}\n{time_ns},17,north,{:.2}\n", powers[0], powers[1])
     };
     let rows: String = (0..30).map(heard).collect();
     fs::write(&reports, format!("time_ns,device,access_point,power_dbm\n{rows}")).expect("writes");
@@ -150,6 +149,20 @@ fn reports_of_a_file_say_who_carries_a_device() {
     assert!(!bindings.is_empty() && bindings.iter().all(|row| row.device == 17), "{bindings:?}");
     let csv = fs::read_to_string(out.join("bindings.csv")).expect("a table");
     assert!(csv.starts_with("scene,frame,time_ns,device,track,p\n"), "{csv:.200}");
+    // Decisions about whoever carries it begin with the access point that is said to serve it.
+    let carrier = bindings.iter().rfind(|row| row.p > 0.5).expect("somebody carries it").track;
+    for (index, name) in (0..).zip(&names) {
+        let rows: String =
+            rows.lines().map(|row| format!("{row},{}\n", row.contains(name.as_str()))).collect();
+        fs::write(&reports, format!("time_ns,device,access_point,power_dbm,serves\n{rows}")).expect("writes");
+        let out = folder.join(format!("served-by-{name}"));
+        assert!(run(&reports, &out).status.success());
+        let decisions = tables::read::<DecisionRow>(&out, &names).expect("a table");
+        let of_carrier: Vec<u32> =
+            decisions.iter().filter(|row| row.track == carrier).map(|row| row.serving).collect();
+        let last = &of_carrier[of_carrier.len() - 5..];
+        assert!(last.iter().all(|serving| *serving == index), "served by {name}: {of_carrier:?}");
+    }
     fs::write(&reports, "time_ns,device,access_point,power_dbm\n5,17,attic,-60\n").expect("writes");
     let refused = run(&reports, &folder.join("refused"));
     let told = String::from_utf8_lossy(&refused.stderr).into_owned();

@@ -11,6 +11,7 @@ use crate::setup;
 
 mod sink;
 mod captures;
+mod empty;
 mod look;
 mod words;
 mod matching;
@@ -241,24 +242,6 @@ impl std::fmt::Display for Input {
 }
 
 impl Input {
-    /// Every frame, all at once, as the empty hall is learned; what is broken is counted. Says what was lost at the end of a
-    /// damaged file.
-    ///
-    /// # Errors
-    /// As [`Self::frames`].
-    pub fn all_frames(
-        &self,
-        site: &Site,
-        health: &mut Health,
-    ) -> Result<(Vec<Frame>, Option<String>), Error> {
-        let mut frames = Vec::new();
-        let lost = self.frames(site, health, |frame| {
-            frames.push(frame.clone());
-            Ok(())
-        })?;
-        Ok((frames, lost))
-    }
-
     /// A line for each capture: which sensors it was found to be of, and by what.
     pub fn matched(&self, site: &Site) -> Vec<String> {
         let Self::Captures(captures) = self else { return Vec::new() };

@@ -1,11 +1,12 @@
 //! What access points hear of devices: from tables, from JSON, and from recordings.
 //!
 //! A table has the columns `time_ns` (or `time_s`, `t_s`, `time`, `t` in seconds), `access_point` (its name in the site file),
-//! `device` (the network's number) and `power_dbm` or `rsrp_dbm`. A recording's table has `heard_ns` besides: then `time_ns` is the end of the
-//! frame before which a report was taken. JSON is one report or a list of them:
+//! `device` (the network's number) and `power_dbm` or `rsrp_dbm`; and `serves` where it is known which access point serves the device.
+//! A recording's table has `heard_ns` besides: then `time_ns` is the end of the frame before which a report was taken. JSON is one
+//! report or a list of them:
 //!
 //! ```json
-//! [ { "time_ns": 1700000000100000000, "access_point": "door", "device": 17, "power_dbm": -63.5 } ]
+//! [ { "time_ns": 1700000000100000000, "access_point": "door", "device": 17, "power_dbm": -63.5, "serves": true } ]
 //! ```
 //!
 //! `time_ns` is of the hall's sensors, whose clocks need not be the host's. It may be missing in JSON: then a report was heard when
@@ -47,7 +48,7 @@ impl Reports {
         while let Some(entry) = reader.next_entry()? {
             if let Entry::Other(topic, _, message) = entry
                 && topic == ReportRow::TOPIC
-                && let Some((.., of_frame)) = wire::decode::<ReportRow>(&message, &names)
+                && let Some(of_frame) = of_message(&message, &names)
             {
                 rows.extend(of_frame);
             }
@@ -103,6 +104,7 @@ pub fn rows(frame: u64, time_ns: i64, reports: &[Report]) -> Vec<ReportRow> {
         access_point: report.access_point as u32,
         device: report.device,
         power_dbm: report.power_dbm,
+        serves: report.serves,
     };
     reports.iter().map(row).collect()
 }
@@ -123,6 +125,8 @@ struct Sent {
     access_point: String,
     device: u64,
     power_dbm: f64,
+    #[serde(default)]
+    serves: bool,
 }
 
 /// One or several.
@@ -154,7 +158,7 @@ pub fn from_json(json: &[u8], site: &Site, now_ns: i64) -> Result<Vec<Came>, Err
     }
     let report = |(place, sent): (usize, Sent)| {
         let (is_timed, time_ns) = (sent.time_ns.is_some(), sent.time_ns.unwrap_or(now_ns));
-        let report = named(time_ns, &sent.access_point, sent.device, sent.power_dbm, site);
+        let report = named(time_ns, &sent.access_point, sent.device, sent.power_dbm, sent.serves, site);
         report.map(|report| Came { report, is_timed }).map_err(|e| e.within(format!("report {place}")))
     };
     sent.into_iter().enumerate().map(report).collect()
@@ -169,10 +173,11 @@ pub fn named(
     access_point: &str,
     device: u64,
     power_dbm: f64,
+    serves: bool,
     site: &Site,
 ) -> Result<Report, Error> {
     let index = site.access_points.iter().position(|known| known.name == access_point);
-    let report = Report { time_ns, access_point: index.unwrap_or(usize::MAX), device, power_dbm };
+    let report = Report { time_ns, access_point: index.unwrap_or(usize::MAX), device, power_dbm, serves };
     check(&report, access_point, site).map(|()| report)
 }
 
@@ -184,9 +189,16 @@ pub fn to_json(came: &[Came], site: &Site) -> String {
             "access_point": site.access_points.get(report.access_point).map(|ap| &ap.name),
             "device": report.device,
             "power_dbm": report.power_dbm,
+            "serves": report.serves,
         })
     };
     serde_json::Value::from(came.iter().map(named).collect::<Vec<_>>()).to_string()
+}
+
+/// The reports of a message in a recording. Earlier messages do not say who serves.
+fn of_message(message: &[u8], names: &[String]) -> Option<Vec<ReportRow>> {
+    let rows = wire::decode(message, names).or_else(|| wire::decode_without(message, names, "serves"));
+    rows.map(|(.., rows)| rows)
 }
 
 fn of_table(mut table: Loose, site: &Site) -> Result<Tabled, Error> {
@@ -197,7 +209,7 @@ fn of_table(mut table: Loose, site: &Site) -> Result<Tabled, Error> {
         table.put("heard_ns", times);
     }
     let of_all = table.column("scene").is_none();
-    let may_miss = |name: &str| name == "scene" || name == "frame";
+    let may_miss = |name: &str| ["scene", "frame", "serves"].contains(&name);
     let names = names(site);
     let rows: Vec<ReportRow> = table.rows(&names, ReportRow::default(), may_miss)?;
     for (r, row) in rows.iter().enumerate() {
@@ -213,6 +225,7 @@ fn of_row(row: &ReportRow) -> Report {
         access_point: row.access_point as usize,
         device: row.device,
         power_dbm: row.power_dbm,
+        serves: row.serves,
     }
 }
 
@@ -249,6 +262,7 @@ fn names(site: &Site) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cdr::Encoder;
     use umbracast::Config;
 
     fn site() -> Site {
@@ -304,6 +318,24 @@ mod tests {
         assert!(from_json(b"{}", &site, 5).unwrap_err().to_string().starts_with("expected JSON"));
     }
 
+    /// Recordings of before the column `serves` hold messages without it.
+    #[test]
+    fn reports_recorded_before_they_said_who_serves_are_read() {
+        let mut e = Encoder::default();
+        e.header(100_000_000, "site");
+        e.u64(1);
+        e.u32(2);
+        for device in [7, 8] {
+            e.u64(90_000_000);
+            e.string("door");
+            e.u64(device);
+            e.f64(-61.5);
+        }
+        let rows = of_message(&e.finish(), &["door".to_owned()]).unwrap();
+        assert_eq!(rows.iter().map(|row| row.device).collect::<Vec<_>>(), [7, 8]);
+        assert!(rows.iter().all(|row| !row.serves && row.power_dbm == -61.5));
+    }
+
     #[test]
     fn json_goes_out_and_in() {
         let site = site();
@@ -315,7 +347,7 @@ mod tests {
         let Came { report, is_timed } = reports[0];
         assert_eq!((reports.len(), report.time_ns, report.device, is_timed), (1, now_ns, u64::MAX, false));
         assert_eq!(from_json(to_json(&reports, &site).as_bytes(), &site, now_ns).unwrap(), reports);
-        let timed = [Came { report, is_timed: true }];
+        let timed = [Came { report: Report { serves: true, ..report }, is_timed: true }];
         assert_eq!(from_json(to_json(&timed, &site).as_bytes(), &site, 0).unwrap(), timed);
         assert_eq!(rows(4, 9, &[report])[0].heard_ns, now_ns);
     }

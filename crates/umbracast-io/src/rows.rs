@@ -237,6 +237,8 @@ pub struct ReportRow {
     /// The network's name of the device.
     pub device: u64,
     pub power_dbm: f64,
+    /// Whether the access point is said to serve the device.
+    pub serves: bool,
 }
 
 /// Truth of the radio: what bodies cost one link at one instant.

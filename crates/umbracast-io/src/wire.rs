@@ -157,6 +157,15 @@ pub fn encode<R: WireRow>(time_ns: i64, frame: u64, rows: &[R], access_points: &
 
 /// The rows of a message, with the frame's number and time; `None` where the bytes are something else.
 pub fn decode<R: WireRow>(bytes: &[u8], access_points: &[String]) -> Option<(u64, i64, Vec<R>)> {
+    decode_without(bytes, access_points, "")
+}
+
+/// The same of a message from before there was a column.
+pub(crate) fn decode_without<R: WireRow>(
+    bytes: &[u8],
+    access_points: &[String],
+    column: &str,
+) -> Option<(u64, i64, Vec<R>)> {
     let mut d = Decoder::new(bytes)?;
     let time_ns = d.time()?;
     d.string()?;
@@ -173,6 +182,7 @@ pub fn decode<R: WireRow>(bytes: &[u8], access_points: &[String]) -> Option<(u64
                 ("frame", Cell::U64(v)) => set(v, Some(frame)),
                 ("time_ns", Cell::I64(v)) => set(v, Some(time_ns)),
                 ("scene", _) => true,
+                (name, _) if name == column => true,
                 (_, Cell::U32(v)) => set(v, d.u32()),
                 (_, Cell::U64(v)) => set(v, d.u64()),
                 (_, Cell::I64(v)) => set(v, d.u64().map(|v| v as i64)),

@@ -69,7 +69,10 @@ mod tests {
     use super::*;
 
     fn came(time_ns: i64, is_timed: bool) -> Came {
-        Came { report: Report { time_ns, access_point: 0, device: 1, power_dbm: -60.0 }, is_timed }
+        Came {
+            report: Report { time_ns, access_point: 0, device: 1, power_dbm: -60.0, serves: false },
+            is_timed,
+        }
     }
 
     #[test]

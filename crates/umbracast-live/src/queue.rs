@@ -49,21 +49,28 @@ impl<T> Queue<T> {
 
     /// Adds an item; a full queue gives one up and counts it. What comes after [`Self::close`] is lost, too.
     pub fn push(&self, item: T) {
+        self.offer(item);
+    }
+
+    /// As [`Self::push`]; false where one was given up.
+    pub fn offer(&self, item: T) -> bool {
         let mut state = self.lock();
         if state.closed {
             state.lost += 1;
-            return;
+            return false;
         }
-        if state.items.len() == self.capacity {
+        let is_full = state.items.len() == self.capacity;
+        if is_full {
             state.lost += 1;
             if self.when_full == WhenFull::DropNewest {
-                return;
+                return false;
             }
             state.items.pop_front();
         }
         state.items.push_back(item);
         drop(state);
         self.filled.notify_one();
+        !is_full
     }
 
     /// Waits for the next item; `None` once the queue is closed and empty.
@@ -116,7 +123,8 @@ mod tests {
 
     fn filled(when_full: WhenFull) -> Queue<u32> {
         let queue = Queue::new(2, when_full);
-        (1..=4).for_each(|item| queue.push(item));
+        let taken: Vec<bool> = (1..=4).map(|item| queue.offer(item)).collect();
+        assert_eq!(taken, [true, true, false, false]);
         queue.close();
         queue
     }

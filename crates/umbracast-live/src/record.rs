@@ -105,17 +105,28 @@ impl Recorder {
 
     /// A packet, in the order in which the assembler got it.
     pub fn packet(&self, packet: Arrived) {
-        self.queue.push(Item::Packet(packet));
+        self.push(Item::Packet(packet));
     }
 
     /// A frame's results.
     pub fn result(&self, published: Arc<Published>) {
-        self.queue.push(Item::Result(published));
+        self.push(Item::Result(published));
     }
 
     /// Another configuration of the same sensors, in a new file.
     pub fn take_over(&self, config: &Config) {
-        self.queue.push(Item::Config(Box::new(config.clone())));
+        self.push(Item::Config(Box::new(config.clone())));
+    }
+
+    /// Where too much waits, the thread hangs at a disk that takes nothing and says nothing: then nobody else could tell it.
+    fn push(&self, item: Item) {
+        if !self.queue.offer(item) {
+            let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner);
+            status.lost += 1; // Until the thread counts again, the queue's with its own.
+            status.failing.get_or_insert_with(|| {
+                format!("expected a disk that keeps up, found {WAITING} packets and results that wait for it")
+            });
+        }
     }
 
     /// True while its thread works.
@@ -410,6 +421,21 @@ mod tests {
     #[test]
     fn a_site_s_name_does_not_lead_out_of_the_folder() {
         assert_eq!(file_name("../hall 3/east"), "___hall_3_east");
+    }
+
+    /// As one does whose host is gone: a write neither succeeds nor fails. It was told once the disk wrote again, or never.
+    #[test]
+    fn a_disk_that_stands_still_is_told_while_it_does() {
+        let status = Arc::new(Mutex::new(RecordStatus::default()));
+        let queue = Arc::new(Queue::new(2, WhenFull::DropNewest));
+        let thread = std::thread::spawn(|| ());
+        let recorder = Recorder { queue, status: status.clone(), thread };
+        let told = || status.lock().unwrap().clone();
+        (0..2).for_each(|k| recorder.packet(arrived(k)));
+        assert_eq!(told(), RecordStatus::default());
+        (2..5).for_each(|k| recorder.packet(arrived(k)));
+        assert_eq!(told().lost, 3);
+        assert!(told().failing.is_some_and(|told| told.contains("expected a disk that keeps up")));
     }
 
     #[test]

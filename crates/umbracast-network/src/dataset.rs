@@ -112,6 +112,7 @@ impl<'a> DataSet<'a> {
                 access_point: report.access_point as u32,
                 device: report.device,
                 power_dbm: report.power_dbm,
+                serves: report.serves,
             };
             self.reports.write(&heard.iter().map(row).collect::<Vec<_>>())?;
             for person in 0..traces.people {

@@ -241,6 +241,7 @@ mod tests {
             device: 1,
             // The frame that is nearest.
             power_dbm: if (k + 2) / 5 == 10 { -60.0 } else { -46.0 },
+            serves: false,
         };
         let reports: Vec<Report> = (0..95).map(report).collect();
         let mut fit = Fit::default();

@@ -39,7 +39,8 @@ pub fn of_scene(site: &Site, traces: &Traces, seed: u64, device_of: impl Fn(usiz
                     + changing_db
                     + REPORT_NOISE_DB * normal();
                 let (time_ns, device) = (tick as i64 * TICK_NS, device_of(person));
-                reports.push(Report { time_ns, access_point, device, power_dbm: power_dbm.round() });
+                let power_dbm = power_dbm.round();
+                reports.push(Report { time_ns, access_point, device, power_dbm, serves: false });
             }
         }
     }

@@ -337,7 +337,8 @@ impl Chain {
             self.fader.fade(caster, &mut o.losses);
             self.binder.bind(o.time_ns, &o.tracks, &o.losses, &mut o.bindings);
             self.listener.sharpen(o.time_ns, &o.tracks, caster, &self.binder, &mut o.blockages);
-            self.decider.decide(&o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
+            self.binder.served().for_each(|served| self.decider.serve(&served));
+            self.decider.decide(o.time_ns, &o.tracks, &o.losses, self.fader.outages(), &mut o.decisions);
             let fewer = caster.took_fewer_samples() || self.fader.took_fewer_samples();
             self.fewer_samples += u64::from(fewer);
             o.health.frames_with_fewer_samples =

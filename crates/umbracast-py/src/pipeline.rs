@@ -17,6 +17,13 @@ use crate::told::{refused, wrong};
 /// Packets from Python: which sensor, when it was received, and the payload.
 type Received = (usize, i64, Vec<u8>);
 
+/// What an access point heard: when, its name, the device's number, dBm; and whether it serves the device.
+#[derive(FromPyObject)]
+enum Heard {
+    Serving(i64, String, u64, f64, bool),
+    Power(i64, String, u64, f64),
+}
+
 /// The three stages with what each remembers. Python's other threads run while a frame is worked on.
 ///
 /// >>> import numpy, umbracast
@@ -66,10 +73,16 @@ impl Pipeline {
     }
 
     /// Takes what access points heard of devices since the last frame: (time in nanoseconds, access point's name, device's number,
-    /// dBm). The next frames' `bindings` say who carries which device.
-    fn hear(&mut self, reports: Vec<(i64, String, u64, f64)>) -> PyResult<()> {
-        let report = |(place, (time_ns, name, device, power_dbm)): (usize, (i64, String, u64, f64))| {
-            reports::named(time_ns, &name, device, power_dbm, self.site.site())
+    /// dBm), and as a fifth whether the access point serves the device. The next frames' `bindings` say who carries which device.
+    fn hear(&mut self, reports: Vec<Heard>) -> PyResult<()> {
+        let report = |(place, heard): (usize, Heard)| {
+            let (time_ns, name, device, power_dbm, serves) = match heard {
+                Heard::Power(time_ns, name, device, power_dbm) => (time_ns, name, device, power_dbm, false),
+                Heard::Serving(time_ns, name, device, power_dbm, serves) => {
+                    (time_ns, name, device, power_dbm, serves)
+                }
+            };
+            reports::named(time_ns, &name, device, power_dbm, serves, self.site.site())
                 .map_err(|e| refused(e.within(format!("report {place}"))))
         };
         let reports: Vec<_> = reports.into_iter().enumerate().map(report).collect::<PyResult<_>>()?;

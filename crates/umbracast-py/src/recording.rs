@@ -75,7 +75,9 @@ impl Recording {
     /// The frames without people that lie beside the recording, and what was lost of them.
     pub fn empty_beside(&self) -> Result<(Vec<umbracast::Frame>, Option<String>), Error> {
         let Some(empty) = &self.empty else { return Ok((Vec::new(), None)) };
-        empty.all_frames(self.site.site(), &mut Health::default())
+        let site = self.site.site();
+        let all: Vec<usize> = (0..site.sensors.len()).collect();
+        empty.empty_frames(site, &all, &mut Health::default())
     }
 }
 

@@ -93,3 +93,4 @@ def test_reports():
     assert "report 0: access_point: expected one of the site's that has a radio (none has), found \"side\"" in told(
         lambda: pipeline.hear([(100_000_000, "side", 7, -60.0)])
     )
+    assert "report 0: access_point" in told(lambda: pipeline.hear([(100_000_000, "side", 7, -60.0, True)]))

@@ -42,7 +42,7 @@ pub fn row(folder: &Path) -> Answer {
     for (name, costs) in cases() {
         write_f64(folder, name, &[SIDE, SIDE], &costs);
         let mut assignment = Assignment::default();
-        let ms = times(5, || (), |()| assignment.optimal(SIDE, SIDE, |r, c| costs[r * SIDE + c]));
+        let ms = times(5, || (), |()| assignment.of_matrix(&costs, SIDE));
         let pairs = assignment.column_of.iter().enumerate().filter_map(|(r, c)| c.map(|c| (r, c)));
         answer.case(name, &ms, &[("sum", sum(&costs, pairs))]);
     }

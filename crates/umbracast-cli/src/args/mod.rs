@@ -222,8 +222,8 @@ pub struct Run {
     /// Weights of the LSTM in place of the embedded ones.
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
-    /// The power that access points received from devices, CSV or Parquet with the columns `time_ns`, `access_point`, `device`, `power_dbm`, and
-    /// `scene` where there are several. Default: what the recordings hold. The table `bindings` says who carries which device.
+    /// The power that access points received from devices, CSV or Parquet with the columns `time_ns`, `access_point`, `device`, `power_dbm`,
+    /// and `serves` and `scene` where they are known. Default: what the recordings hold. The table `bindings` says who carries which device.
     #[arg(long, value_name = "FILE")]
     pub reports: Option<PathBuf>,
     /// Also write every table as CSV.

@@ -247,7 +247,9 @@ fn empty(
             packets[sensor].push(packet);
             Ok(())
         })?;
-        let (frames, _) = empty.all_frames(site, &mut Health::default())?;
+        // A tracker has it for front ends, of which each needs its own sensors'.
+        let needed = if stages.contains(&Role::Sensor) { own } else { &[] };
+        let (frames, _) = empty.empty_frames(site, needed, &mut Health::default())?;
         return Ok((frames, shared.with_empty(hall, site, &packets)));
     }
     if !stages.contains(&Role::Sensor) {

@@ -217,7 +217,7 @@ fn list(input: &[u8]) -> bool {
 
 fn reported() -> Vec<Vec<u8>> {
     let one = r#"{ "access_point": "side", "device": 17, "power_dbm": -63.5 }"#;
-    let many = r#"[ { "time_ns": 200000000, "access_point": "side", "device": 17, "power_dbm": -63.5 },
+    let many = r#"[ { "time_ns": 200000000, "access_point": "side", "device": 17, "power_dbm": -63.5, "serves": true },
         { "time_ns": 180000000, "access_point": "centre", "device": 18446744073709551615, "power_dbm": -7e1 } ]"#;
     vec![one.into(), many.into()]
 }
@@ -235,6 +235,7 @@ fn report(bytes: &[u8]) -> bool {
     for frame in 1..4 {
         binder.bind(frame * STEP_NS, &outcome.tracks, &outcome.losses, &mut bindings);
         assert!(bindings.iter().all(|binding| (0.0..=1.0 + 1e-9).contains(&binding.p)), "{bindings:?}");
+        assert!(binder.served().all(|served| outcome.tracks.iter().any(|track| track.id == served.track)));
     }
     true
 }

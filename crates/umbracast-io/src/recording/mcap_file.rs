@@ -138,8 +138,10 @@ fn string(record: &mut &[u8]) -> Option<String> {
     std::str::from_utf8(text).ok().map(str::to_owned)
 }
 
-fn plain(error: &McapError) -> String {
+/// An error in words: the library's leave out what the disk said.
+pub(super) fn plain(error: &McapError) -> String {
     match error {
+        McapError::Io(error) => error.to_string(),
         McapError::BadMagic => "other bytes at its beginning".to_owned(),
         McapError::UnexpectedEof => "its end before the first message".to_owned(),
         McapError::UnsupportedCompression(codec) => format!(

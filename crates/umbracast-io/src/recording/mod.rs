@@ -282,6 +282,18 @@ mod tests {
         assert!(damaged > 40, "{damaged}");
     }
 
+    /// All that was told of a full disk was "I/O error from writing, or reading a compression stream".
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_full_disk_is_called_full() {
+        let site = Config::default().site;
+        let full = Path::new("/dev/full");
+        let written = RecordingWriter::create_live(full, "", &site, 0)
+            .and_then(|mut writer| writer.flush())
+            .unwrap_err();
+        assert_eq!(written.to_string(), "/dev/full: No space left on device (os error 28)");
+    }
+
     /// In a file of 6 GB and more a length of 6 GB was believed.
     #[test]
     fn a_length_in_a_long_file_is_not_believed_either() {

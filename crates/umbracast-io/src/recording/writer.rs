@@ -9,6 +9,7 @@ use mcap::records::MessageHeader;
 use umbracast::lidar::{Frame, Model, Packet};
 use umbracast::{Error, Site};
 
+use super::mcap_file::plain;
 use super::{CONFIG_TOPIC, topic_of};
 use crate::messages::{self, Schema};
 use crate::results::{Message, Results};
@@ -60,15 +61,15 @@ impl RecordingWriter {
         site: &Site,
         start_ns: i64,
     ) -> Result<Self, Error> {
-        let fail = |e: &dyn std::fmt::Display| Error::new(e.to_string()).within(path.display());
-        let file = BufWriter::new(create(path).map_err(|e| fail(&e))?);
+        let fail = |told: String| Error::new(told).within(path.display());
+        let file = BufWriter::new(create(path).map_err(|e| fail(e.to_string()))?);
         // Packets hardly compress (a sixth), and a reader then needs no codec.
         let mcap = options
             .compression(None)
             .profile("ros2")
             .library(concat!("umbracast ", env!("CARGO_PKG_VERSION")))
             .create(file)
-            .map_err(|e| fail(&e))?;
+            .map_err(|e| fail(plain(&e)))?;
         let packets = site.sensors.iter().enumerate().map(|(number, sensor)| {
             let other = Model::of_sensor(sensor).is_ok_and(|m| m.packet_bytes() != messages::PACKET_BYTES);
             (format!("/{}/packets", topic_of(site, number)), !other)
@@ -207,9 +208,10 @@ impl RecordingWriter {
     }
 
     fn fail(&self, error: &mcap::McapError) -> Error {
-        Error::new(error.to_string()).within(self.path.display())
+        Error::new(plain(error)).within(self.path.display())
     }
 }
+
 /// A new file that its owner and his group read: a recording shows where people were.
 fn create(path: &Path) -> std::io::Result<File> {
     let mut options = File::options();

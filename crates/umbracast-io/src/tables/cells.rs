@@ -335,6 +335,7 @@ impl Row for ReportRow {
         see(plain("access_point"), Cell::AccessPoint(&mut self.access_point));
         see(plain("device"), Cell::U64(&mut self.device));
         see(plain("power_dbm"), Cell::F64(&mut self.power_dbm));
+        see(plain("serves"), Cell::Bool(&mut self.serves));
     }
 }
 

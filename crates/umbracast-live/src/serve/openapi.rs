@@ -69,6 +69,7 @@ fn report_schema() -> Value {
             "access_point": { "type": "string", "description": "Its name in the site file; it has a radio there." },
             "device": { "type": "integer", "description": "The network's name of the device." },
             "power_dbm": { "type": "number", "description": "Received power of the reference signal." },
+            "serves": { "type": "boolean", "description": "Whether this access point serves the device; false where it is not said." },
         }
     })
 }

@@ -47,12 +47,43 @@ pub fn clock() -> Instant {
     Instant::now()
 }
 
-/// A row of the table, and whether all was well in the end: everybody has the same number, and nothing was lost where
-/// nothing may be.
-pub fn account(seen: Vec<Seen>, failed: Instant, restored: Instant, none_lost: bool) -> (String, bool) {
+/// What became of a run; its text is the row of the table.
+#[derive(Debug, Default)]
+pub struct Account {
+    frames: usize,
+    /// Frames without results from the first to the last.
+    pub lost: i64,
+    gap: Duration,
+    later_ms: f64,
+    /// From the end of the failure until all was well; none where it never was.
+    recovered_s: Option<f64>,
+    /// People of the last frame who had another number before the failure.
+    pub renumbered: usize,
+}
+
+impl Account {
+    /// Whether frames came, and all was well within so long after the failure.
+    pub fn is_well(&self, within_s: f64) -> bool {
+        self.frames > 0 && self.recovered_s.is_some_and(|s| s <= within_s)
+    }
+}
+
+impl std::fmt::Display for Account {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { frames, lost, later_ms, renumbered, .. } = self;
+        if *frames == 0 {
+            return write!(f, "no frame came");
+        }
+        let gap_ms = self.gap.as_secs_f64() * 1e3;
+        let recovers = self.recovered_s.map_or("never".to_owned(), |s| format!("{s:.2}"));
+        write!(f, "{frames:7} {lost:7} {gap_ms:9.0} {later_ms:9.1} {recovers:>11} {renumbered:10}")
+    }
+}
+
+pub fn account(seen: Vec<Seen>, failed: Instant, restored: Instant) -> Account {
     let times: BTreeSet<i64> = seen.iter().map(|frame| frame.time_ns).collect();
     let (Some(first), Some(last)) = (times.first(), times.last()) else {
-        return ("no frame came".to_owned(), false);
+        return Account::default();
     };
     let all = (last - first) / umbracast::STEP_NS + 1;
     let gap = seen.windows(2).map(|pair| pair[1].at - pair[0].at).max().unwrap_or_default();
@@ -62,17 +93,14 @@ pub fn account(seen: Vec<Seen>, failed: Instant, restored: Instant, none_lost: b
     let in_time = |pair: &[Seen]| pair[1].at - pair[0].at < GAP;
     let well = |frame: &Seen| frame.sensors == 2 && frame.people.len() + 1 > followed;
     let recovered = seen.windows(2).find(|pair| pair[1].at > restored && in_time(pair) && well(&pair[1]));
-    let recovers =
-        recovered.map_or("never".to_owned(), |pair| format!("{:.2}", (pair[1].at - restored).as_secs_f64()));
+    let recovered_s = recovered.map(|pair| (pair[1].at - restored).as_secs_f64());
     let renumbered = seen.last().map_or(0, |frame| frame.people.difference(&known).count());
     let lost = all - times.len() as i64;
     let until = restored.max(failed + LOOKED_AT);
     let (ahead, during): (Vec<&Seen>, Vec<&Seen>) =
         seen.iter().filter(|frame| frame.at < until).partition(|frame| frame.at < failed);
     let later_ms = median_delay_ms(&during, seen[0].at) - median_delay_ms(&ahead, seen[0].at);
-    let (frames, gap_ms) = (times.len(), gap.as_secs_f64() * 1e3);
-    let row = format!("{frames:7} {lost:7} {gap_ms:9.0} {later_ms:9.1} {recovers:>11} {renumbered:10}");
-    (row, recovered.is_some() && renumbered == 0 && (!none_lost || lost == 0))
+    Account { frames: times.len(), lost, gap, later_ms, recovered_s, renumbered }
 }
 
 /// Half of the frames came later after their own time than this, up to a constant that all frames of a run share.

@@ -1,6 +1,6 @@
 //! Hosts that vanish without a reset, as when a cable is pulled: nobody else may lose a frame for it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::sleep;
 use std::time::Duration;
@@ -104,17 +104,9 @@ impl Bench {
         replay.0.wait().map_err(|e| Error::new(e.to_string()))?;
         sleep(Duration::from_secs(1));
         let seen = std::mem::take(&mut *watch.lock().unwrap_or_else(PoisonError::into_inner));
-        let times: BTreeSet<i64> = seen.iter().map(|frame| frame.time_ns).collect();
-        let all = times
-            .last()
-            .zip(times.first())
-            .map_or(0, |(last, first)| (last - first) / umbracast::STEP_NS + 1);
-        let lost = all - times.len() as i64;
-        let (row, _) = account(seen, failed, restored, false);
+        let row = account(seen, failed, restored);
         println!("{what:44} {must:40} {row}");
-        if self.short && (all == 0 || lost > *may_lose) {
-            return Err(Error::new(format!("{what}: expected: {must}")));
-        }
+        self.expect(row.is_well(2.0) && row.lost <= *may_lose, what, must);
         Ok(())
     }
 }

@@ -28,7 +28,7 @@ pub struct Orca {
     corners: Vec<Corner>,
     grid: Grid,
     next_mps: Vec<Vec2>,
-    neighbors: Vec<(f32, usize)>,
+    neighbors: Vec<usize>,
     edges: Vec<(f32, usize)>,
     lines: Vec<HalfPlane>,
 }
@@ -78,7 +78,7 @@ impl Orca {
         let obstacle_lines = self.lines.len();
 
         self.grid.nearest(&self.agents, i, &mut self.neighbors);
-        for &(_, other) in &self.neighbors {
+        for &other in &self.neighbors {
             self.lines.push(half_plane(agent, &self.agents[other], self.step_s));
         }
         velocity::nearest_allowed(
