@@ -141,3 +141,47 @@ impl Antenna {
         lowest_m <= top_m + zone_m
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::site::Radio;
+
+    #[test]
+    fn no_body_is_left_out_that_is_in_the_way_of_a_sample() {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
+        let antenna = Antenna {
+            place_m: DVec3::ZERO,
+            wave: Wave::new(&Radio::default(), 40.0),
+            margin_db: 10.0,
+            spreads: false,
+        };
+        let (mut left_out, mut missed) = (0, 0);
+        for _ in 0..200_000 {
+            let mut part = |from: f64, to: f64| rng.random_range(from..to);
+            let disc = |x: f64, y: f64, radius_m: f64| Disc { center_m: DVec2::new(x, y), radius_m };
+            let aim_m = part(1.0, 25.0);
+            let aim = disc(aim_m, 0.0, part(0.0, 0.25 * aim_m.min(6.0)));
+            let body = disc(part(-1.0, aim_m + 1.0), part(-3.0, 3.0), part(0.0, 1.0));
+            let scale = part(0.8, 1.3) as f32;
+            let in_disc =
+                |of: Disc, turn: f64, share: f64| of.center_m + share * of.radius_m * DVec2::from_angle(turn);
+            let (end_m, foot_m) =
+                (in_disc(aim, part(0.0, 6.3), part(0.0, 1.0)), in_disc(body, part(0.0, 6.3), part(0.0, 1.0)));
+            let half_m = f64::from(Wave::half_m(scale));
+            if antenna.meets(DVec3::Z, aim, 1.0, body, half_m, 2.0) {
+                continue;
+            }
+            left_out += 1;
+            let (length_m, to) = (end_m.length(), end_m.normalize());
+            let from_tx_m = to.dot(foot_m);
+            let aside_m = to.perp_dot(foot_m) as f32;
+            let is_clear =
+                antenna.wave.is_clear(scale, aside_m, from_tx_m as f32, (length_m - from_tx_m) as f32);
+            missed += usize::from(!is_clear);
+        }
+        assert!(left_out > 20_000 && missed == 0, "{missed} of {left_out}");
+    }
+}

@@ -35,6 +35,13 @@ const NOTHING: Fault = Fault {
     clients: Clients::Nobody,
 };
 
+/// Packets suffer, and nobody notices.
+const HARMLESS: Fault = Fault {
+    must: "nobody lost",
+    promises: &[EveryFrame, Followed(PEOPLE), NobodyInvented(PEOPLE), SameNumbers, Well(1.0)],
+    ..NOTHING
+};
+
 /// A run with a disk lasts longer: after a write that failed, it is tried again five seconds later.
 const OF_DISK: Fault = Fault {
     must: "told, counted, recorded again after it",
@@ -72,20 +79,8 @@ pub const FAULTS: &[Fault] = &[
         harm: harm::silent,
         ..NOTHING
     },
-    Fault {
-        name: "one packet of a thousand lost for 5 s",
-        must: "nobody lost",
-        promises: &[EveryFrame, Followed(PEOPLE), NobodyInvented(PEOPLE), SameNumbers, Well(1.0)],
-        harm: harm::lost::<1000>,
-        ..NOTHING
-    },
-    Fault {
-        name: "one packet of ten lost for 5 s",
-        must: "nobody lost",
-        promises: &[EveryFrame, Followed(PEOPLE), NobodyInvented(PEOPLE), SameNumbers, Well(1.0)],
-        harm: harm::lost::<10>,
-        ..NOTHING
-    },
+    Fault { name: "one packet of a thousand lost for 5 s", harm: harm::lost::<1000>, ..HARMLESS },
+    Fault { name: "one packet of ten lost for 5 s", harm: harm::lost::<10>, ..HARMLESS },
     Fault {
         name: "every second packet lost for 5 s",
         must: "people are followed",
@@ -114,13 +109,7 @@ pub const FAULTS: &[Fault] = &[
         harm: harm::cut_in_half,
         ..NOTHING
     },
-    Fault {
-        name: "eight packets each in reverse order for 5 s",
-        must: "nobody lost",
-        promises: &[EveryFrame, Followed(PEOPLE), NobodyInvented(PEOPLE), SameNumbers, Well(1.0)],
-        harm: harm::eight_in_reverse,
-        ..NOTHING
-    },
+    Fault { name: "eight packets each in reverse order for 5 s", harm: harm::eight_in_reverse, ..HARMLESS },
     Fault {
         name: "every packet ten times for 5 s",
         must: "repeated ones counted, no frame lost",
