@@ -278,6 +278,9 @@ pub struct Simulation {
     /// Sensors that hang elsewhere than the site says, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub slip: BTreeMap<String, Slip>,
+    /// What is put in while people are there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub put_in: Option<PutIn>,
     /// Sensors whose ranges are too long, by name: by how many metres.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub range_bias_m: BTreeMap<String, f64>,
@@ -290,6 +293,25 @@ pub struct Simulation {
     /// Glass and mirrors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub panes: Vec<Pane>,
+}
+
+/// Furniture that is not there from the start.
+///
+/// ```
+/// use umbracast::{Config, Mode};
+///
+/// let file = "[site.simulation.put_in]\nafter_s = 5.0\nfurniture = [{ position_m = [0.0, -13.0], size_m = [7.0, 2.5, 3.0], yaw_deg = 0.0 }]";
+/// let site = Config::with_overlay(Mode::Default, file, "lorry.toml")?.site;
+/// assert_eq!(site.simulation.put_in.unwrap().furniture[0].size_m[2], 3.0);
+/// # Ok::<(), umbracast::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PutIn {
+    /// When it comes, all at once.
+    pub after_s: f64,
+    /// As the site's own.
+    pub furniture: Vec<Furniture>,
 }
 
 /// How a simulated sensor comes to hang elsewhere.

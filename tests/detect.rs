@@ -113,6 +113,7 @@ fn expected_at(position_m: DVec2) -> Prior {
         position_sigma_m: 0.05,
         height_m: 1.7,
         confirmed: true,
+        walked: false,
         is_furniture: false,
     }
 }
@@ -200,6 +201,51 @@ fn furniture_put_in_after_the_empty_scan_is_learned_and_forgotten_once_it_is_tak
     }
     chain.step(&frame(&config, 25, &[thing, person]), &[]);
     assert!(chain.finds(&[thing, person], 0.15), "{:#?}", chain.detections);
+}
+
+/// A lorry, a car, a door leaf: pieces of them have the shape of a person, and were people for as long as they stood.
+#[test]
+fn what_appears_out_of_nothing_is_learned_although_it_has_the_shape_of_a_person() {
+    let config = config(Mode::Default);
+    let (mut chain, thing, person) = (Chain::new(&config), PEOPLE_M[0], PEOPLE_M[1]);
+    chain.background.learn_empty(&frame(&config, 0, &[]));
+    let came_walking = Prior { walked: true, ..expected_at(person) };
+    for k in 1..100 {
+        let here = if k < 10 { vec![] } else { vec![thing, person] };
+        let priors = if k <= 10 { vec![came_walking] } else { vec![expected_at(thing), came_walking] };
+        chain.step(&frame(&config, k, &here), &priors);
+        match k {
+            10 => assert!(chain.finds(&here, 0.15), "at once"),
+            40.. => assert!(chain.finds(&[person], 0.15), "frame {k}: {:#?}", chain.detections),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn who_is_invented_where_something_appears_is_gone_again_within_seconds() {
+    let config = config(Mode::Default);
+    let mut pipeline = Pipeline::new(&config, None).unwrap();
+    pipeline.learn_empty(&frame(&config, 0, &[]));
+    for k in 1..=60 {
+        let here: &[DVec2] = if k < 10 { &[] } else { &PEOPLE_M };
+        let outcome = pipeline.step(&frame(&config, k, here));
+        assert!(k < 40 || outcome.tracks.iter().all(|track| !track.confirmed), "frame {k}");
+    }
+}
+
+#[test]
+fn who_may_have_come_while_a_sensor_was_silent_is_not_learned() {
+    let config = config(Mode::Default);
+    let mut pipeline = Pipeline::new(&config, None).unwrap();
+    pipeline.learn_empty(&frame(&config, 0, &[]));
+    for k in (1..10).chain(20..300) {
+        let here: &[DVec2] = if k < 10 { &[] } else { &PEOPLE_M };
+        let outcome = pipeline.step(&frame(&config, k, here));
+        let followed =
+            |at: &DVec2| outcome.tracks.iter().any(|t| t.confirmed && t.position_m.distance(*at) < 0.2);
+        assert!(k < 30 || here.iter().all(followed), "frame {k}");
+    }
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub(super) fn check_site(site: &Site) -> Result<(), Error> {
     site.sensors.iter().try_for_each(|s| sensor(s, site))?;
     site.access_points.iter().try_for_each(|ap| access_point(ap, site))?;
     site.pillars.iter().enumerate().try_for_each(|(i, p)| pillar(i, p, site))?;
-    site.furniture.iter().enumerate().try_for_each(|(i, f)| furniture(i, f, site))?;
+    furniture("site.furniture", &site.furniture, site)?;
     ue(&site.ue)?;
     site.handover.as_ref().map_or(Ok(()), handover)?;
     simulation(site)
@@ -76,6 +76,10 @@ fn sensor(sensor: &Sensor, site: &Site) -> Result<(), Error> {
 
 fn simulation(site: &Site) -> Result<(), Error> {
     within("site.simulation.dropout", site.simulation.dropout, 0.0, 1.0)?;
+    if let Some(more) = &site.simulation.put_in {
+        within("site.simulation.put_in.after_s", more.after_s, 0.0, f64::INFINITY)?;
+        furniture("site.simulation.put_in.furniture", &more.furniture, site)?;
+    }
     for (key, places_m) in
         [("entrances_m", &site.simulation.entrances_m), ("places_m", &site.simulation.places_m)]
     {
@@ -168,15 +172,18 @@ fn pillar(index: usize, pillar: &Pillar, site: &Site) -> Result<(), Error> {
     above_0(&key("radius_m"), pillar.radius_m, 0.5 * size_m(site).min_element())
 }
 
-fn furniture(index: usize, furniture: &Furniture, site: &Site) -> Result<(), Error> {
-    let key = |key: &str| format!("site.furniture[{index}].{key}");
-    on_floor(&key("position_m"), furniture.position_m, site)?;
-    let [length_m, width_m, height_m] = furniture.size_m;
-    let longest_m = size_m(site).x.hypot(size_m(site).y);
-    above_0(&key("size_m, x"), length_m, longest_m)?;
-    above_0(&key("size_m, y"), width_m, longest_m)?;
-    above_0(&key("size_m, z"), height_m, site.hall.height_m)?;
-    within(&key("yaw_deg"), furniture.yaw_deg, -360.0, 360.0)
+fn furniture(list: &str, all: &[Furniture], site: &Site) -> Result<(), Error> {
+    for (index, furniture) in all.iter().enumerate() {
+        let key = |key: &str| format!("{list}[{index}].{key}");
+        on_floor(&key("position_m"), furniture.position_m, site)?;
+        let [length_m, width_m, height_m] = furniture.size_m;
+        let longest_m = size_m(site).x.hypot(size_m(site).y);
+        above_0(&key("size_m, x"), length_m, longest_m)?;
+        above_0(&key("size_m, y"), width_m, longest_m)?;
+        above_0(&key("size_m, z"), height_m, site.hall.height_m)?;
+        within(&key("yaw_deg"), furniture.yaw_deg, -360.0, 360.0)?;
+    }
+    Ok(())
 }
 
 fn ue(ue: &Ue) -> Result<(), Error> {
@@ -231,7 +238,7 @@ fn size_m(site: &Site) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::site::{DarkCloth, Pane, Slip, Surface};
+    use crate::site::{DarkCloth, Pane, PutIn, Slip, Surface};
     use crate::{Config, Mode};
 
     const SITES: [&str; 10] = [
@@ -261,7 +268,7 @@ mod tests {
     #[test]
     fn what_cannot_be_is_refused_with_key_name_expected_and_found() {
         type Change = fn(&mut Site);
-        let wrong: [(Change, &str); 34] = [
+        let wrong: [(Change, &str); 35] = [
             (|s| s.hall.height_m = 0.0, "site.hall.height_m: expected more than 0 and 1000 at most, found 0"),
             (|s| s.hall.width_m = f64::NAN, "site.hall.width_m: expected more than 0"),
             (|s| s.sensors.clear(), "site.sensors: expected one or more, found none"),
@@ -328,6 +335,10 @@ mod tests {
                     s.sensors[1].calibration = Some("Channel,Elevation,Azimuth\n1,15.0".into());
                 },
                 "site.sensors.lidar_west: calibration: line 2: expected channel 1 of 32, its elevation and azimuth",
+            ),
+            (
+                |s| s.simulation.put_in = Some(PutIn { after_s: -1.0, furniture: Vec::new() }),
+                "site.simulation.put_in.after_s: expected",
             ),
             (|s| s.simulation.dropout = 2.0, "site.simulation.dropout: expected 0 to 1, found 2"),
             (

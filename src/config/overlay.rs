@@ -52,7 +52,7 @@ fn merge(base: &mut Table, over: Table) {
 }
 
 /// Keys that the defaults leave out, with their kinds.
-const OPTIONAL: [(&str, &str, &str); 19] = [
+const OPTIONAL: [(&str, &str, &str); 20] = [
     ("site", "handover", "a table"),
     ("site", "reflections", "a table"),
     ("site.hall", "outline_m", "an array"),
@@ -66,6 +66,7 @@ const OPTIONAL: [(&str, &str, &str); 19] = [
     ("site.sensors", "udp_port", "a whole number"),
     ("site.simulation", "clock_ahead_ms", "a table"),
     ("site.simulation", "slip", "a table"),
+    ("site.simulation", "put_in", "a table"),
     ("site.simulation", "entrances_m", "an array"),
     ("site.simulation", "places_m", "an array"),
     ("site.simulation", "range_bias_m", "a table"),

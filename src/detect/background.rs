@@ -93,7 +93,7 @@ impl Background {
                 self.sensors.iter_mut().for_each(SensorModel::know);
                 let mut nothing = Vec::new();
                 for scan in &frame.scans {
-                    self.scan(scan, Learn::Empty, &mut Health::default(), &mut nothing);
+                    self.scan(frame.time_ns, scan, Learn::Empty, &mut Health::default(), &mut nothing);
                 }
             }
             BackgroundMethod::Voxels => {
@@ -131,7 +131,7 @@ impl Background {
                 for scan in &frame.scans {
                     let known = self.sensors.get(scan.sensor).is_some_and(SensorModel::is_known);
                     let learn = if known { Learn::Furniture(priors) } else { Learn::OnTheWay(priors) };
-                    self.scan(scan, learn, health, points);
+                    self.scan(frame.time_ns, scan, learn, health, points);
                 }
                 self.forget_people(frame);
             }
@@ -262,9 +262,16 @@ impl Background {
     }
 
     /// One scan against its sensor's range image; what is new goes to `points`.
-    fn scan(&mut self, scan: &Scan, learn: Learn, health: &mut Health, points: &mut Vec<Point>) {
+    fn scan(
+        &mut self,
+        time_ns: i64,
+        scan: &Scan,
+        learn: Learn,
+        health: &mut Health,
+        points: &mut Vec<Point>,
+    ) {
         let Some(sensor) = self.sensors.get_mut(scan.sensor) else { return };
-        sensor.scan(Look { scan, clip: &self.clip, learn }, health, points);
+        sensor.scan(Look { scan, time_ns, clip: &self.clip, learn }, health, points);
     }
 }
 

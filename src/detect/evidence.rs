@@ -401,6 +401,7 @@ mod tests {
             position_sigma_m: 0.05,
             height_m: 1.7,
             confirmed: true,
+            walked: false,
             is_furniture: false,
         }
     }

@@ -147,6 +147,7 @@ mod tests {
             position_sigma_m: 0.1,
             height_m: 1.7,
             confirmed: true,
+            walked: false,
             is_furniture: false,
         }
     }

@@ -71,6 +71,7 @@ mod tests {
         position_sigma_m: 0.1,
         height_m: 1.75,
         confirmed: true,
+        walked: false,
         is_furniture: false,
     };
 

@@ -375,6 +375,7 @@ mod tests {
             position_sigma_m: 0.1,
             height_m,
             confirmed: true,
+            walked: false,
             is_furniture: false,
         };
         let config = Config::default();
@@ -409,6 +410,7 @@ mod tests {
                 position_sigma_m: 0.05,
                 height_m: 1.7,
                 confirmed: true,
+                walked: false,
                 is_furniture: false,
             };
             let config = Config::default();

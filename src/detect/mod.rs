@@ -6,6 +6,7 @@
 mod cluster;
 mod first_sight;
 mod range_model;
+mod presence;
 mod cloud_limits;
 mod sensor_model;
 mod voxel;
@@ -86,6 +87,8 @@ pub struct Prior {
     pub height_m: f64,
     /// True once the track is confirmed.
     pub confirmed: bool,
+    /// True of who was seen to walk.
+    pub walked: bool,
     /// True of what has been there for long and never walked: nobody, but something that was put there.
     pub is_furniture: bool,
 }

@@ -2,6 +2,7 @@
 //! azimuth).
 
 mod movers;
+mod stays;
 
 /// A range is background when it came back in at least this share of the revolutions: leaves and edges come back at
 /// several ranges; a passer-by has a smaller share.
@@ -39,6 +40,9 @@ const EDGE_BINS: usize = 2;
 const EDGE_M: f32 = 0.3;
 /// What is behind somebody is taken to be as near as the nearest of so many bins beside: leaves have no even face.
 const BESIDE_BINS: usize = 5;
+
+pub use stays::Near;
+use stays::Stays;
 
 /// One range that comes back, with how often it did.
 #[derive(Debug, Clone, Copy, Default)]
@@ -109,6 +113,8 @@ pub struct RangeModel {
     furnished: usize,
     /// What is nearer than the background by more than this is new.
     margin_m: f32,
+    /// What is new and stays.
+    stays: Stays,
 }
 
 impl RangeModel {
@@ -135,6 +141,7 @@ impl RangeModel {
             known: false,
             furniture: Vec::new(),
             furnished: 0,
+            stays: Stays::default(),
         }
     }
 
@@ -167,6 +174,7 @@ impl RangeModel {
         (self.nearest_m, self.limit_m) = (vec![0.0; pixels], vec![0.0; pixels]);
         // Numbers of pixels change: what was put there is learned anew.
         (self.furniture, self.furnished) = (vec![0; pixels], 0);
+        self.stays.of_pixel = vec![Default::default(); pixels];
         if old_rows > 0 {
             self.find_limits();
         }
@@ -312,6 +320,7 @@ impl RangeModel {
             (self.furniture[pixel], self.furnished) = (0, self.furnished - 1);
             let gone = |mode: &Mode| mode.range_m < range_m - self.margin_m;
             let least = SHARE * self.revolutions;
+            self.stays.hid(pixel, range_m, self.count);
             self.modes[pixel].iter_mut().filter(|mode| gone(mode)).for_each(|mode| *mode = Mode::default());
             self.set_nearest(pixel, nearest_m(&self.modes[pixel], least).unwrap_or(f32::INFINITY));
         }

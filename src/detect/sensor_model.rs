@@ -2,7 +2,8 @@
 
 use super::cloud_limits::{CloudLimits, Elevations, azimuth_of_cdeg, range_of_m};
 use super::first_sight::Return;
-use super::range_model::{RangeModel, Verdict};
+use super::presence::{is_furnitures, is_somebodys, near, people};
+use super::range_model::{Near, RangeModel, Verdict};
 use super::{Point, Prior};
 use crate::Health;
 use crate::elementary::wide;
@@ -19,12 +20,10 @@ const BIN_COLUMNS: f64 = 1.02;
 /// The same of an unorganised cloud, whose columns are not known: a VLP-16 at 20 Hz fires every 0.4 degrees.
 const CLOUD_AZIMUTH_BIN_DEG: f64 = 1.0;
 const CLOUD_ELEVATION_BIN_DEG: f64 = 0.5;
-/// Nothing is learned within this distance of an expected person.
-const FREEZE_M: f64 = 0.5;
-/// What is new within this distance of furniture's middle is a part of it: half a large table.
-const FURNITURE_M: f64 = 0.9;
 /// In so many frames it is looked who is there from the start.
 const FIRST_FRAMES: u32 = 3;
+/// Who was not looked for in so long may have walked in.
+const BLIND_NS: u64 = 350_000_000;
 /// Lower points are the floor's.
 const LOWEST_M: f64 = 0.03;
 
@@ -44,6 +43,8 @@ pub(super) struct SensorModel {
     known: bool,
     /// Since the start.
     frames: u32,
+    /// Of the last frame.
+    time_ns: i64,
     returns: Vec<CloudReturn>,
     /// Of each beam: how long the head has turned on, and how far it looks to the right.
     turned: Vec<[f32; 2]>,
@@ -79,15 +80,23 @@ impl Learn<'_> {
         !matches!(self, Self::Furniture(_))
     }
 
-    /// Of a return, new or not; `at_m` says where it is, if people can be there.
-    fn verdict(self, at_m: Option<DVec3>, new: bool) -> Verdict {
+    /// Of a return, new or not; `at_m` says where it is, if people can be there. `stays` is asked whether what is new has been there
+    /// for long.
+    fn verdict(
+        self,
+        at_m: Option<DVec3>,
+        new: bool,
+        stays: impl FnOnce(&dyn Fn() -> Near) -> bool,
+    ) -> Verdict {
         match (self, at_m) {
             // What is not new there may be of somebody too: a body's edge beside a pixel whose background is nearer. If it
             // were learned, the body would be learned from its edge inwards.
             (Self::OnTheWay(priors), Some(at_m)) if is_somebodys(priors, at_m) => Verdict::Somebodys,
             (Self::Empty | Self::OnTheWay(_), _) => Verdict::Learned,
             (Self::Furniture(priors), Some(at_m))
-                if new && is_furnitures(priors, at_m) && !is_somebodys(priors, at_m) =>
+                if new
+                    && (stays(&|| near(priors, at_m))
+                        || is_furnitures(priors, at_m) && !is_somebodys(priors, at_m)) =>
             {
                 Verdict::Furnitures
             }
@@ -110,27 +119,12 @@ impl Learn<'_> {
     }
 }
 
-/// Somebody who stands still must not be learned.
-fn is_somebodys(priors: &[Prior], at_m: DVec3) -> bool {
-    people(priors)
-        .any(|(prior, reach_m)| prior.position_m.distance_squared(at_m.truncate()) < reach_m * reach_m)
-}
-
-/// Those who are expected, and how near to them a return may be theirs.
-fn people(priors: &[Prior]) -> impl Iterator<Item = (&Prior, f64)> {
-    let reach_m = |prior: &Prior| FREEZE_M + prior.position_sigma_m.min(FREEZE_M);
-    priors.iter().filter(|prior| !prior.is_furniture).map(move |prior| (prior, reach_m(prior)))
-}
-
-fn is_furnitures(priors: &[Prior], at_m: DVec3) -> bool {
-    let near = |prior: &Prior| prior.position_m.distance(at_m.truncate()) < FURNITURE_M;
-    priors.iter().any(|prior| prior.is_furniture && near(prior))
-}
-
 /// One scan, and what is asked of it.
 #[derive(Clone, Copy)]
 pub(super) struct Look<'a> {
     pub(super) scan: &'a Scan,
+    /// The frame's.
+    pub(super) time_ns: i64,
     pub(super) clip: &'a Clip,
     pub(super) learn: Learn<'a>,
 }
@@ -163,6 +157,7 @@ impl SensorModel {
             cloud_limits: None,
             known: false,
             frames: 0,
+            time_ns: 0,
             returns: Vec::new(),
             turned: Vec::new(),
             azimuths_cdeg: Vec::new(),
@@ -196,6 +191,12 @@ impl SensorModel {
     /// One scan; what is new goes to `points`.
     pub(super) fn scan(&mut self, look: Look, health: &mut Health, points: &mut Vec<Point>) {
         self.frames = self.frames.saturating_add(1);
+        let last_ns = std::mem::replace(&mut self.time_ns, look.time_ns);
+        // Nor is it known how long ago the empty scan was made.
+        if look.time_ns.abs_diff(last_ns) > BLIND_NS || matches!(look.learn, Learn::Empty) {
+            self.ranges.was_blind();
+            self.cloud_ranges.was_blind();
+        }
         let known = self.known;
         let ranges = match &look.scan.cloud {
             Cloud::Organised(image) => {
@@ -262,7 +263,7 @@ impl SensorModel {
         health: &mut Health,
         points: &mut Vec<Point>,
     ) {
-        let Look { scan, clip, learn } = look;
+        let Look { scan, clip, learn, .. } = look;
         let beams = image.beams.len();
         if beams == 0 {
             return;
@@ -327,7 +328,7 @@ impl SensorModel {
                     if !background && at_m.is_some() {
                         points.push(point);
                     }
-                    learn.verdict(at_m, !background)
+                    learn.verdict(at_m, !background, |near| ranges.stays(pixel, range_m, near))
                 };
                 ranges.take(pixel, range_m, verdict);
             }
@@ -341,13 +342,23 @@ impl SensorModel {
         health: &mut Health,
         points: &mut Vec<Point>,
     ) {
-        let Look { scan, clip, learn } = look;
+        let Look { scan, clip, learn, .. } = look;
         if self.sees_new_only(learn)
             && let Some(out_of_range) = self.sort_new(cloud)
         {
             health.points_invalid += out_of_range;
-            let new = self.returns.iter().map(|r| unorganised_point(scan, &r.point));
-            points.extend(new.filter(|point| clip.holds(point.position_m)));
+            for CloudReturn { elevation_bin, azimuth_cdeg, range_m, point } in self.returns.iter().copied() {
+                let point = unorganised_point(scan, &point);
+                if !clip.holds(point.position_m) {
+                    continue;
+                }
+                points.push(point);
+                let Some(row) = self.row_of_elevation[elevation_bin] else { continue };
+                let own = self.cloud_ranges.pixel(usize::from(row), azimuth_cdeg);
+                let stays = |near: &dyn Fn() -> Near| self.cloud_ranges.stays(own, range_m, near);
+                let verdict = learn.verdict(Some(point.position_m), true, stays);
+                self.cloud_ranges.take(own, range_m, verdict);
+            }
             return;
         }
         self.cloud_limits = None;
@@ -370,7 +381,8 @@ impl SensorModel {
             if range_m >= limit_m && !learn.is_all() {
                 self.cloud_ranges.see_past(own, range_m);
             } else {
-                self.cloud_ranges.take(own, range_m, learn.verdict(at_m, new));
+                let verdict = learn.verdict(at_m, new, |near| self.cloud_ranges.stays(own, range_m, near));
+                self.cloud_ranges.take(own, range_m, verdict);
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::followed::seconds;
 use super::remembered::{Remembered, Words};
+use super::visibility::BodyView;
 use crate::detect::Detection;
 use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::DVec2;
@@ -19,6 +20,15 @@ const PERSON_TOP_M: f64 = 1.0;
 const PERSON_DIAGONAL_M: f64 = 1.0;
 const HEAD_DIAGONAL_M: f64 = 0.6;
 
+/// What gives less than this share of the returns that it gave before, although others hide no more than the rest, is what is left of
+/// an object that the background learns: its edges.
+const LEFT_SHARE: f64 = 0.25;
+const FREE_SHARE: f64 = 0.5;
+/// So much is taken to have been seen of everybody.
+const MOST_SHARE: f64 = 0.4;
+/// What never walked is furniture when it has been no more than that for so long.
+const LEFT_AFTER_S: f64 = 0.5;
+
 /// What first shows this near to furniture is taken for a part of it that was hidden: a large table's other end.
 pub(super) const BESIDE_M: f64 = 0.9;
 /// A detection that cannot be of a person counts for so many that can: of one who stands 96 of 100 can, of a cupboard up
@@ -32,7 +42,11 @@ pub(super) struct Origin {
     position_m: DVec2,
     /// Beside furniture.
     beside: bool,
-    walked: bool,
+    pub(super) walked: bool,
+    /// The largest share of a body's returns that a detection had.
+    most_share: f64,
+    /// For how long it has been what is left of an object.
+    left_s: f64,
     /// Detections that may be of a person, less [`NO_PERSON`] for each that cannot.
     like_person: f64,
 }
@@ -43,13 +57,23 @@ impl Remembered for Origin {
         words.vec2(&mut self.position_m);
         words.bool(&mut self.beside);
         words.bool(&mut self.walked);
+        words.f64(&mut self.most_share);
+        words.f64(&mut self.left_s);
         words.f64(&mut self.like_person);
     }
 }
 
 impl Origin {
     pub(super) fn new(position_m: DVec2, born_ns: i64, beside: bool) -> Self {
-        Self { born_ns, position_m, beside, walked: false, like_person: 0.0 }
+        Self {
+            born_ns,
+            position_m,
+            beside,
+            walked: false,
+            most_share: MOST_SHARE,
+            left_s: 0.0,
+            like_person: 0.0,
+        }
     }
 
     pub(super) fn age_s(&self, time_ns: i64) -> f64 {
@@ -57,19 +81,39 @@ impl Origin {
     }
 
     /// A detection of the track, which is now here.
-    pub(super) fn see(&mut self, detection: &Detection, position_m: DVec2, speed_mps: f64) {
-        self.walked |= speed_mps > WALKS_FROM_MPS && position_m.distance(self.position_m) > WALKED_M;
+    pub(super) fn see(
+        &mut self,
+        detection: &Detection,
+        view: &BodyView,
+        position_m: DVec2,
+        speed_mps: f64,
+        step_s: f64,
+    ) {
+        let share = f64::from(detection.points) / view.returns.max(f64::MIN_POSITIVE);
+        let is_free = view.beams_known && view.returns > FREE_SHARE * view.returns_alone;
+        let is_left = is_free && share < LEFT_SHARE * self.most_share;
+        if is_free {
+            self.most_share = self.most_share.max(share.min(1.0));
+        }
+        self.walked |=
+            !is_left && speed_mps > WALKS_FROM_MPS && position_m.distance(self.position_m) > WALKED_M;
         let diagonal_m = detection.aabb.size_m().truncate().length();
-        let may_be_person = detection.top_m > PERSON_TOP_M
+        let may_be_person = !is_left
+            && detection.top_m > PERSON_TOP_M
             && diagonal_m < PERSON_DIAGONAL_M
             && detection.top_diagonal_m < HEAD_DIAGONAL_M;
         self.like_person += if may_be_person { 1.0 } else { -NO_PERSON };
+        self.left_s = if is_left { self.left_s + step_s } else { 0.0 };
+        if self.left_s > FURNITURE_AFTER_S {
+            (self.walked, self.like_person) = (false, 0.0);
+        }
     }
 
     /// True once it is taken for something that was put there.
     pub(super) fn is_furniture(&self, time_ns: i64) -> bool {
         let may_be_person = self.like_person > 0.0 && !self.beside;
-        !self.walked && !may_be_person && self.age_s(time_ns) > FURNITURE_AFTER_S
+        let is_left = self.left_s > LEFT_AFTER_S;
+        !self.walked && (is_left || !may_be_person && self.age_s(time_ns) > FURNITURE_AFTER_S)
     }
 }
 
@@ -83,27 +127,55 @@ mod tests {
         seen(Origin::new(DVec2::ZERO, 0, false), seconds, top_m, top_diagonal_m, speed_mps)
     }
 
+    fn of(aabb: Aabb, top_m: f64, top_diagonal_m: f64) -> Detection {
+        Detection {
+            position_m: DVec2::ZERO,
+            covariance_m2: None,
+            z_m: 0.5 * top_m,
+            time_ns: 0,
+            points: 40,
+            full_body: true,
+            top_m,
+            top_diagonal_m,
+            limbs: None,
+            reaches: Vec::new(),
+            aabb,
+            obb: Obb::from_aabb(&aabb),
+        }
+    }
+
     fn seen(mut origin: Origin, seconds: i64, top_m: f64, top_diagonal_m: f64, speed_mps: f64) -> bool {
         let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.3, top_m) };
         for k in 0..10 * seconds {
             let position_m = DVec2::new(0.1 * k as f64 * speed_mps, 0.0);
-            let detection = Detection {
-                position_m,
-                covariance_m2: None,
-                z_m: 0.5 * top_m,
-                time_ns: k * crate::STEP_NS,
-                points: 40,
-                full_body: true,
-                top_m,
-                top_diagonal_m,
-                limbs: None,
-                reaches: Vec::new(),
-                aabb,
-                obb: Obb::from_aabb(&aabb),
-            };
-            origin.see(&detection, position_m, speed_mps);
+            let detection =
+                Detection { position_m, time_ns: k * crate::STEP_NS, ..of(aabb, top_m, top_diagonal_m) };
+            origin.see(&detection, &BodyView::default(), position_m, speed_mps, crate::STEP_S);
         }
         origin.is_furniture(10 * seconds * crate::STEP_NS)
+    }
+
+    /// A track slid along the edges that the background had not learned of a lorry, and had walked.
+    #[test]
+    fn what_is_left_of_an_object_has_not_walked() {
+        let mut origin = Origin::new(DVec2::ZERO, 0, false);
+        let mut see = |points: u32, x_m: f64| {
+            let view =
+                BodyView { returns: 60.0, returns_alone: 60.0, beams_known: true, ..BodyView::default() };
+            let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.3, 1.7) };
+            let detection = Detection { points, ..of(aabb, 1.7, 0.25) };
+            origin.see(&detection, &view, DVec2::new(x_m, 0.0), 0.5, 0.1);
+            (origin.walked, origin.is_furniture(crate::STEP_NS))
+        };
+        assert_eq!((0..10).map(|_| see(50, 0.0)).last(), Some((false, false)));
+        assert_eq!((0..10).map(|k| see(4, 0.2 * f64::from(k))).last(), Some((false, true)));
+        // Somebody is seen whole again, and was a person all the time.
+        assert_eq!(see(50, 1.5), (true, false));
+        assert_eq!(
+            (0..45).map(|_| see(4, 1.5)).last(),
+            Some((false, true)),
+            "it jumped before it was learned"
+        );
     }
 
     #[test]

@@ -268,6 +268,7 @@ impl Person {
             position_sigma_m: largest_sigma(state.position_covariance()),
             height_m: self.height.mean_m(),
             confirmed: self.confirmed && !self.origin.is_furniture(last_ns),
+            walked: self.origin.walked,
             is_furniture: self.origin.is_furniture(last_ns),
         }
     }
@@ -338,7 +339,7 @@ impl Person {
         self.points = detection.points;
         let state = self.filter.state();
         let speed_mps = state.velocity_mps().length();
-        self.origin.see(detection, state.position_m(), speed_mps);
+        self.origin.see(detection, view, state.position_m(), speed_mps, step_s);
         if let Some(limbs) = detection.limbs.as_ref().filter(|_| numbers.limb_phase) {
             self.limb_phase.see(limbs, speed_mps, self.height.mean_m());
         }

@@ -13,6 +13,7 @@ mod locked;
 mod logictronix;
 mod mutations;
 mod nodes;
+mod objects;
 mod scores;
 mod standing;
 mod walls;
@@ -59,7 +60,7 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 53] = [
+const JOBS: [Job; 54] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
@@ -83,6 +84,7 @@ const JOBS: [Job; 53] = [
     job("instructions", "how many instructions a frame takes", 10, Needs::Program("valgrind"), house::instructions),
     job("soak", "a day of people, as fast as it goes: memory, time, numbers", 400, Needs::Asking, house::soak),
     job("living", "furniture put in, people who stand, no empty scan", 15, Needs::Nothing, living::living),
+    job("objects", "objects put in after the empty scan: who is invented, for how long", 6, Needs::Nothing, objects::objects),
     job("standing", "people who stand or sit from the first frame on", 25, Needs::Nothing, standing::standing),
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", 5, Needs::Nothing, glass::glass),
     job("gestures", "people who talk with their hands beside a sensor", 10, Needs::Nothing, gestures::gestures),

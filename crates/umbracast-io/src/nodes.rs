@@ -368,6 +368,7 @@ impl Message for Prior {
             position_sigma_m: 0.0,
             height_m: 0.0,
             confirmed: false,
+            walked: false,
             is_furniture: false,
         }
     }
@@ -379,6 +380,7 @@ impl Message for Prior {
         f.f64("height_m", &mut self.height_m);
         f.bool("confirmed", &mut self.confirmed);
         f.bool("is_furniture", &mut self.is_furniture);
+        f.bool("walked", &mut self.walked);
     }
 }
 

@@ -234,6 +234,17 @@ mod tests {
     }
 
     #[test]
+    fn what_is_put_in_is_there_from_its_time_on() {
+        let mut site = Config::default().site;
+        let before = Scene::empty(&site, 7, 3).unwrap();
+        let furniture =
+            vec![umbracast::site::Furniture { position_m: [0.0; 2], size_m: [7.0, 2.5, 3.0], yaw_deg: 0.0 }];
+        site.simulation.put_in = Some(umbracast::site::PutIn { after_s: 0.2, furniture });
+        let with = Scene::empty(&site, 7, 3).unwrap();
+        assert_eq!([0, 1, 2].map(|k| before[k] == with[k]), [true, true, false]);
+    }
+
+    #[test]
     fn a_scene_that_goes_on_misses_no_packet() {
         let site = Config::default().site;
         let later = |by_s: i64| crowd().later(by_s * 1_000_000_000);

@@ -44,8 +44,8 @@ struct Simulated {
     noise: Noise,
     /// Packets that are not wholly within are not sent.
     powered_ns: Range<i64>,
-    /// From this time on it hangs elsewhere, and sees this.
-    slipped: Option<(i64, Outlook)>,
+    /// From each of these times on it hangs elsewhere or more is there, and it sees this; in order of time.
+    later: Vec<(i64, Outlook)>,
     /// Its clock before true time.
     ahead_ns: i64,
     open: OpenPacket,
@@ -134,15 +134,25 @@ impl Simulated {
         }
         let site_from_sensor = sensor.site_from_sensor();
         let head = Head::new(model, sensor);
-        let slipped = site.simulation.slip.get(&sensor.name).map(|slip| {
-            ((slip.after_s * 1e9) as i64, Outlook::new(site, &slip.slipped(&site_from_sensor), &head))
+        let (slip, put_in) = (site.simulation.slip.get(&sensor.name), &site.simulation.put_in);
+        let mut times_s: Vec<f64> =
+            slip.iter().map(|slip| slip.after_s).chain(put_in.iter().map(|more| more.after_s)).collect();
+        times_s.sort_by(f64::total_cmp);
+        let later = times_s.into_iter().map(|time_s| {
+            let slipped =
+                slip.filter(|slip| slip.after_s <= time_s).map(|slip| slip.slipped(&site_from_sensor));
+            let mut site = site.clone();
+            let more = put_in.iter().filter(|more| more.after_s <= time_s).flat_map(|more| &more.furniture);
+            site.furniture.extend(more.copied());
+            ((time_s * 1e9) as i64, Outlook::new(&site, &slipped.unwrap_or(site_from_sensor), &head))
         });
+        let later = later.collect();
         Ok(Self {
             outlook: Outlook::new(site, &site_from_sensor, &head),
             head,
             noise,
             powered_ns: 0..i64::MAX,
-            slipped,
+            later,
             ahead_ns: site.simulation.clock_ahead_ms.get(&sensor.name).map_or(0, |ms| (ms * 1e6) as i64),
             open: OpenPacket::default(),
         })
@@ -156,10 +166,9 @@ impl Simulated {
 
     /// What is really there.
     fn look(&mut self, index: u64, walkers: &[Walker]) -> View {
-        let outlook = match &mut self.slipped {
-            Some((after_ns, outlook)) if index as i64 * umbracast::STEP_NS >= *after_ns => outlook,
-            _ => &mut self.outlook,
-        };
+        let time_ns = index as i64 * umbracast::STEP_NS;
+        let later = self.later.iter_mut().rev().find(|(after_ns, _)| time_ns >= *after_ns);
+        let outlook = later.map_or(&mut self.outlook, |(_, outlook)| outlook);
         let mut view = View::of_hall(&outlook.hall, &self.head, index);
         for (pane, painter) in (0..).zip(std::iter::once(&mut outlook.painter).chain(&mut outlook.reflected))
         {
