@@ -361,10 +361,9 @@ impl Message for Prior {
     const WHAT: &'static str = "Where a person is expected.";
 
     fn empty() -> Self {
-        let (position_m, velocity_mps) = (DVec2::ZERO, DVec2::ZERO);
         Self {
-            position_m,
-            velocity_mps,
+            position_m: DVec2::ZERO,
+            velocity_mps: DVec2::ZERO,
             position_sigma_m: 0.0,
             height_m: 0.0,
             confirmed: false,
