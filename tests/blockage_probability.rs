@@ -67,6 +67,7 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         gait: GaitPhase::UNKNOWN,
         points: 30,
         confirmed: true,
+        part_of: None,
         aabb,
         obb: Obb::from_aabb(&aabb),
         observed: [Observed { time_ns: 0, position_m, velocity_mps }].into(),

@@ -115,6 +115,7 @@ fn expected_at(position_m: DVec2) -> Prior {
         confirmed: true,
         walked: false,
         is_furniture: false,
+        shape: None,
     }
 }
 

@@ -52,6 +52,8 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         points: 30,
         limbs: None,
         reaches: Vec::new(),
+        bands: Default::default(),
+        is_covered: false,
         full_body: true,
         top_m: 1.7,
         top_diagonal_m: 0.2,

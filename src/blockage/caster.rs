@@ -90,10 +90,14 @@ impl Caster {
     /// ```
     pub fn cast(&mut self, tracks: &[Track], forecasts: &[Forecast], blockages: &mut Vec<Blockage>) {
         blockages.clear();
-        let people = tracks.iter().zip(forecasts).filter(|(track, _)| track.confirmed);
+        let all = tracks.iter().zip(forecasts);
+        let people = all.clone().filter(|(track, _)| track.confirmed);
         match self.method {
             BlockageMethod::Algorithm1 => self.cast_boxes(&people.collect::<Vec<_>>(), blockages),
-            BlockageMethod::Probability => self.cast_samples(people, blockages),
+            BlockageMethod::Probability => {
+                let things = all.filter(|(track, _)| !track.confirmed && track.part_of.is_some());
+                self.cast_samples(people, things, blockages);
+            }
         }
     }
 
@@ -194,10 +198,11 @@ impl Caster {
     fn cast_samples<'a>(
         &mut self,
         people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
+        things: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
         blockages: &mut Vec<Blockage>,
     ) {
         let (numbers, ue) = (&self.numbers, &self.ue);
-        self.sampler.draw(numbers, ue, people.clone());
+        self.sampler.draw(numbers, ue, people.clone().chain(things));
         for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
             for (person, (track, _)) in people.clone().enumerate() {
                 let chances = self.sampler.chances(ue, access_point, ap_m, person, self.threshold);

@@ -45,8 +45,10 @@ pub struct Sampler {
     draws: BTreeMap<u64, Draws>,
     quantiles: Quantiles,
     people: Vec<Trajectories>,
-    /// How many of `people` are in the frame.
+    /// How many of `people` are in the frame, the things of some of them behind all who have links.
     present: usize,
+    /// How many of them have links.
+    links_of: usize,
     /// How many samples each of them has.
     samples: usize,
     /// As they fall from the access point `seen_from`.
@@ -107,6 +109,7 @@ impl Sampler {
             quantiles: Quantiles::new(numbers.samples),
             people: Vec::new(),
             present: 0,
+            links_of: 0,
             samples: numbers.samples,
             shadows: Shadows::default(),
             seen_from: None,
@@ -126,7 +129,7 @@ impl Sampler {
     }
 
     wide! {
-        /// Draws everybody's trajectories. A person's draws depend on the seed, the track and nothing else, so the samples of
+        /// Draws the trajectories of everybody who has links, and then of the things of some of them. A person's draws depend on the seed, the track and nothing else, so the samples of
         /// one frame and the next differ only by what the tracks learned.
         pub fn draw<'a>(
             &mut self,
@@ -143,6 +146,7 @@ impl Sampler {
         ue: &Ue,
         people: impl Iterator<Item = (&'a Track, &'a Forecast)> + Clone,
     ) {
+        self.links_of = people.clone().take_while(|(track, _)| track.confirmed).count();
         self.draws.retain(|&id, _| people.clone().any(|(track, _)| track.id == id));
         // Where there is more to ask than time allows, samples are left out, for all links alike; what is left is a sample of
         // the same distribution, for draws are in no order. A frame has about as much to ask as the one before.
@@ -167,7 +171,7 @@ impl Sampler {
 
     /// Everybody's samples of the frame that was drawn, and how many of each count.
     pub(crate) fn drawn(&self) -> (&[Trajectories], usize) {
-        (&self.people[..self.present], self.samples)
+        (&self.people[..self.links_of], self.samples)
     }
 
     /// Whether the frame before had more meetings than could be asked with all samples.

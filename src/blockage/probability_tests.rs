@@ -44,6 +44,7 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
         gait: GaitPhase { phase_rad: within(3.0), concentration: 1.0 + within(1.0) },
         points: 30,
         confirmed: true,
+        part_of: None,
         aabb,
         obb: Obb::from_aabb(&aabb),
         observed: Default::default(),
@@ -212,6 +213,28 @@ fn a_ray_meets_what_somebody_carries_beside_him() {
         sampler.chances(&config.site.ue, 0, aps_m[0], 1, 0.5).p_now
     };
     assert!(p(0.0) < 0.2 && p(0.1) > 0.8, "{} {}", p(0.0), p(0.1));
+}
+
+#[test]
+fn a_pram_blocks_others_but_not_its_owner_and_has_no_link() {
+    let mut config = Config::default();
+    (config.site.pillars, config.site.furniture) = (Vec::new(), Vec::new());
+    config.site.access_points.truncate(1);
+    config.site.access_points[0].position_m = [8.0, 0.0, 1.2];
+    let stands = |id: u64, x: f64, y: f64| Track::new(id, DVec2::new(x, y), DVec2::ZERO);
+    // Whether the links of somebody aside and of somebody behind the pram are blocked.
+    let blocked = |part_of: Option<u64>| {
+        let pram = Track { confirmed: false, part_of, height_m: 1.1, ..stands(2, 1.0, 0.0) };
+        let tracks = [stands(0, 1.0, 3.0), stands(1, 0.0, 0.0), pram];
+        let forecasts = tracks.each_ref().map(constant_velocity::forecast);
+        let mut blockages = Vec::new();
+        let mut caster = crate::blockage::Caster::new(&config.blockage, &config.site);
+        caster.cast(&tracks, &forecasts, &mut blockages);
+        blockages.iter().map(|link| (link.track, link.p_now > 0.5)).collect::<Vec<_>>()
+    };
+    assert_eq!(blocked(Some(0)), [(0, false), (1, true)]);
+    assert_eq!(blocked(Some(1)), [(0, false), (1, false)], "its owner");
+    assert_eq!(blocked(None), [(0, false), (1, false)], "nobody, and nothing that is known");
 }
 
 #[test]

@@ -114,6 +114,7 @@ impl Shadows {
             let seen = second.seen(p.second.center_m);
             let share = second.share(&seen, p.reach_m, [p.second.radius_m; 4]);
             other as usize != person
+                && p.part_of != Some(q.track)
                 && share.and_then(|share| self.band(rises_of_second_m, share, p, p.floors_m)).is_some()
         });
         for step in 0..MOMENTS {

@@ -38,6 +38,8 @@ pub(crate) struct Trajectories {
     /// How many of them were asked for.
     asked: usize,
     pub(crate) track: u64,
+    /// The track whose thing this is.
+    pub(super) part_of: Option<u64>,
     /// By step: the mean, round which the samples lie.
     pub(crate) mean_m: [DVec2; MOMENTS],
     /// By step: how far.
@@ -111,6 +113,7 @@ impl Trajectories {
         self.samples = samples.next_multiple_of(WORD);
         self.asked = numbers.samples;
         self.track = track.id;
+        self.part_of = track.part_of;
         self.phase = Some(track.gait);
         self.walks = false;
         self.mean_m = std::array::from_fn(|s| position_at(track, forecast, s));

@@ -326,6 +326,7 @@ mod tests {
                     confirmed: true,
                     walked: false,
                     is_furniture: false,
+                    shape: None,
                 });
             }
             clocks.follow(&points, &clusters, &priors);

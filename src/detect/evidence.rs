@@ -2,7 +2,7 @@
 //! body, and parts nearer than two bodies can stand become one. Both thresholds change where people are expected.
 
 use super::arms::{ALONE_M, ARM_M, have_one_head, is_arm};
-use super::canopy::{is_overhead, without_canopy};
+use super::canopy::is_overhead;
 use super::means::{PASSES, means, one_more, people_if};
 use super::memory::{Memory, PEOPLE_OF_CLUSTER};
 use super::part::{POINTS_MIN, Part};
@@ -31,6 +31,8 @@ const CROWD_SIGMA_M: f64 = 0.15;
 /// Two people when the halves of what a known person was given in a crowd lie farther apart than this: what others leave to
 /// see of one body is shorter than a body.
 const BESIDE_M: f64 = 0.30;
+/// Halves of a body that is known lie no farther apart than so many standard deviations of its points.
+const HALVES_OF_LENGTH: f64 = 2.2;
 /// Points that deviate more than this along their longest axis are more than four people in a row.
 const CROWD_M: f64 = 0.7;
 
@@ -43,16 +45,15 @@ pub(super) fn split(
     parts: &mut Vec<Part>,
     memory: &mut Memory,
 ) {
-    let mut all = Part::new(moved_m, cluster);
-    if is_overhead(moved_m, &all) {
-        memory.points.give(all.points);
+    if is_overhead(moved_m, &cluster) {
+        memory.points.give(cluster);
         return;
     }
+    let all = Part::new(moved_m, cluster);
     if all.points.len() < 2 * POINTS_MIN {
         parts.push(all);
         return;
     }
-    without_canopy(moved_m, &mut all);
     let axis_m = all.axis_m(moved_m);
     let is_crowd = axis_m.length() > CROWD_M;
     // Most are one person alone, for whom nothing need be remembered.
@@ -108,10 +109,13 @@ fn split_more(
         one
     });
     // k against k + 1: the longest part gives way to its two halves, and all find their places anew. Legs alone
-    // are never counted: two of them may be one person or two. Nor are the halves of somebody alone with his arms out.
+    // are never counted: two of them may be one person or two. Nor are the halves of somebody alone with his arms out. What is low
+    // and farther from every body than a leg is a thing.
+    let alone = known.first().filter(|_| known.len() == 1).and_then(|&k| priors[k].shape);
+    let halves_m = alone.map_or(HALVES_M, |shape| HALVES_M.max(HALVES_OF_LENGTH * shape.longest_m()));
     let are_more = |more: &[Part]| {
-        are_people(more, HALVES_M)
-            && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M)
+        are_people(more, halves_m)
+            && more.iter().all(|part| part.top_m >= FULL_BODY_TOP_M || is_no_leg(part, more))
             && !(more.len() == 2
                 && expected_near(&[all], priors) < 2
                 && are_of_one_body(moved_m, more, known.len() == 1))
@@ -141,10 +145,11 @@ fn among_known(
             continue;
         }
         whole.look(moved_m);
-        without_canopy(moved_m, &mut whole);
         let ends_m = whole.ends_m(whole.axis_m(moved_m));
+        let beside_m =
+            priors[k].shape.map_or(BESIDE_M, |shape| BESIDE_M.max(HALVES_OF_LENGTH * shape.longest_m()));
         let are_two =
-            |two: &[Part]| are_people(two, BESIDE_M) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M);
+            |two: &[Part]| are_people(two, beside_m) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M);
         let first = parts.len();
         match people_if(moved_m, &whole.points, ends_m, memory, are_two) {
             Some(mut two) => {
@@ -173,6 +178,12 @@ fn are_of_one_body(moved_m: &[DVec3], parts: &[Part], is_known: bool) -> bool {
         have_one_head(moved_m, a, b) || is_arm(moved_m, a, b, is_known) || is_arm(moved_m, b, a, is_known)
     };
     parts.iter().enumerate().any(|(k, a)| parts[k + 1..].iter().any(|b| of_one(a, b)))
+}
+
+/// True of what is farther from every body among `parts` than a leg, where there is one.
+fn is_no_leg(low: &Part, parts: &[Part]) -> bool {
+    let mut bodies = parts.iter().filter(|part| part.top_m >= FULL_BODY_TOP_M).peekable();
+    bodies.peek().is_some() && bodies.all(|body| body.mean_m().distance(low.mean_m()) > LIMB_M)
 }
 
 /// True when all stand apart and show enough.
@@ -367,14 +378,16 @@ fn has_halves(moved_m: &[DVec3], part: &Part, axis_m: DVec2) -> bool {
             break;
         }
     }
-    let is_person =
-        |(_, points, top_m): &(DVec2, f64, f64)| *points >= POINTS_MIN as f64 && *top_m >= FULL_BODY_TOP_M;
-    means_m[0].distance(means_m[1]) > HALVES_M && halves.iter().all(is_person)
+    let shows_enough = halves.iter().all(|(_, points, _)| *points >= POINTS_MIN as f64);
+    let bodies = halves.iter().filter(|(_, _, top_m)| *top_m >= FULL_BODY_TOP_M).count();
+    let apart_m = means_m[0].distance(means_m[1]);
+    shows_enough && apart_m > HALVES_M && (bodies == 2 || bodies == 1 && apart_m > LIMB_M)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::Shape;
 
     /// An upright body of 0.26 x 0.5 m, broad along y.
     fn body(x: f64, y: f64) -> Vec<DVec3> {
@@ -403,6 +416,7 @@ mod tests {
             confirmed: true,
             walked: false,
             is_furniture: false,
+            shape: None,
         }
     }
 
@@ -411,6 +425,31 @@ mod tests {
         assert_eq!(people(&body(0.0, 0.0), &[]), 1);
         assert_eq!(people(&[body(0.0, 0.0), body(0.0, 0.5)].concat(), &[]), 2);
         assert_eq!(people(&[body(0.0, 0.0), body(0.0, 0.5), body(0.0, 1.0)].concat(), &[]), 3);
+    }
+
+    /// A suitcase that is pulled, and what its shaft leaves of the gap to the hand: one cluster with its owner.
+    fn suitcase(x: f64) -> Vec<DVec3> {
+        (0..20)
+            .map(|i| DVec3::new(x + 0.02 * f64::from(i % 10), 0.1 * f64::from(i / 10), 0.03 * f64::from(i)))
+            .collect()
+    }
+
+    #[test]
+    fn a_stranger_who_pulls_a_suitcase_is_told_from_it() {
+        assert_eq!(people(&[body(0.0, 0.0), suitcase(-0.9)].concat(), &[]), 2);
+        let leg: Vec<DVec3> = suitcase(-0.45);
+        assert_eq!(people(&[body(0.0, 0.0), leg].concat(), &[]), 1);
+    }
+
+    #[test]
+    fn a_body_that_is_known_to_be_long_is_not_halved_and_a_stranger_as_long_is() {
+        let long = [body(0.0, 0.0), body(0.5, 0.0)].concat();
+        let mut known = prior(0.25, 0.0);
+        assert_eq!(people(&long, &[known]), 2);
+        let mut shape = Shape::default();
+        long.iter().for_each(|p| shape.bands[0].add(p.truncate() - DVec2::X * 0.25));
+        known.shape = Some(shape);
+        assert_eq!(people(&long, &[known]), 1);
     }
 
     #[test]

@@ -33,9 +33,9 @@ pub struct AxisFeatures {
 /// A point that has been moved.
 #[derive(Debug, Clone)]
 pub struct Seen {
-    at_m: DVec2,
+    pub(super) at_m: DVec2,
     /// Above the floor.
-    z_m: f64,
+    pub(super) z_m: f64,
     /// Horizontal, from the sensor.
     away: DVec2,
     range_m: f64,

@@ -4,6 +4,7 @@
 //! expected positions the four legs of two people look like four people.
 
 use super::Prior;
+use super::shape::{BANDS, band_of};
 use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{DVec2, DVec3};
 
@@ -67,6 +68,8 @@ struct Known {
     variance_m2: f64,
     place_m: DVec2,
     place_variance_m2: f64,
+    /// By band of height, what was learned of the body: means ahead and left, variances.
+    learned: [Option<(DVec2, DVec2)>; BANDS],
     /// Points farther away are not his, whatever their height.
     reach2_m2: f64,
     sum_m: DVec2,
@@ -77,6 +80,15 @@ impl Known {
     fn new(prior: &Prior, sigma_min_m: f64) -> Self {
         let velocity_mps = prior.velocity_mps;
         let variance_m2 = prior.position_sigma_m.max(sigma_min_m).powi(2);
+        let shape = prior.shape.filter(|_| velocity_mps.length() >= WALKS_FROM_MPS);
+        let learned = std::array::from_fn(|band| {
+            let (mean_m, variance_m2) = shape.as_ref()?.band(band)?;
+            Some((mean_m, variance_m2 + DVec2::splat(LEARNED_SIGMA_M.powi(2))))
+        });
+        // With the whole deviation of the mean beside that of the points.
+        let farthest_m2 =
+            |(mean_m, variance_m2): &(DVec2, DVec2)| mean_m.length_squared() + variance_m2.max_element();
+        let reach_m2 = learned.iter().flatten().map(farthest_m2).fold(DEVIATION_MAX_M.powi(2), f64::max);
         Self {
             prior: *prior,
             heading: (velocity_mps.length() >= WALKS_FROM_MPS).then(|| velocity_mps.normalize()),
@@ -84,7 +96,8 @@ impl Known {
             place_m: prior.position_m,
             place_variance_m2: variance_m2,
             // With room for rounding. A place is never less sure than it was expected to be.
-            reach2_m2: 1.001 * GATE * GATE * (DEVIATION_MAX_M.powi(2) + variance_m2),
+            reach2_m2: 1.001 * GATE * GATE * (reach_m2 + variance_m2),
+            learned,
             sum_m: DVec2::ZERO,
             points: 0.0,
         }
@@ -108,15 +121,23 @@ impl Known {
         if off_m.length_squared() > self.reach2_m2 {
             return None;
         }
-        let (along_m, across_m) = deviations_m(point_m.z / self.prior.height_m);
-        let (mut along, mut across) = (along_m.powi(2), across_m.powi(2));
-        if self.heading.is_none() {
-            (along, across) = (0.5 * (along + across), 0.5 * (along + across));
-        }
         let heading = self.heading.unwrap_or(DVec2::X);
-        (along, across) = (along + self.place_variance_m2, across + self.place_variance_m2);
-        let squared = off_m.dot(heading).powi(2) / along + off_m.perp_dot(heading).powi(2) / across;
+        let (mean_m, variance_m2) =
+            self.learned[band_of(point_m.z)].unwrap_or_else(|| (DVec2::ZERO, self.usual_m2(point_m.z)));
+        let DVec2 { x: along, y: across } = variance_m2 + DVec2::splat(self.place_variance_m2);
+        let off_m = DVec2::new(off_m.dot(heading), heading.perp_dot(off_m)) - mean_m;
+        let squared = off_m.x.powi(2) / along + off_m.y.powi(2) / across;
         (squared < GATE * GATE).then(|| squared + (along * across).ln())
+    }
+
+    /// Variances of a usual body's points along its way and across it; of who stands the same for any direction.
+    fn usual_m2(&self, height_m: f64) -> DVec2 {
+        let (along_m, across_m) = deviations_m(height_m / self.prior.height_m);
+        let (along, across) = (along_m.powi(2), across_m.powi(2));
+        match self.heading {
+            Some(_) => DVec2::new(along, across),
+            None => DVec2::splat(0.5 * (along + across)),
+        }
     }
 }
 
@@ -126,6 +147,8 @@ fn likeliest(point_m: DVec3, known: &[Known]) -> Option<usize> {
     near.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(k, _)| k)
 }
 
+/// What is learned of a body is not surer than this: limbs swing.
+const LEARNED_SIGMA_M: f64 = 0.05;
 /// No deviation is larger.
 const DEVIATION_MAX_M: f64 = 0.28;
 
@@ -139,6 +162,7 @@ fn deviations_m(height_share: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::Shape;
 
     fn prior(x: f64, y: f64, velocity_mps: DVec2) -> Prior {
         Prior {
@@ -149,6 +173,7 @@ mod tests {
             confirmed: true,
             walked: false,
             is_furniture: false,
+            shape: None,
         }
     }
 
@@ -161,6 +186,27 @@ mod tests {
         let mut memory = Memory::default();
         find_owners(&points_m, &[0, 1, 2, 3], people.iter(), 0.05, &mut memory);
         assert_eq!(memory.owners, [Some(0), Some(0), Some(1), Some(1)]);
+    }
+
+    #[test]
+    fn knees_of_who_is_known_to_sit_ahead_of_them_are_his_and_not_of_who_stands_there() {
+        let mut sits = prior(0.0, 0.0, DVec2::X);
+        let mut shape = Shape::default();
+        for band in &mut shape.bands[..3] {
+            [[0.4, 0.1], [0.6, -0.1], [0.1, 0.0], [0.3, 0.0]]
+                .iter()
+                .for_each(|at_m| band.add(DVec2::from_array(*at_m)));
+        }
+        sits.shape = Some(shape);
+        let stands = prior(0.9, 0.0, DVec2::ZERO);
+        let knees_m = [DVec3::new(0.5, 0.1, 0.6), DVec3::new(0.55, -0.1, 0.5)];
+        let owners = |sits: Prior| {
+            let mut memory = Memory::default();
+            find_owners(&knees_m, &[0, 1], [sits, stands].iter(), 0.05, &mut memory);
+            memory.owners
+        };
+        assert_eq!(owners(sits), [Some(0); 2]);
+        assert_eq!(owners(Prior { shape: None, ..sits }), [Some(1); 2], "of whom nothing is known");
     }
 
     #[test]

@@ -73,6 +73,7 @@ mod tests {
         confirmed: true,
         walked: false,
         is_furniture: false,
+        shape: None,
     };
 
     /// A walker along y at a phase: feet under the hips, hands beside them, each a point, a swing apart.

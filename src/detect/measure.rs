@@ -2,10 +2,12 @@
 //! frame.
 
 use super::axis::{AxisModel, Network};
+use super::canopy::OVERHEAD_M;
 use super::evidence::FULL_BODY_TOP_M;
 use super::features::{AxisFeatures, Seen};
 use super::limbs::LimbCovariance;
 use super::outline::{LEVELS, Reach, reaches};
+use super::shape::{BANDS, Moments, band_of};
 use super::{Cluster, Detection, Point, Prior};
 use crate::Site;
 use crate::config::{DetectConfig, Mechanism, PositionMethod};
@@ -22,6 +24,8 @@ const EXPECTED_M: f64 = 0.55;
 const HEAD_M: f64 = 0.2;
 /// A prior farther than this from a cluster does not tell where its person walks.
 const OWN_M: f64 = 0.5;
+/// What hangs so near to somebody's axis, in plan view, may hide the head.
+const OVER_M: f64 = 0.6;
 /// A wheelchair is 1.3 m from corner to corner, and who sits in one reaches no higher than this.
 const SEATED_DIAGONAL_MAX_M: f64 = 1.5;
 const SEATED_HEIGHT_M: f64 = 1.5;
@@ -86,6 +90,10 @@ pub struct Measurer {
     sensors_m: Vec<DVec3>,
     hall: Hall,
     axis: Network,
+    /// By point: whether a cluster has it.
+    is_taken: Vec<bool>,
+    /// Where points lie that hang over people.
+    overhead_m: Vec<DVec2>,
     /// A person's points, moved.
     seen: Vec<Seen>,
     /// Memory of the last frame's detections.
@@ -111,6 +119,8 @@ impl Measurer {
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
             hall: site.hall.clone(),
             axis: Network::of(AxisModel::shipped()),
+            is_taken: Vec::new(),
+            overhead_m: Vec::new(),
             seen: Vec::new(),
             spare: Vec::new(),
         }
@@ -140,6 +150,7 @@ impl Measurer {
     ) {
         self.spare.extend(detections.drain(..).map(|detection| detection.reaches));
         let mut seen = std::mem::take(&mut self.seen);
+        self.look_up(points, clusters);
         for cluster in clusters {
             let aabb = self.above_floor(points, cluster).1;
             let expected = self.is_expected(points, cluster, &aabb, priors);
@@ -155,6 +166,18 @@ impl Measurer {
             }
         }
         self.seen = seen;
+    }
+
+    /// Finds what hangs over people: no cluster has it.
+    fn look_up(&mut self, points: &[Point], clusters: &[Cluster]) {
+        self.is_taken.clear();
+        self.is_taken.resize(points.len(), false);
+        clusters.iter().flatten().for_each(|&i| self.is_taken[i as usize] = true);
+        let nobodys =
+            points.iter().zip(&self.is_taken).filter(|(_, taken)| !**taken).map(|(p, _)| p.position_m);
+        let high = nobodys.filter(|p| p.z - self.hall.floor_m(p.truncate()) > OVERHEAD_M);
+        self.overhead_m.clear();
+        self.overhead_m.extend(high.map(|p| p.truncate()));
     }
 
     /// How high the floor is where a person's points are in the middle, and the box of the points from there.
@@ -234,6 +257,10 @@ impl Measurer {
                 (position_m, mean_m.z, Some(covariance_m2))
             }
         };
+        let mut bands = [Moments::default(); BANDS];
+        if covariance_m2.is_some() {
+            seen.iter().for_each(|s| bands[band_of(s.z_m)].add(s.at_m - position_m));
+        }
         let who = nearest(mean_m.truncate(), priors);
         let limbs = who.and_then(|who| LimbCovariance::of(of(), position_m.extend(floor_m), who));
         let of_top = places_m().filter(|p| p.z >= aabb.max_m.z - HEAD_M);
@@ -252,6 +279,8 @@ impl Measurer {
             covariance_m2,
             limbs,
             reaches: all_reaches,
+            bands,
+            is_covered: self.overhead_m.iter().any(|p| p.distance(position_m) < OVER_M),
             z_m,
             time_ns,
             points: cluster.len() as u32,
@@ -377,6 +406,7 @@ mod tests {
             confirmed: true,
             walked: false,
             is_furniture: false,
+            shape: None,
         };
         let config = Config::default();
         let mut detections = Vec::new();
@@ -412,6 +442,7 @@ mod tests {
                 confirmed: true,
                 walked: false,
                 is_furniture: false,
+                shape: None,
             };
             let config = Config::default();
             let mut detections = Vec::new();

@@ -14,8 +14,9 @@ mod background;
 #[doc(hidden)] // What the model of the body axis reads, for its fit.
 pub mod features;
 mod dp_means;
-mod guided;
 mod part;
+mod shape;
+mod guided;
 mod memory;
 mod means;
 mod canopy;
@@ -41,6 +42,7 @@ pub use measure::Measurer;
 #[doc(hidden)] // For the card of the model of the body axis.
 pub use measure::SHIFT_M;
 pub use outline::{LEVELS, Reach};
+pub use shape::{BANDS, Moments, Shape};
 pub use split_merge::Clusterer;
 
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
@@ -91,6 +93,8 @@ pub struct Prior {
     pub walked: bool,
     /// True of what has been there for long and never walked: nobody, but something that was put there.
     pub is_furniture: bool,
+    /// How the points of the body lie, where it was learned.
+    pub shape: Option<Shape>,
 }
 
 /// Points of one person: indices into the foreground, ascending.
@@ -123,10 +127,14 @@ pub struct Detection {
     pub top_m: f64,
     /// Diagonal in plan view of what lies at most 0.2 m below the highest point: a head is small, a cupboard's top is not.
     pub top_diagonal_m: f64,
+    /// Whether something hangs over it, such as an umbrella: its top need not be a head.
+    pub is_covered: bool,
     /// How arms and legs of a known walker lie.
     pub limbs: Option<LimbCovariance>,
     /// How far the body of somebody known reaches, by sensor and level.
     pub reaches: Vec<Reach>,
+    /// How the points lie about the position, band by band, along the site's axes.
+    pub bands: [Moments; BANDS],
     /// Box along the site's axes, in the site frame.
     pub aabb: Aabb,
     /// Box along the cluster's axes, the same.

@@ -1,5 +1,6 @@
 //! One cluster, one person: Haselich's split-merge, or evidence for one person more or fewer.
 
+use super::canopy::Canopies;
 use super::cluster::PlanGrid;
 use super::dp_means::MergeMean;
 use super::features::away;
@@ -56,6 +57,9 @@ pub struct Clusterer {
     grid: PlanGrid,
     /// Each point, moved behind the surface that its sensor saw, with its height above the floor.
     moved_m: Vec<DVec3>,
+    canopies: Canopies,
+    /// The points that are of no canopy.
+    shown: Vec<u32>,
     plan_m: Vec<DVec2>,
     radius_m: Vec<f64>,
     labels: Vec<u32>,
@@ -86,6 +90,8 @@ impl Clusterer {
             hall: site.hall.clone(),
             grid: PlanGrid::default(),
             moved_m: Vec::new(),
+            canopies: Canopies::default(),
+            shown: Vec::new(),
             plan_m: Vec::new(),
             radius_m: Vec::new(),
             labels: Vec::new(),
@@ -152,22 +158,30 @@ impl Clusterer {
     /// Connected components in plan view.
     fn components(&mut self, points: &[Point]) {
         self.moved_m.clear();
+        for point in points {
+            let behind_m = (away(&self.sensors_m, point) * self.radius.shift_m).extend(0.0);
+            self.moved_m.push(above_floor(&self.hall, point.position_m) + behind_m);
+        }
+        self.shown.clear();
+        match self.method {
+            ClusterMethod::Evidence => self.canopies.leave_out(&self.moved_m, &mut self.shown),
+            ClusterMethod::Haselich | ClusterMethod::HaselichAsShipped => {
+                self.shown.extend(0..points.len() as u32);
+            }
+        }
         self.plan_m.clear();
         self.radius_m.clear();
-        for point in points {
-            let range_m =
-                self.sensors_m.iter().map(|s| s.distance(point.position_m)).fold(f64::INFINITY, f64::min);
+        for &i in &self.shown {
+            let position_m = points[i as usize].position_m;
+            let range_m = self.sensors_m.iter().map(|s| s.distance(position_m)).fold(f64::INFINITY, f64::min);
             let range_m = if range_m.is_finite() { range_m } else { 0.0 };
-            let behind_m = (away(&self.sensors_m, point) * self.radius.shift_m).extend(0.0);
-            let moved_m = above_floor(&self.hall, point.position_m) + behind_m;
-            self.moved_m.push(moved_m);
-            self.plan_m.push(moved_m.truncate());
+            self.plan_m.push(self.moved_m[i as usize].truncate());
             self.radius_m.push(self.radius.radius_m + self.radius.per_range * range_m);
         }
         let found =
             self.grid.components(&self.plan_m, &self.radius_m, self.radius.radius_m, &mut self.labels);
         self.components.resize_with(found, || self.memory.take_points());
-        for (&label, i) in self.labels.iter().zip(0..) {
+        for (&label, &i) in self.labels.iter().zip(&self.shown) {
             self.components[label as usize].push(i);
         }
     }

@@ -221,6 +221,7 @@ pub(super) mod tests {
             gait: crate::gait::GaitPhase::UNKNOWN,
             points: 30,
             confirmed: true,
+            part_of: None,
             aabb: Aabb { min_m: DVec3::ZERO, max_m: DVec3::ONE },
             obb: Obb { center_m: DVec3::ZERO, half_m: DVec3::ONE, site_from_box: DMat3::IDENTITY },
             observed,

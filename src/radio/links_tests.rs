@@ -31,6 +31,7 @@ pub(in crate::radio) fn somebody(id: u64, position_m: DVec2, velocity_mps: DVec2
         gait: crate::gait::GaitPhase::UNKNOWN,
         points: 30,
         confirmed: true,
+        part_of: None,
         aabb,
         obb: Obb::from_aabb(&aabb),
         observed: Default::default(),

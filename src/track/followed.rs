@@ -60,6 +60,9 @@ pub struct Track {
     /// False until the track has been seen often enough to be believed, while it has been out of sight so long that its
     /// position says little, and from when on it is taken for furniture, for it never walked.
     pub confirmed: bool,
+    /// Whose pram, walking frame or other thing it is, the `id` of a track: it is nobody and has no link, but it stands in the way
+    /// of everybody else's.
+    pub part_of: Option<u64>,
     /// The person's box along the site's axes, at `position_m`.
     pub aabb: Aabb,
     /// The person's oriented box, at `position_m`.

@@ -56,6 +56,7 @@ impl Track {
             gait: GaitPhase::UNKNOWN,
             points: 0,
             confirmed: true,
+            part_of: None,
             aabb: Aabb { min_m: DVec3::ZERO, max_m: DVec3::ZERO },
             obb: Obb { center_m: DVec3::ZERO, half_m: DVec3::ZERO, site_from_box: DMat3::IDENTITY },
             observed: Default::default(),

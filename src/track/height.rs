@@ -23,6 +23,8 @@ const CHILD_MAX_M: f64 = 1.50;
 const TOP_SIGMA_M: f64 = 0.025;
 /// Chance of a highest point that says nothing (an arm raised, a bag, another body's point).
 const OUTLIER: f64 = 0.05;
+/// No height is less likely than this, so that a track which was another body's for long finds its height within some seconds.
+const LEAST_LOG_P: f64 = -25.0;
 /// Frames that follow each other say nearly the same: each counts as this share of one.
 const NEW_IN_A_FRAME: f64 = 0.2;
 /// The lowest tops of a gap hardly occur, for of all columns and sensors that meet a head the highest point counts:
@@ -115,7 +117,8 @@ impl Height {
             self.log_p.as_chunks_mut::<LANES>().0.iter_mut().zip(HEIGHTS_M.as_chunks::<LANES>().0)
         {
             for k in 0..LANES {
-                log_p[k] -= most;
+                let below = log_p[k] - most;
+                log_p[k] = if below > LEAST_LOG_P { below } else { LEAST_LOG_P };
                 let p = exp(log_p[k]);
                 sums[0][k] += p;
                 sums[1][k] += p * height_m[k];
@@ -181,5 +184,19 @@ mod tests {
         let before_m = height.mean_m();
         height.see(2.1, 1.0 / 0.2);
         assert!((height.mean_m() - before_m).abs() < 0.02, "{before_m} to {}", height.mean_m());
+    }
+
+    /// A track that followed a pram for a minute, and was given its owner in a crowd, called him 1.02 m tall for good.
+    #[test]
+    fn a_height_that_was_sure_changes_its_mind_within_seconds() {
+        let mut height = Height::new(1.72, 0.09, 0.1);
+        let sweep = |height: &mut Height, top_m: f64, frames: u32| {
+            (0..frames)
+                .for_each(|frame| height.see(top_m - 0.2 * f64::from(frame * 7 % 20) / 20.0, 1.0 / 0.2));
+        };
+        sweep(&mut height, 1.05, 600);
+        assert!((height.mean_m() - 1.05).abs() < 0.03, "{}", height.mean_m());
+        sweep(&mut height, 1.75, 60);
+        assert!((height.mean_m() - 1.75).abs() < 0.05, "{}", height.mean_m());
     }
 }

@@ -22,6 +22,7 @@ mod heading;
 mod followed;
 mod origin;
 mod attached;
+mod shape;
 mod person;
 mod given;
 mod mixture;

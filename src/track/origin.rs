@@ -139,6 +139,8 @@ mod tests {
             top_diagonal_m,
             limbs: None,
             reaches: Vec::new(),
+            bands: Default::default(),
+            is_covered: false,
             aabb,
             obb: Obb::from_aabb(&aabb),
         }

@@ -129,6 +129,8 @@ const DEVIATIONS_MAX: f64 = 3.0;
 
 /// Within this time the axis moves to where the outline says.
 const CENTRED_S: f64 = 2.0;
+/// What reaches so much farther all round than a usual body is a chair's, and the axis is not in its middle.
+const ROUND_MAX_M: f64 = 0.06;
 /// Detections of nobody's axis are farther off in the long run: who sits shows his feet ahead, which tells nothing.
 const OFFSET_MAX_M: f64 = 0.06;
 
@@ -187,7 +189,10 @@ impl Outline {
                 .map(|(level, weight)| from_detections_m(level) * weight)
                 .sum::<f64>()
         };
-        let told_m = DVec2::new(told(0, &usual.centre_ahead), told(1, &usual.centre_left));
+        let told_m = match self.levels.iter().any(|level| level.mean_m[2] > ROUND_MAX_M) {
+            true => DVec2::ZERO,
+            false => DVec2::new(told(0, &usual.centre_ahead), told(1, &usual.centre_left)),
+        };
         let moved_m = (told_m.clamp_length_max(OFFSET_MAX_M) - self.offset_m) * (step_s / CENTRED_S).min(1.0);
         self.offset_m += moved_m;
         for level in &mut self.levels {

@@ -13,6 +13,7 @@ use super::numbers::Numbers;
 use super::origin::Origin;
 use super::outline::{Axis, Outline};
 use super::remembered::{Remembered, Words};
+use super::shape::LearnedShape;
 use super::visibility::{Body, BodyView, Visibility};
 use crate::detect::{Detection, Prior};
 use crate::gait::relative_speed_hz;
@@ -90,12 +91,15 @@ pub(super) struct Person {
     heading: Heading,
     height: Height,
     outline: Outline,
+    shape: LearnedShape,
     /// Whether it is a part of somebody, or moved by one.
     pub(super) attached: Attached,
     /// Averaged extent along x and y.
     extent_m: DVec2,
     /// Averaged highest point of frames in which a head would have been seen.
     shown_top_m: f64,
+    /// In how many frames.
+    tops_shown: u32,
     observed: Observations,
 }
 
@@ -116,9 +120,11 @@ impl Remembered for Person {
         self.heading.visit(words);
         self.height.visit(words);
         self.outline.visit(words);
+        self.shape.visit(words);
         self.attached.visit(words);
         words.vec2(&mut self.extent_m);
         words.f64(&mut self.shown_top_m);
+        words.u32(&mut self.tops_shown);
         self.observed.visit(words);
     }
 }
@@ -164,9 +170,11 @@ impl Person {
             heading: Heading::ANY,
             height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
             outline: Outline::new(&numbers.usual),
+            shape: LearnedShape::default(),
             attached: Attached::default(),
             extent_m: DVec2::splat(WIDTH_M),
             shown_top_m: HEIGHT_MEAN_M,
+            tops_shown: 0,
             observed: Observations::default(),
         }
     }
@@ -239,6 +247,11 @@ impl Person {
         self.origin.is_furniture(time_ns).then(|| self.filter.position_m())
     }
 
+    /// Mean and one standard deviation.
+    pub(super) fn height_m(&self) -> (f64, f64) {
+        (self.height.mean_m(), self.height.sigma_m())
+    }
+
     /// Whether it has a detection in this frame.
     pub(super) fn is_seen(&self) -> bool {
         self.points > 0
@@ -247,6 +260,7 @@ impl Person {
     /// As others may move beside it.
     pub(super) fn beside(&self) -> Beside {
         Beside {
+            id: self.id,
             position_m: self.filter.position_m(),
             velocity_mps: self.filter.velocity_mps(),
             height_m: self.height.mean_m(),
@@ -270,6 +284,7 @@ impl Person {
             confirmed: self.confirmed && !self.origin.is_furniture(last_ns),
             walked: self.origin.walked,
             is_furniture: self.origin.is_furniture(last_ns),
+            shape: self.shape.known(),
         }
     }
 
@@ -300,7 +315,8 @@ impl Person {
             heading_rad: self.heading.mean_rad,
             heading_sigma_rad: self.heading.sigma_rad(),
             heading_behind: self.heading.behind,
-            height_m: self.height.mean_m(),
+            // A thing may be lower than anybody.
+            height_m: if self.attached.is_thing() { self.shown_top_m } else { self.height.mean_m() },
             height_sigma_m: self.height.sigma_m(),
             width_scale: 1.0,
             width_scale_sigma: WIDTH_SCALE_SIGMA,
@@ -310,7 +326,9 @@ impl Person {
             confirmed: self.confirmed
                 && !self.origin.is_furniture(time_ns)
                 && !self.attached.is_thing()
+                && !self.attached.is_undecided()
                 && largest_sigma(state.position_covariance()) < REPORTED_SIGMA_MAX_M,
+            part_of: self.attached.part_of(),
             aabb,
             obb,
             observed,
@@ -343,7 +361,7 @@ impl Person {
         if let Some(limbs) = detection.limbs.as_ref().filter(|_| numbers.limb_phase) {
             self.limb_phase.see(limbs, speed_mps, self.height.mean_m());
         }
-        if !view.on_step {
+        if !view.on_step && !detection.is_covered {
             self.height.see(detection.top_m, view.beams_per_m_at_top);
         }
         self.heading.see(detection, view, speed_mps);
@@ -357,9 +375,22 @@ impl Person {
         if !view.beams_known {
             self.shown_top_m = height_m;
         } else if view.top_m > SHOWN_SHARE * height_m {
-            let new = new.max(1.0 / f64::from(self.matches));
+            self.tops_shown += 1;
+            let new = new.max(1.0 / f64::from(self.tops_shown));
             self.shown_top_m += (detection.top_m * height_m / view.top_m - self.shown_top_m) * new;
         }
+    }
+
+    /// Learns how the points lie of who walks with nobody near.
+    pub(super) fn see_alone(&mut self, detection: &Detection, view: &BodyView) {
+        let (position_m, velocity_mps) = (self.filter.position_m(), self.filter.velocity_mps());
+        if !detection.full_body
+            || view.returns < FREE_SHARE * view.returns_alone
+            || velocity_mps.length() < OUTLINE_FROM_MPS
+        {
+            return;
+        }
+        self.shape.see(&detection.bands, detection.position_m - position_m, velocity_mps.normalize());
     }
 
     /// Learns the outline from a detection in free sight, where it is known which way the body faces.
@@ -457,6 +488,8 @@ mod tests {
             points,
             limbs: None,
             reaches: Vec::new(),
+            bands: Default::default(),
+            is_covered: false,
             full_body: true,
             top_m: HEIGHT_MEAN_M,
             top_diagonal_m: 0.2,

@@ -72,6 +72,14 @@ pub(super) trait Words {
         }
     }
 
+    /// A number that may not be there.
+    fn maybe_word(&mut self, value: &mut Option<u64>) {
+        let (mut there, mut word) = (value.is_some(), value.unwrap_or(0));
+        self.bool(&mut there);
+        self.word(&mut word);
+        *value = there.then_some(word);
+    }
+
     /// A time that may not be there.
     fn maybe_i64(&mut self, value: &mut Option<i64>) {
         let (mut there, mut time) = (value.is_some(), value.unwrap_or(0));

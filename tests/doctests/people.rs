@@ -39,6 +39,8 @@ pub fn detection(x_m: f64, time_ns: i64) -> umbracast::detect::Detection {
         top_diagonal_m: 0.2,
         limbs: None,
             reaches: Vec::new(),
+            bands: Default::default(),
+            is_covered: false,
         aabb,
         obb: Obb::from_aabb(&aabb),
     }

@@ -369,6 +369,7 @@ impl Message for Prior {
             confirmed: false,
             walked: false,
             is_furniture: false,
+            shape: None,
         }
     }
 
@@ -404,6 +405,7 @@ impl Message for Track {
             gait: GaitPhase::UNKNOWN,
             points: 0,
             confirmed: false,
+            part_of: None,
             aabb: Aabb { min_m: DVec3::ZERO, max_m: DVec3::ZERO },
             obb: Obb { center_m: DVec3::ZERO, half_m: DVec3::ZERO, site_from_box: DMat3::ZERO },
             observed: VecDeque::new(),
@@ -427,6 +429,10 @@ impl Message for Track {
         f.f64("gait_concentration", &mut self.gait.concentration);
         f.u32("points", &mut self.points);
         f.bool("confirmed", &mut self.confirmed);
+        let (mut is_part, mut part_of) = (self.part_of.is_some(), self.part_of.unwrap_or_default());
+        f.bool("is_part", &mut is_part);
+        f.u64("part_of", &mut part_of);
+        self.part_of = is_part.then_some(part_of);
         vec3(f, "aabb_min_m", &mut self.aabb.min_m);
         vec3(f, "aabb_max_m", &mut self.aabb.max_m);
         vec3(f, "obb_center_m", &mut self.obb.center_m);

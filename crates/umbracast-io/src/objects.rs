@@ -160,6 +160,8 @@ fn detection(object: &Object, after_s: f64, time_ns: i64) -> Option<Detection> {
         top_diagonal_m: 0.0, // Nobody says: what is listed is somebody.
         limbs: None,
         reaches: Vec::new(),
+        bands: Default::default(),
+        is_covered: false,
         aabb: Aabb { min_m: obb.center_m - reach_m, max_m: obb.center_m + reach_m },
         obb,
     })

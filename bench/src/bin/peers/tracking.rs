@@ -82,6 +82,8 @@ fn detection(at_m: DVec2, time_ns: i64) -> Detection {
         top_diagonal_m: 0.2,
         limbs: None,
         reaches: Vec::new(),
+        bands: Default::default(),
+        is_covered: false,
         aabb,
         obb: Obb::from_aabb(&aabb),
     }
