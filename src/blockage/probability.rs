@@ -129,8 +129,8 @@ impl Sampler {
     }
 
     wide! {
-        /// Draws the trajectories of everybody who has links, and then of the things of some of them. A person's draws depend on the seed, the track and nothing else, so the samples of
-        /// one frame and the next differ only by what the tracks learned.
+        /// Draws the trajectories of everybody who has links, and then of the things of some of them. A person's draws depend on the
+        /// seed, the track and nothing else, so the samples of one frame and the next differ only by what the tracks learned.
         pub fn draw<'a>(
             &mut self,
             numbers: &Numbers,

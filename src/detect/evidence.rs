@@ -1,8 +1,9 @@
 //! One person more, or one fewer? A cluster is split as long as its parts lie farther apart than the halves of one
 //! body, and parts nearer than two bodies can stand become one. Both thresholds change where people are expected.
 
-use super::arms::{ALONE_M, ARM_M, have_one_head, is_arm};
+use super::arms::{ARM_M, have_one_head, is_arm};
 use super::canopy::is_overhead;
+use super::expected::{EXPECTED_HALVES_M, are_expected_apart, expected, expected_near};
 use super::means::{PASSES, means, one_more, people_if};
 use super::memory::{Memory, PEOPLE_OF_CLUSTER};
 use super::part::{POINTS_MIN, Part};
@@ -12,10 +13,6 @@ use crate::geometry::{DVec2, DVec3};
 /// Two people when the means of the halves of a cluster lie farther apart than this: the halves of one body are at most
 /// 0.35 m apart, of two side by side 0.45 m.
 const HALVES_M: f64 = 0.42;
-/// The same where two people are known, who may come closer.
-const EXPECTED_HALVES_M: f64 = 0.3;
-/// A point or part nearer than this to an expected person may be that person.
-const EXPECTED_M: f64 = 0.3;
 /// What ends below this height is legs alone: the hips of most adults.
 pub(super) const FULL_BODY_TOP_M: f64 = 0.9;
 /// Parts whose means are nearer than this are one person: nobody's body axis comes nearer to another's.
@@ -317,41 +314,6 @@ fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> boo
     // Who is not known has no arms here, for strangers who stand close show as little of themselves.
     (is_arm(moved_m, small, large, true) || is_arm(moved_m, large, small, true))
         && expected_near(&[small, large], priors) == 1
-}
-
-/// How many confirmed people are expected so near to any of these that none of them is alone.
-fn expected_near(parts: &[&Part], priors: &[Prior]) -> usize {
-    let is_near = |prior: &&Prior| {
-        prior.confirmed && parts.iter().any(|part| prior.position_m.distance(part.mean_m()) < ALONE_M)
-    };
-    priors.iter().filter(is_near).count()
-}
-
-/// True when each of the two is where another confirmed person is expected.
-fn are_expected_apart(a_m: DVec2, b_m: DVec2, priors: &[Prior]) -> bool {
-    let nearest = |p_m: DVec2| {
-        let confirmed = priors.iter().filter(|prior| prior.confirmed).map(|prior| prior.position_m);
-        confirmed.min_by(|a, b| a.distance_squared(p_m).total_cmp(&b.distance_squared(p_m)))
-    };
-    let (Some(p), Some(q)) = (nearest(a_m), nearest(b_m)) else { return false };
-    let own = |prior_m: DVec2, p_m: DVec2| prior_m.distance(p_m) < EXPECTED_M;
-    p.distance(q) > EXPECTED_HALVES_M && own(p, a_m) && own(q, b_m)
-}
-
-/// Which confirmed people are expected within the cluster.
-fn expected(moved_m: &[DVec3], priors: &[Prior], cluster: &[u32]) -> impl Iterator<Item = usize> {
-    let of = || cluster.iter().map(|&i| moved_m[i as usize].truncate());
-    let bounds_m = |(least, most): (DVec2, DVec2), p: DVec2| (least.min(p), most.max(p));
-    let (least_m, most_m) = of().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), bounds_m);
-    let is_inside = move |prior: &Prior| {
-        let at_m = prior.position_m;
-        // Most people are elsewhere.
-        let away_m = at_m - at_m.clamp(least_m, most_m);
-        prior.confirmed
-            && away_m.length_squared() < EXPECTED_M * EXPECTED_M
-            && of().any(|p| p.distance(at_m) < EXPECTED_M)
-    };
-    (0..priors.len()).filter(move |&k| is_inside(&priors[k]))
 }
 
 /// True when both halves of a part, a step along this axis to either side of its middle, might be people: what [`means`] would

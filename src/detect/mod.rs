@@ -21,6 +21,7 @@ mod memory;
 mod means;
 mod canopy;
 mod arms;
+mod expected;
 mod evidence;
 mod split_merge;
 #[doc(hidden)] // The model of the body axis, for its fit and for the command that shows it.

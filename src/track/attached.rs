@@ -1,7 +1,7 @@
 //! What goes with somebody's body and is too long and low to be one who walks: a wheelchair before its rider's trunk, a pram, a walking
 //! frame. It is followed, for what is known to be there confuses nobody, and it is nobody.
 
-use super::person::HEIGHT_MEAN_M;
+use super::height::HEIGHT_MEAN_M;
 use super::remembered::{Remembered, Words};
 use crate::geometry::DVec2;
 
@@ -127,7 +127,10 @@ impl Attached {
             self.lasted_s = (self.lasted_s - step_s).max(0.0);
         }
         self.watched_s += step_s;
-        self.is_undecided = self.watched_s < DECIDED_AFTER_S && all.iter().any(|body| body.is_over(thing));
+        // Of a body as new nothing but a prior tells the height; what it shows does.
+        let is_low_beside =
+            |body: &Beside| body.is_over(thing) && thing.shown_top_m < HEIGHT_SHARE * body.shown_top_m;
+        self.is_undecided = self.watched_s < DECIDED_AFTER_S && all.iter().any(is_low_beside);
         self.is_thing = self.lasted_s > if self.is_thing { 0.0 } else { THING_AFTER_S };
     }
 }
@@ -183,8 +186,8 @@ mod tests {
             attached.is_undecided()
         };
         assert_eq!([after(3, &mut attached), after(10, &mut attached)], [true, false]);
-        let mut alone = Attached::default();
-        alone.look(&child, &[child], 0.1);
-        assert!(!alone.is_undecided());
+        let (mut among_children, other) = (Attached::default(), beside(0.5, 0.4, 1.2, 0.4));
+        among_children.look(&child, &[child, other], 0.1);
+        assert!(!among_children.is_undecided());
     }
 }

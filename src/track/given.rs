@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::followed::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
-use super::person::HEIGHT_MEAN_M;
+use super::height::HEIGHT_MEAN_M;
 use crate::STEP_NS;
 use crate::gait::{GaitPhase, WALKS_FROM_MPS};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};

@@ -6,6 +6,8 @@
 use super::remembered::{Remembered, Words};
 use crate::elementary::{exp, ln, wide};
 
+/// Mean standing height of adults in shoes.
+pub(super) const HEIGHT_MEAN_M: f64 = 1.72;
 /// Lowest height of an adult that is thought of, metres.
 const ADULT_M: f64 = 1.30;
 /// Cells that are added up side by side: no cell may be left over.

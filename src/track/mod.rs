@@ -19,6 +19,7 @@ mod limb_phase;
 pub mod visibility;
 mod height;
 mod heading;
+mod noise;
 mod followed;
 mod origin;
 mod attached;

@@ -2,6 +2,7 @@
 
 use crate::cdr::{Decoder, Encoder};
 use crate::messages::{HEADER_DEFINITIONS, Schema};
+use umbracast::geometry::{DMat3, DVec2, DVec3};
 
 /// A message, or a part of one.
 pub trait Message: Sized {
@@ -49,6 +50,30 @@ pub trait Fields: Sized {
     fn one<M: Message>(&mut self, name: &str, value: &mut M);
     /// Any number of them.
     fn list<M: Message>(&mut self, name: &str, values: &mut Vec<M>);
+}
+
+/// A number of a sensor, an access point or the like.
+pub(crate) fn index(f: &mut impl Fields, name: &str, value: &mut usize) {
+    let mut number = *value as u32;
+    f.u32(name, &mut number);
+    *value = number as usize;
+}
+
+/// Metres, or metres a second.
+pub(crate) fn vec2(f: &mut impl Fields, name: &str, value: &mut DVec2) {
+    f.f64_array(name, AsMut::<[f64; 2]>::as_mut(value));
+}
+
+/// The same with a height.
+pub(crate) fn vec3(f: &mut impl Fields, name: &str, value: &mut DVec3) {
+    f.f64_array(name, AsMut::<[f64; 3]>::as_mut(value));
+}
+
+/// Column by column.
+pub(crate) fn matrix(f: &mut impl Fields, name: &str, value: &mut DMat3) {
+    let mut columns = value.to_cols_array();
+    f.f64_array(name, &mut columns);
+    *value = DMat3::from_cols_array(&columns);
 }
 
 /// The message's bytes.

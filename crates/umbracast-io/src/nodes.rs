@@ -10,7 +10,7 @@ use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb, Pose};
 use umbracast::lidar::{Fan, SECTORS, View};
 use umbracast::track::{GaitPhase, Observed, Track};
 
-use crate::fields::{Fields, Message, schema};
+use crate::fields::{Fields, Message, index, matrix, schema, vec2, vec3};
 use crate::messages::Schema;
 
 /// One frame of one front end.
@@ -482,25 +482,4 @@ impl Message for Forecast {
         f.f64_array("state_covariance", self.coupling.state.as_flattened_mut());
         f.f64_array("acceleration_psd_m2ps3", self.coupling.acceleration_psd_m2ps3.as_flattened_mut());
     }
-}
-
-fn index(f: &mut impl Fields, name: &str, value: &mut usize) {
-    let mut number = *value as u32;
-    f.u32(name, &mut number);
-    *value = number as usize;
-}
-
-fn vec2(f: &mut impl Fields, name: &str, value: &mut DVec2) {
-    f.f64_array(name, AsMut::<[f64; 2]>::as_mut(value));
-}
-
-fn vec3(f: &mut impl Fields, name: &str, value: &mut DVec3) {
-    f.f64_array(name, AsMut::<[f64; 3]>::as_mut(value));
-}
-
-/// Column by column.
-fn matrix(f: &mut impl Fields, name: &str, value: &mut DMat3) {
-    let mut columns = value.to_cols_array();
-    f.f64_array(name, &mut columns);
-    *value = DMat3::from_cols_array(&columns);
 }
