@@ -3,6 +3,7 @@
 
 mod movers;
 mod stays;
+mod arrivals;
 
 /// A range is background when it came back in at least this share of the revolutions: leaves and edges come back at
 /// several ranges; a passer-by has a smaller share.

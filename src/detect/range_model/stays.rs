@@ -1,26 +1,15 @@
-//! What came after the empty scan and stays. Nobody appears out of nothing: people walk in, or come out from behind something. What
-//! appears where the hall was seen a moment before, with nobody on the way, is an object, whatever its shape, and so is what has been
-//! at the same range for long where no person is known.
-
-use super::{EDGE_M, RangeModel};
-
-/// What came so many revolutions ago stays. Out of nothing it may be the first that is seen of somebody who walks on;
-const STAYS_REVOLUTIONS: u32 = 10;
-/// beside somebody, or where it may have been hidden, nobody walks so slowly that one pixel sees him for so long.
-const STAYS_BESIDE_REVOLUTIONS: u32 = 40;
-/// What was not seen in so many revolutions, though nothing was before it, is gone.
-const GONE_REVOLUTIONS: u32 = 4;
+//! What is new to one sensor, and since when.
 
 /// One surface that is nearer than the background.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Stay {
     /// 0 of none.
-    range_m: f32,
+    pub(super) range_m: f32,
     /// The revolution that it came in, and the last that saw it or something before it.
-    since: u32,
-    last: u32,
+    pub(super) since: u32,
+    pub(super) last: u32,
     /// Who was there when it came.
-    came: Near,
+    pub(super) came: Near,
 }
 
 /// What is new to one sensor, and stays.
@@ -28,7 +17,7 @@ pub(super) struct Stay {
 pub(super) struct Stays {
     pub(super) of_pixel: Vec<[Stay; 2]>,
     /// The revolution before which it was not seen what came.
-    blind: u32,
+    pub(super) blind: u32,
 }
 
 impl Stays {
@@ -46,114 +35,4 @@ pub enum Near {
     /// Who may be a person, but was never seen to walk; or what is there was hidden before.
     Unsure,
     Walker,
-}
-
-impl RangeModel {
-    /// From the next revolution on it is not known what came in between.
-    pub fn was_blind(&mut self) {
-        self.stays.blind = self.count;
-    }
-
-    /// A new return. True where it is an object's. Who is `near` is asked only where it matters.
-    pub fn stays(&mut self, pixel: usize, range_m: f32, near: &dyn Fn() -> Near) -> bool {
-        let (count, margin_m) = (self.count, self.margin_m);
-        let blind = self.stays.blind;
-        let stays = &mut self.stays.of_pixel[pixel];
-        let (mut own, mut was_hidden) = (None, count.wrapping_sub(blind) <= GONE_REVOLUTIONS);
-        for (k, stay) in stays.iter_mut().enumerate().filter(|(_, stay)| stay.range_m != 0.0) {
-            let off_m = range_m - stay.range_m;
-            if count.wrapping_sub(stay.last) > GONE_REVOLUTIONS {
-                *stay = Stay::default();
-            } else if off_m > margin_m {
-                // An edge comes back now from before and now from behind.
-                was_hidden = true;
-            } else {
-                stay.last = count;
-                if off_m >= -margin_m && own.is_none() {
-                    own = Some(k);
-                }
-            }
-        }
-        let Some(k) = own else {
-            // It takes the place of none, or of the nearer: who passes by is not what is behind.
-            let [first, second] = stays.map(|stay| stay.range_m);
-            let k = usize::from(first != 0.0 && (second == 0.0 || second < first));
-            let came = near();
-            let came = if was_hidden && came == Near::Nobody { Near::Unsure } else { came };
-            stays[k] = Stay { range_m, since: count, last: count, came };
-            return false;
-        };
-        let stay = &mut self.stays.of_pixel[pixel][k];
-        let since = count.wrapping_sub(stay.since);
-        if stay.came == Near::Nobody {
-            return since >= STAYS_REVOLUTIONS;
-        }
-        if since < STAYS_BESIDE_REVOLUTIONS {
-            return false;
-        }
-        match (stay.came, near()) {
-            (Near::Unsure, Near::Nobody | Near::Walker) => true,
-            // Whoever brought it has left it there.
-            (Near::Walker, Near::Nobody) => {
-                (stay.came, stay.since) = (Near::Unsure, count);
-                false
-            }
-            _ => self.is_rim(pixel, range_m),
-        }
-    }
-
-    /// Whether an object that came out of nothing, and is background by now, goes on there. What is learned by this does not go on
-    /// itself, so that of who leans on it no more than a rim is learned.
-    fn is_rim(&self, pixel: usize, range_m: f32) -> bool {
-        let (bin, row) = (pixel / self.rows, pixel % self.rows);
-        let goes_on = |off: usize| {
-            let beside = (bin + off) % self.bins * self.rows + row;
-            let same = |stay: &Stay| {
-                stay.range_m != 0.0 && stay.came == Near::Nobody && (stay.range_m - range_m).abs() < EDGE_M
-            };
-            self.furniture[beside] > 0 && self.stays.of_pixel[beside].iter().any(same)
-        };
-        [1, 2, self.bins - 1, self.bins - 2].into_iter().any(goes_on)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Whether the last of these returns of one pixel, a revolution each and 0 where there is none, is taken for an object's.
-    fn stays(ranges_m: &[f32], near: impl Fn(usize) -> Near) -> bool {
-        let mut model = RangeModel::new(1.0);
-        model.grow(1);
-        model.count = 100;
-        let mut last = false;
-        for (k, &range_m) in ranges_m.iter().enumerate() {
-            last = range_m > 0.0 && model.stays(0, range_m, &|| near(k));
-            model.close_known_revolution();
-        }
-        last
-    }
-
-    #[test]
-    fn what_comes_out_of_nothing_and_stays_is_an_object_whoever_is_taken_to_stand_there_later() {
-        for later in [Near::Nobody, Near::Unsure, Near::Walker] {
-            let near = |k| if k == 0 { Near::Nobody } else { later };
-            assert_eq!([5, 12].map(|n| stays(&vec![9.0; n], near)), [false, true], "{later:?}");
-        }
-    }
-
-    #[test]
-    fn who_came_walking_or_was_there_from_the_start_is_nobodys_object() {
-        assert!(!stays(&[9.0; 3000], |_| Near::Walker));
-        assert!(!stays(&[9.0; 3000], |_| Near::Unsure));
-        assert!(stays(&[9.0; 100], |k| if k < 20 { Near::Walker } else { Near::Nobody }), "carried there");
-    }
-
-    #[test]
-    fn who_was_hidden_is_not_out_of_nothing_and_who_passes_by_hides_nothing_for_good() {
-        let near = |k| if k < 4 { Near::Nobody } else { Near::Unsure };
-        assert!(!stays(&[&[7.0; 4][..], &[9.0; 100]].concat(), near), "behind a lorry that drove away");
-        assert!(stays(&[&[9.0; 4][..], &[7.0; 4], &[9.0; 4]].concat(), near), "a table behind a walker");
-        assert!(!stays(&[&[9.0; 4][..], &[0.0; 6], &[9.0; 4]].concat(), near), "it went");
-    }
 }
