@@ -12,21 +12,25 @@ const FURNITURE_M: f64 = 0.9;
 /// Who is near a return that is not known to be furniture's.
 pub(super) fn near(priors: &[Prior], at_m: DVec3) -> Near {
     let mut near = Near::Nobody;
-    for (prior, reach_m) in people(priors) {
-        if prior.position_m.distance_squared(at_m.truncate()) < reach_m * reach_m {
-            if prior.walked {
-                return Near::Walker;
-            }
-            near = Near::Unsure;
+    for prior in around(priors, at_m) {
+        if prior.walked {
+            return Near::Walker;
         }
+        near = Near::Unsure;
     }
     near
 }
 
 /// Somebody who stands still must not be learned.
 pub(super) fn is_somebodys(priors: &[Prior], at_m: DVec3) -> bool {
-    people(priors)
-        .any(|(prior, reach_m)| prior.position_m.distance_squared(at_m.truncate()) < reach_m * reach_m)
+    around(priors, at_m).next().is_some()
+}
+
+fn around(priors: &[Prior], at_m: DVec3) -> impl Iterator<Item = &Prior> {
+    let is_near = move |(prior, reach_m): &(&Prior, f64)| {
+        prior.position_m.distance_squared(at_m.truncate()) < reach_m * reach_m
+    };
+    people(priors).filter(is_near).map(|(prior, _)| prior)
 }
 
 /// Those who are expected, and how near to them a return may be theirs.

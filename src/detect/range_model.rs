@@ -5,6 +5,9 @@ mod movers;
 mod stays;
 mod arrivals;
 
+pub use stays::Near;
+use stays::Stays;
+
 /// A range is background when it came back in at least this share of the revolutions: leaves and edges come back at
 /// several ranges; a passer-by has a smaller share.
 const SHARE: f32 = 0.3;
@@ -41,9 +44,6 @@ const EDGE_BINS: usize = 2;
 const EDGE_M: f32 = 0.3;
 /// What is behind somebody is taken to be as near as the nearest of so many bins beside: leaves have no even face.
 const BESIDE_BINS: usize = 5;
-
-pub use stays::Near;
-use stays::Stays;
 
 /// One range that comes back, with how often it did.
 #[derive(Debug, Clone, Copy, Default)]

@@ -98,7 +98,9 @@ impl Origin {
         self.walked |=
             !is_left && speed_mps > WALKS_FROM_MPS && position_m.distance(self.position_m) > WALKED_M;
         let diagonal_m = detection.aabb.size_m().truncate().length();
+        // What seems to hang over it may be its own top: a cupboard's.
         let may_be_person = !is_left
+            && !detection.is_covered
             && detection.top_m > PERSON_TOP_M
             && diagonal_m < PERSON_DIAGONAL_M
             && detection.top_diagonal_m < HEAD_DIAGONAL_M;
@@ -178,6 +180,22 @@ mod tests {
             Some((false, true)),
             "it jumped before it was learned"
         );
+    }
+
+    /// A cupboard's top was left out as a canopy, and its two sides below it were people for good.
+    #[test]
+    fn what_stands_below_its_own_top_is_furniture_and_who_came_under_an_umbrella_is_none() {
+        let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.3, 1.65) };
+        let is_furniture = |speed_mps: f64| {
+            let mut origin = Origin::new(DVec2::ZERO, 0, false);
+            for k in 0..60 {
+                let position_m = DVec2::new(0.1 * f64::from(k) * speed_mps, 0.0);
+                let covered = Detection { is_covered: true, position_m, ..of(aabb, 1.65, 0.25) };
+                origin.see(&covered, &BodyView::default(), position_m, speed_mps, crate::STEP_S);
+            }
+            origin.is_furniture(60 * crate::STEP_NS)
+        };
+        assert_eq!([0.0, 0.5].map(is_furniture), [true, false]);
     }
 
     #[test]
