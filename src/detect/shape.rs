@@ -11,7 +11,7 @@ pub(super) fn band_of(height_m: f64) -> usize {
     ((height_m / BAND_M).max(0.0) as usize).min(BANDS - 1)
 }
 
-/// Points of a band: how many, the sum of where they lie, and of the squares and products; a share of all after [`Shape::learned`].
+/// Points of a band: how many, the sum of where they lie, and of the squares and products; a share of all after the track has learned them.
 ///
 /// ```
 /// use umbracast::{detect::Moments, geometry::DVec2};
