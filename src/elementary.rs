@@ -1,8 +1,9 @@
 //! Elementary functions for loops that run in vector registers: no branch and no call, and the same bits on every machine,
 //! which the mathematics library of a system does not promise. And how such loops are compiled.
 
-/// A method that does what another, always inlined, does, compiled once more for processors with wider registers. No
-/// instruction that rounds otherwise is used (fused multiply-add is another feature), so both give the same bits.
+/// A method that does what another, always inlined, does, compiled once more for processors with wider registers, which all have
+/// instructions that find and count bits, too. No instruction that rounds otherwise is used (fused multiply-add is another
+/// feature), so both give the same bits.
 macro_rules! wide {
     ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? (&mut self $($rest:tt)*) $($what:tt)*) => {
         $crate::elementary::wide! { @ [$(#[$doc])* $vis] $name [$(<$life>)?] self [&mut self] ($($rest)*) $($what)* }
@@ -15,7 +16,11 @@ macro_rules! wide {
     ) $(-> $out:ty)? = $wide:ident or $portable:ident) => {
         $($before)* fn $name $($life)* ($($receiver)* $(, $arg: $kind)*) $(-> $out)? {
             #[cfg(target_arch = "x86_64")]
-            if std::arch::is_x86_feature_detected!("avx2") {
+            if std::arch::is_x86_feature_detected!("avx2")
+                && std::arch::is_x86_feature_detected!("bmi1")
+                && std::arch::is_x86_feature_detected!("bmi2")
+                && std::arch::is_x86_feature_detected!("popcnt")
+            {
                 // SAFETY: the processor has just said that it has what the function was compiled for.
                 return unsafe { $this.$wide($($arg),*) };
             }
@@ -23,7 +28,7 @@ macro_rules! wide {
         }
 
         #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx2")]
+        #[target_feature(enable = "avx2,bmi1,bmi2,popcnt")]
         fn $wide $($life)* ($($receiver)* $(, $arg: $kind)*) $(-> $out)? {
             $this.$portable($($arg),*)
         }

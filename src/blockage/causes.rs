@@ -3,7 +3,7 @@
 //! adds the owner and the hall.
 
 use super::Chance;
-use super::crossing::{Crossing, Part};
+use super::crossing::Crossing;
 use super::figure::Figure;
 use super::lanes::WORD;
 use super::rays::Rays;
@@ -206,11 +206,9 @@ impl Causes {
         let (words, step) = (self.own.words, own.step as usize);
         self.blocked.clear();
         self.blocked.resize(words, 0);
-        for part in [Part::Trunk, Part::Arms] {
-            self.asked.clear();
-            self.asked.extend((0..words).map(|word| !self.own.met(step, word) & !self.blocked[word]));
-            crossing.ask(figure, part, rays, own, person, 0..words, &self.asked, &mut self.blocked);
-        }
+        self.asked.clear();
+        self.asked.extend((0..words).map(|word| !self.own.met(step, word)));
+        crossing.ask(figure, rays, own, person, 0..words, [&self.asked; 2], &mut self.blocked);
         for word in 0..words {
             self.own.note_new(step, word, self.blocked[word]);
         }

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::body_model::Slice;
 use super::figure::{Band, Figure, Joint, Rod};
-use super::lanes::{WORD, larger, smaller, word_of};
+use super::lanes::{WORD, bits_of, larger, smaller, word_of};
 use super::rays::Rays;
 use super::shadows::Meeting;
 use super::trajectories::Trajectories;
@@ -22,9 +22,10 @@ type Lane = [f32; WORD];
 /// axis, x ahead and y to the left.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Crossing {
-    /// The numbers of those that were taken.
+    /// The numbers of those that were taken, and of which of them the trunk and the arms are asked, a bit each.
     samples: [u32; WORD],
     taken: usize,
+    asks: [u32; 2],
     /// Where the body's swaying axis is, which way it faces, and where the ray ends, then what is worked out of it.
     axis: [Lane; 2],
     own: [Lane; 2],
@@ -40,25 +41,18 @@ pub(super) struct Crossing {
     miss: Lane,
 }
 
-/// What of a body is asked.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Part {
-    Trunk,
-    Arms,
-}
-
 impl Crossing {
-    /// Of the samples in these words of `asked`, bits, adds those whose ray a part of the body meets to `blocked`.
+    /// Adds to `blocked` those samples in some words whose ray the trunk meets, of the samples in `trunk`, bits, and those whose
+    /// ray an arm meets, of the samples in `arms`.
     #[inline(always)]
     pub(super) fn ask(
         &mut self,
         figure: &Figure,
-        part: Part,
         rays: &Rays,
         meeting: &Meeting,
         other: &Trajectories,
         words: Range<usize>,
-        asked: &[u32],
+        [trunk, arms]: [&[u32]; 2],
         blocked: &mut [u32],
     ) {
         let step = meeting.step as usize;
@@ -67,7 +61,8 @@ impl Crossing {
         let (gait, floor_m) = (&other.gait, other.floor_m[step]);
         self.start_z = (rays.start_m.z - floor_m) as f32;
         for word in words {
-            let mut left = asked[word];
+            let (trunk, arms) = (trunk[word], arms[word]);
+            let mut left = trunk | arms;
             if left == 0 {
                 continue;
             }
@@ -92,49 +87,69 @@ impl Crossing {
                 (self.height[lane], self.width[lane]) = (height_m[k], width[k]);
                 (self.swing[lane], self.wave[lane]) = (swing_hz[k], wave_hz[k]);
                 self.samples[lane] = (word * WORD + k) as u32;
+                for (asks, bits) in self.asks.iter_mut().zip([trunk, arms]) {
+                    *asks |= (bits >> k & 1) << lane;
+                }
                 self.taken += 1;
                 if self.taken == WORD {
-                    self.answer(figure, part, meeting.band, blocked);
+                    self.answer(figure, meeting.band, blocked);
                 }
             }
         }
-        self.answer(figure, part, meeting.band, blocked);
+        self.answer(figure, meeting.band, blocked);
     }
 
     /// Asks those that were taken.
     #[inline(always)]
-    fn answer(&mut self, figure: &Figure, part: Part, band: Band, blocked: &mut [u32]) {
+    fn answer(&mut self, figure: &Figure, band: Band, blocked: &mut [u32]) {
         if self.taken == 0 {
             return;
         }
-        self.cross(figure, part, band);
-        for (sample, miss) in self.samples[..self.taken].iter().zip(&self.miss) {
-            blocked[*sample as usize / WORD] |= u32::from(*miss <= 0.0) << (*sample as usize % WORD);
+        self.turn_to_body();
+        let [trunk, arms] = std::mem::take(&mut self.asks);
+        let mut met = if trunk != 0 { trunk & self.cross_trunk(figure, band) } else { 0 };
+        if arms & !met != 0 {
+            met |= arms & self.cross_arms(figure, band);
+        }
+        while met != 0 {
+            let sample = self.samples[met.trailing_zeros() as usize % WORD] as usize;
+            met &= met - 1;
+            blocked[sample / WORD] |= 1 << (sample % WORD);
         }
         self.taken = 0;
     }
 
     #[inline(always)]
-    fn cross(&mut self, figure: &Figure, part: Part, band: Band) {
-        self.turn_to_body();
+    fn cross_trunk(&mut self, figure: &Figure, band: Band) -> u32 {
         self.miss = [f32::INFINITY; WORD];
-        match part {
-            Part::Trunk => {
-                let mut bottom = 0.0;
-                for slice in &figure.slices {
-                    if band.meets(bottom, slice.top) {
-                        self.cross_slice(slice, bottom as f32);
-                    }
-                    bottom = slice.top;
-                }
+        let mut bottom = 0.0;
+        for slice in &figure.slices {
+            if band.meets(bottom, slice.top) {
+                self.cross_slice(slice, bottom as f32);
             }
-            Part::Arms => {
-                for rod in figure.rods.iter().filter(|rod| rod.is_within(band)) {
-                    self.cross_rod(rod, -1.0);
-                    self.cross_rod(rod, 1.0);
-                }
-            }
+            bottom = slice.top;
         }
+        self.met()
+    }
+
+    #[inline(always)]
+    fn cross_arms(&mut self, figure: &Figure, band: Band) -> u32 {
+        self.miss = [f32::INFINITY; WORD];
+        for rod in figure.rods.iter().filter(|rod| rod.is_within(band)) {
+            self.cross_rod(rod, -1.0);
+            self.cross_rod(rod, 1.0);
+        }
+        self.met()
+    }
+
+    /// A bit for each ray that does not miss.
+    #[inline(always)]
+    fn met(&self) -> u32 {
+        let mut met = [0.0; WORD];
+        for k in 0..WORD {
+            met[k] = -self.miss[k];
+        }
+        bits_of(&met)
     }
 
     /// How many lanes are in use, up to whole registers.
@@ -145,17 +160,26 @@ impl Crossing {
 
     #[inline(always)]
     fn turn_to_body(&mut self) {
-        for i in 0..self.lanes() {
-            let share = 1.0 / self.height[i];
-            let (own_x, own_y) = (self.own[0][i], self.own[1][i]);
-            let (axis_x, axis_y) = (self.axis[0][i], self.axis[1][i]);
-            let (end_x, end_y) = (self.end[0][i], self.end[1][i]);
-            self.from[0][i] = -(own_x * axis_x + own_y * axis_y) * share;
-            self.from[1][i] = (own_y * axis_x - own_x * axis_y) * share;
-            self.from[2][i] = self.start_z * share;
-            self.along[0][i] = (own_x * end_x + own_y * end_y) * share;
-            self.along[1][i] = (own_x * end_y - own_y * end_x) * share;
-            self.along[2][i] = (self.end[2][i] - self.start_z) * share;
+        let start_z = self.start_z;
+        for register in 0..self.lanes() / REGISTER {
+            let of = |lane: &Lane| lane.as_chunks::<REGISTER>().0[register];
+            let (height, [own_x, own_y]) = (of(&self.height), self.own.each_ref().map(of));
+            let ([axis_x, axis_y], [end_x, end_y, end_z]) =
+                (self.axis.each_ref().map(of), self.end.each_ref().map(of));
+            let (mut from, mut along) = ([[0.0; REGISTER]; 3], [[0.0; REGISTER]; 3]);
+            for i in 0..REGISTER {
+                let share = 1.0 / height[i];
+                from[0][i] = -(own_x[i] * axis_x[i] + own_y[i] * axis_y[i]) * share;
+                from[1][i] = (own_y[i] * axis_x[i] - own_x[i] * axis_y[i]) * share;
+                from[2][i] = start_z * share;
+                along[0][i] = (own_x[i] * end_x[i] + own_y[i] * end_y[i]) * share;
+                along[1][i] = (own_x[i] * end_y[i] - own_y[i] * end_x[i]) * share;
+                along[2][i] = (end_z[i] - start_z) * share;
+            }
+            for i in 0..3 {
+                self.from[i].as_chunks_mut::<REGISTER>().0[register] = from[i];
+                self.along[i].as_chunks_mut::<REGISTER>().0[register] = along[i];
+            }
         }
     }
 

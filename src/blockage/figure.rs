@@ -62,11 +62,18 @@ impl Plan {
     }
 }
 
+/// Heights that are compared at once.
+const REGISTER: usize = 8;
+
 /// The body's numbers as the loops want them.
 #[derive(Debug, Clone)]
 pub(super) struct Figure {
     pub(super) slices: Vec<Slice>,
     pub(super) rods: [Rod; 2],
+    /// Tops of all slices but the last, in whole registers; what is left of the last one holds no numbers.
+    tops: Vec<[f64; REGISTER]>,
+    /// Between which heights each rod is.
+    rods_up: [[f64; 2]; 2],
     /// Of every stretch of slices, with every choice of rods.
     pub(super) plans: Vec<Plan>,
     pub(super) sway_left: f64,
@@ -90,6 +97,8 @@ impl Figure {
         let mut figure = Self {
             slices: body.slices.clone(),
             rods: body.arms.rods(),
+            tops: Vec::new(),
+            rods_up: [[0.0; 2]; 2],
             plans: Vec::new(),
             sway_left: body.sway_left,
             sway_ahead: body.sway_ahead,
@@ -139,6 +148,11 @@ impl Figure {
 
     fn look_from_above(&mut self) {
         let n = self.slices.len();
+        let tops =
+            |slices: &[Slice]| std::array::from_fn(|i| slices.get(i).map_or(f64::NAN, |slice| slice.top));
+        self.tops.clear();
+        self.tops.extend(self.slices[..n.saturating_sub(1)].chunks(REGISTER).map(tops));
+        self.rods_up = self.rods.map(|rod| rod.between());
         let stretches = (0..n).flat_map(|low| (0..n).map(move |high| (low, high)));
         let of_stretch = stretches.flat_map(|(low, high)| (0..RODS).map(move |rods| (low, high, rods)));
         let mut plans = std::mem::take(&mut self.plans);
@@ -150,14 +164,14 @@ impl Figure {
     /// What of the body is within a band: one of [`Figure::plans`].
     #[inline(always)]
     pub(super) fn plan_of(&self, band: Band) -> usize {
-        let slices = &self.slices;
-        let last = slices.len().saturating_sub(1);
         // Slices stand one upon another.
-        let low: usize = slices[..last].iter().map(|slice| usize::from(slice.top < band.low)).sum();
-        let high: usize = slices[..last].iter().map(|slice| usize::from(slice.top <= band.high)).sum();
-        let rods =
-            self.rods.iter().enumerate().map(|(i, rod)| usize::from(rod.is_within(band)) << i).sum::<usize>();
-        (low * slices.len() + high.max(low)) * RODS + rods
+        let (mut low, mut high) = (0, 0);
+        for tops in &self.tops {
+            low += tops.iter().map(|top| usize::from(*top < band.low)).sum::<usize>();
+            high += tops.iter().map(|top| usize::from(*top <= band.high)).sum::<usize>();
+        }
+        let rod = |i: usize| usize::from(band.meets(self.rods_up[i][0], self.rods_up[i][1])) << i;
+        (low * self.slices.len() + high.max(low)) * RODS + rod(0) + rod(1)
     }
 
     /// True where a band lies between the floor and the top of the head of everybody.
@@ -217,9 +231,15 @@ pub(super) struct Rod {
 impl Rod {
     #[inline(always)]
     pub(super) fn is_within(&self, band: Band) -> bool {
+        let [low, high] = self.between();
+        band.meets(low, high)
+    }
+
+    /// No part of it is below the first or above the second.
+    fn between(&self) -> [f64; 2] {
         // No width is more than twice the usual one.
         let radius = 2.0 * self.radius;
-        band.meets(self.upper.up.min(self.lower.up) - radius, self.upper.up.max(self.lower.up) + radius)
+        [self.upper.up.min(self.lower.up) - radius, self.upper.up.max(self.lower.up) + radius]
     }
 }
 

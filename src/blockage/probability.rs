@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::Chance;
 use super::causes::{Causes, Firsts, Kept, Known};
 use super::counts::{Chances, Counts};
-use super::crossing::{Crossing, Part};
+use super::crossing::Crossing;
 use super::draws::{Draws, Quantiles};
 use super::figure::Figure;
 use super::lanes::WORD;
@@ -32,8 +32,8 @@ const TESTS_MAX: usize = 1 << 18;
 /// What a person takes of that by being seen and followed, which lasts as long as so many tests: a crowd's frame is not to last
 /// longer for it. Forty people are left the fewest samples, which moves their F1 and calibration by less than .002.
 const TESTS_PER_PERSON: usize = 6000;
-/// Room from the start for the meetings of one link in a crowd, so that a step allocates nothing.
-const MEETINGS: usize = 1 << 10;
+/// Room from the start for the meetings of one link at a step in a crowd, so that a step allocates nothing.
+const MEETINGS: usize = 1 << 7;
 /// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
 const SAMPLES_MIN: usize = WORD;
 
@@ -55,8 +55,8 @@ pub struct Sampler {
     shadows: Shadows,
     /// By number; `None` after a draw.
     seen_from: Option<usize>,
-    /// Who may stand in the way of the link that was asked last.
-    meetings: Vec<Meeting>,
+    /// Who may stand in the way of the link that was asked last, by step.
+    meetings: [Vec<Meeting>; MOMENTS],
     /// Meetings of all links that were asked since the draw: the samples of the next frame depend on it.
     asked: usize,
     rays: Rays,
@@ -113,7 +113,7 @@ impl Sampler {
             samples: numbers.samples,
             shadows: Shadows::default(),
             seen_from: None,
-            meetings: Vec::with_capacity(MEETINGS),
+            meetings: std::array::from_fn(|_| Vec::with_capacity(MEETINGS)),
             asked: 0,
             rays: Rays::default(),
             crossing: Crossing::default(),
@@ -201,23 +201,21 @@ impl Sampler {
             self.shadows.fall(ap_m, ue, people);
             self.seen_from = Some(ap);
         }
-        self.meetings.clear();
         self.shadows.meet(&self.figure, people, person, &mut self.meetings);
-        self.asked += self.meetings.len();
+        self.asked += self.meetings.iter().map(Vec::len).sum::<usize>();
         let samples = self.samples;
         let words = samples.div_ceil(WORD);
         self.link.begin(samples);
         let mut counts = Counts::default();
         let aim = Aim { ue, ap_m, person };
-        let later = self.take_step(aim, 0, 0..self.meetings.len(), 0..words, &mut counts);
+        self.take_step(aim, 0, 0..words, &mut counts);
         counts.blocked_now = counts.now / samples as f64 >= threshold;
         // Where nothing stands in the way of any sample now, nor of the first half of them later, that is taken for the rest
         // as well: some chance below a few per cent then counts as none.
         let half = words.div_ceil(2);
         for words in [0..half, half..words] {
-            let mut rest = later.clone();
             for step in 1..MOMENTS {
-                rest = self.take_step(aim, step, rest, words.clone(), &mut counts);
+                self.take_step(aim, step, words.clone(), &mut counts);
             }
             if counts.now == 0.0 && counts.met == [0.0; MOMENTS] {
                 break;
@@ -297,27 +295,17 @@ impl Sampler {
         self.causes.of(&known, &self.figure, things, asks_own, crossing, rays, aim)
     }
 
-    /// What these words of samples show of a link at a step. `rest` are the link's meetings from that step on; those of
-    /// later steps come back.
+    /// What these words of samples show of a link at a step.
     #[inline(always)]
-    fn take_step(
-        &mut self,
-        aim: Aim,
-        step: usize,
-        rest: Range<usize>,
-        words: Range<usize>,
-        counts: &mut Counts,
-    ) -> Range<usize> {
-        let of_step = self.meetings[rest.clone()].iter().take_while(|m| m.step as usize == step).count();
-        let meetings = rest.start..rest.start + of_step;
+    fn take_step(&mut self, aim: Aim, step: usize, words: Range<usize>, counts: &mut Counts) {
         self.link.blocked[words.clone()].fill(0);
         let blocked_now = counts.blocked_now;
-        if !meetings.is_empty() && self.link.is_open(words.clone(), step, blocked_now) {
+        if !self.meetings[step].is_empty() && self.link.is_open(words.clone(), step, blocked_now) {
             if !aim.ue.is_on_axis() {
                 self.people[aim.person].walk(&self.figure, &self.draws);
             }
             self.rays.aim(aim.ap_m, aim.ue, &self.people[aim.person], step, words.clone());
-            for m in meetings.clone() {
+            for m in 0..self.meetings[step].len() {
                 self.mark(m, step, words.clone(), blocked_now);
                 if !self.link.is_open(words.clone(), step, blocked_now) {
                     break;
@@ -325,13 +313,12 @@ impl Sampler {
             }
         }
         self.link.count(step, self.samples, words, counts);
-        meetings.end..rest.end
     }
 
     /// Notes in which samples a meeting blocks the link, where that matters still.
     #[inline(always)]
     fn mark(&mut self, meeting: usize, step: usize, words: Range<usize>, blocked_now: bool) {
-        let (meeting, link) = (&self.meetings[meeting], &mut self.link);
+        let (meeting, link) = (&self.meetings[step][meeting], &mut self.link);
         let other = &mut self.people[meeting.other as usize];
         other.walk(&self.figure, &self.draws);
         let [mut trunk, mut arms] = [0; 2];
@@ -339,22 +326,17 @@ impl Sampler {
             let open = link.open(word, step, blocked_now);
             let near = match open {
                 0 => Near::default(),
-                _ => self.rays.near(other.own_figure(&self.figure), meeting, other, word),
+                _ => self.rays.near(other.own_figure(&self.figure), meeting, other, word, open),
             };
-            link.blocked[word] |= open & near.surely;
-            link.trunk[word] = open & near.trunk & !near.surely;
-            link.arms[word] = open & near.arms & !near.surely;
+            link.blocked[word] |= near.surely;
+            (link.trunk[word], link.arms[word]) = (near.trunk, near.arms);
             trunk |= link.trunk[word];
             arms |= link.arms[word];
         }
         let Link { blocked, .. } = link;
         let (figure, rays, crossing) = (other.own_figure(&self.figure), &self.rays, &mut self.crossing);
-        if trunk != 0 {
-            crossing.ask(figure, Part::Trunk, rays, meeting, other, words.clone(), &link.trunk, blocked);
-        }
-        if arms != 0 {
-            words.clone().for_each(|word| link.arms[word] &= !blocked[word]);
-            crossing.ask(figure, Part::Arms, rays, meeting, other, words, &link.arms, blocked);
+        if trunk | arms != 0 {
+            crossing.ask(figure, rays, meeting, other, words, [&link.trunk, &link.arms], blocked);
         }
     }
 }

@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use super::figure::{Figure, Plan};
-use super::lanes::{WORD, bits_of, larger, most_of, smaller, word_of, word_of_mut};
+use super::lanes::{WORD, bits_of, larger, smaller, word_of, word_of_mut};
 use super::shadows::Meeting;
 use super::trajectories::Trajectories;
 use crate::geometry::DVec3;
@@ -81,9 +81,17 @@ impl Rays {
         (person.mean_m[step] - self.start_m.truncate()).to_array().map(|m| m as f32)
     }
 
-    /// What of a word of samples is known of the body of `other`, whose gait is known, without asking height by height.
+    /// What of a word of samples, of those whose bits are set in `open`, is known of the body of `other`, whose gait is known,
+    /// without asking height by height.
     #[inline(always)]
-    pub(super) fn near(&self, figure: &Figure, meeting: &Meeting, other: &Trajectories, word: usize) -> Near {
+    pub(super) fn near(
+        &self,
+        figure: &Figure,
+        meeting: &Meeting,
+        other: &Trajectories,
+        word: usize,
+        open: u32,
+    ) -> Near {
         let step = meeting.step as usize;
         let of_step = step * (other.samples / WORD) + word;
         let gait = &other.gait;
@@ -101,7 +109,7 @@ impl Rays {
             to: [word_of(&self.to[0], word), word_of(&self.to[1], word)],
             length_m: word_of(&self.length_m, word),
         };
-        from_above.near()
+        from_above.near(open)
     }
 }
 
@@ -131,7 +139,7 @@ struct FromAbove<'a> {
 
 impl FromAbove<'_> {
     #[inline(always)]
-    fn near(&self) -> Near {
+    fn near(&self, open: u32) -> Near {
         // How far to the left of the ray the swaying axis is, and how far before its start or behind its end.
         let (mut axis, mut beyond, mut within) = ([0.0; WORD], [0.0; WORD], [0.0; WORD]);
         let ([to_x, to_y], [base_x, base_y]) = (self.to, self.base_m);
@@ -142,7 +150,8 @@ impl FromAbove<'_> {
             beyond[k] = larger(along - self.length_m[k], -along);
             within[k] = self.reach_m - larger(axis[k].abs(), beyond[k]);
         }
-        if most_of(&within) < 0.0 {
+        let open = open & bits_of(&within);
+        if open == 0 {
             return Near::default();
         }
         // Across the ray, to the left: what a step ahead and one aside are.
@@ -153,8 +162,10 @@ impl FromAbove<'_> {
             aside[k] = to_x[k] * own_x[k] + to_y[k] * own_y[k];
         }
         let (trunk, surely) = self.trunk(&axis, &beyond, &ahead, &aside);
-        let arms = if self.plan.radius > 0.0 { self.arms(&axis, &within, &ahead, &aside) } else { 0 };
-        Near { trunk, arms, surely }
+        let (surely, left) = (surely & open, open & !surely);
+        let asks_arms = self.plan.radius > 0.0 && left != 0;
+        let arms = if asks_arms { self.arms(&axis, &within, &ahead, &aside) } else { 0 };
+        Near { trunk: trunk & left, arms: arms & left, surely }
     }
 
     /// The ray cuts an ellipse where its middle is nearer than the ellipse reaches; ellipses whose middles are apart along

@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::figure::{Band, Figure};
 use super::sectors::{Covered, Sectors};
-use super::spread::Spread;
+use super::spread::{Between, Spread};
 use super::trajectories::{Disc, MOMENTS, Trajectories};
 use crate::geometry::{DVec2, DVec3};
 use crate::site::Ue;
@@ -49,7 +49,6 @@ pub(super) struct Shadows {
     bodies: Sectors<SECTORS>,
     /// The last link that a body was compared with.
     compared: Vec<u32>,
-    candidates: Vec<u32>,
 }
 
 /// The sectors in which something within `disc` is seen.
@@ -80,71 +79,62 @@ impl Shadows {
         self.compared.resize(people.len(), u32::MAX);
     }
 
-    /// Adds everybody who may stand in the way of a person's link, step after step.
+    /// Everybody who may stand in the way of a person's link, by step.
     #[inline(always)]
     pub(super) fn meet(
         &mut self,
         figure: &Figure,
         people: &[Trajectories],
         person: usize,
-        meetings: &mut Vec<Meeting>,
+        meetings: &mut [Vec<Meeting>; MOMENTS],
     ) {
+        meetings.iter_mut().for_each(Vec::clear);
         let q = &people[person];
-        self.candidates.clear();
-        let towards = covered(wider(q.second, self.ue_reach_m), self.ap_m.truncate());
-        for sector in towards.each::<SECTORS>() {
-            for &other in self.bodies.people(sector) {
-                let compared = &mut self.compared[other as usize];
-                if *compared != person as u32 {
-                    *compared = person as u32;
-                    self.candidates.push(other);
-                }
-            }
-        }
         let rises_m = |floors_m: [f64; 2]| {
             let off_m = [-self.ue_rises_m, self.ue_rises_m];
             [0, 1].map(|i| self.ue_height_share * q.heights_m[i] + floors_m[i] + off_m[i] - self.ap_m.z)
         };
         let rises_of_second_m = rises_m(q.floors_m);
         let second = Bundle::of_second(self.ap_m, q, self.ue_reach_m);
-        // Whom all rays of the second pass above is in nobody's way at any step.
-        let mut candidates = std::mem::take(&mut self.candidates);
-        candidates.retain(|&other| {
-            let p = &people[other as usize];
-            let seen = second.seen(p.second.center_m);
-            let share = second.share(&seen, p.reach_m, [p.second.radius_m; 4]);
-            other as usize != person
-                && p.part_of != Some(q.track)
-                && share.and_then(|share| self.band(rises_of_second_m, share, p, p.floors_m)).is_some()
+        let of_steps: [_; MOMENTS] = std::array::from_fn(|step| {
+            (Bundle::of_step(self.ap_m, q, step, self.ue_reach_m), rises_m([q.floor_m[step]; 2]))
         });
-        for step in 0..MOMENTS {
-            let first = meetings.len();
-            let bundle = Bundle::of_step(self.ap_m, q, step, self.ue_reach_m);
-            let rises_m = rises_m([q.floor_m[step]; 2]);
-            for &other in &candidates {
-                let p = &people[other as usize];
+        let towards = covered(wider(q.second, self.ue_reach_m), self.ap_m.truncate());
+        for &other in towards.each::<SECTORS>().flat_map(|sector| self.bodies.people(sector)) {
+            let p = &people[other as usize];
+            if std::mem::replace(&mut self.compared[other as usize], person as u32) == person as u32
+                || other as usize == person
+                || p.part_of == Some(q.track)
+            {
+                continue;
+            }
+            // Whom all rays of the second pass above is in nobody's way at any step.
+            let share = second.share(&second.seen(p.second.center_m), p.reach_m, [p.second.radius_m; 4]);
+            if share.and_then(|share| self.band(rises_of_second_m, share, p, p.floors_m)).is_none() {
+                continue;
+            }
+            // Whoever is aside at a step is so at the next, mostly: the processor guesses that.
+            for (step, (bundle, rises_m)) in of_steps.iter().enumerate() {
                 let (seen, spread) = (bundle.seen(p.mean_m[step]), &p.spread[step]);
                 if bundle.is_aside(&seen, p.reach_m + spread.radius_m) {
                     continue;
                 }
                 let spreads_m = bundle.spreads_m(spread);
-                let of = |reach_m: f64| {
-                    let share = bundle.share(&seen, reach_m, spreads_m);
-                    share.and_then(|share| self.band(rises_m, share, p, [p.floor_m[step]; 2]))
-                };
-                let Some(band) = of(p.reach_m) else { continue };
+                let floors_m = [p.floor_m[step]; 2];
+                let Some(share) = bundle.share(&seen, p.reach_m, spreads_m) else { continue };
+                let Some(band) = self.band(*rises_m, share, p, floors_m) else { continue };
                 // What is within those heights does not reach as far, so they are fewer still.
                 let reach_m = p.reach_of_m[figure.plan_of(band)];
-                let Some(band) = of(reach_m) else { continue };
+                let Some(share) = bundle.share(&seen, reach_m, spreads_m) else { continue };
+                let Some(band) = self.band(*rises_m, share, p, floors_m) else { continue };
                 let off_m = seen.off_m.abs() as f32;
                 let (plan, reach_m) = (figure.plan_of(band) as u32, (reach_m + ROOM) as f32);
                 let holds = figure.holds(band);
-                meetings.push(Meeting { other, step: step as u32, band, holds, plan, reach_m, off_m });
+                meetings[step].push(Meeting { other, step: step as u32, band, holds, plan, reach_m, off_m });
             }
-            // Who stands nearest to the line blocks most, and what is blocked is not asked again.
-            meetings[first..].sort_unstable_by_key(Meeting::rank);
         }
-        self.candidates = candidates;
+        // Who stands nearest to the line blocks most, and what is blocked is not asked again.
+        meetings.iter_mut().for_each(|of_step| of_step.sort_unstable_by_key(Meeting::rank));
     }
 
     /// The heights at which rays may meet the body of `p` between two shares of their length; `None` where they pass above
@@ -198,6 +188,8 @@ struct Bundle {
     per_m: [f64; 2],
     /// How far the rays' ends lie from the middle's: along it, back, to the left and to the right.
     ends_m: [f64; 4],
+    /// Along the middle, and to the left of it.
+    sides: [Between; 2],
 }
 
 /// Where the middle of somebody's samples is: along a bundle's middle, and to the left of it.
@@ -217,13 +209,14 @@ impl Bundle {
     }
 
     #[inline(always)]
-    fn new(ap_m: DVec3, end_m: DVec2, both_ways_m: impl Fn(DVec2) -> [f64; 2]) -> Self {
+    fn new(ap_m: DVec3, end_m: DVec2, both_ways_m: impl Fn(&Between) -> [f64; 2]) -> Self {
         let way_m = end_m - ap_m.truncate();
         let along = way_m.normalize_or(DVec2::X);
-        let ([fore, back], [left, right]) = (both_ways_m(along), both_ways_m(along.perp()));
+        let sides = [Between::of(along), Between::of(along.perp())];
+        let [[fore, back], [left, right]] = [both_ways_m(&sides[0]), both_ways_m(&sides[1])];
         let (length_m, ends_m) = (way_m.length(), [fore, back, left, right]);
         let per_m = [length_m - ends_m[1], length_m + ends_m[0]].map(|length_m| 1.0 / length_m);
-        Self { start_m: ap_m.truncate(), along, length_m, per_m, ends_m }
+        Self { start_m: ap_m.truncate(), along, length_m, per_m, ends_m, sides }
     }
 
     #[inline(always)]
@@ -235,8 +228,7 @@ impl Bundle {
     /// How far somebody's samples spread to each of the four sides.
     #[inline(always)]
     fn spreads_m(&self, spread: &Spread) -> [f64; 4] {
-        let ([fore, back], [left, right]) =
-            (spread.both_ways_m(self.along), spread.both_ways_m(self.along.perp()));
+        let [[fore, back], [left, right]] = [0, 1].map(|i| spread.both_ways_m(&self.sides[i]));
         [fore, back, left, right]
     }
 

@@ -17,6 +17,35 @@ const ROUNDED_M: f64 = 1e-6;
 /// Cosine of a sixteenth of a turn.
 const COS_SIXTEENTH: f64 = 0.923_879_532_511_286_7;
 
+/// A unit vector put together from the two of the eight directions beside it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Between {
+    straight: usize,
+    diagonal: usize,
+    /// How much of each.
+    off: f64,
+    share: f64,
+}
+
+impl Between {
+    #[inline(always)]
+    pub(super) fn of(direction: DVec2) -> Self {
+        let (x, y) = (direction.x.abs(), direction.y.abs());
+        let (right, up) = (direction.x >= 0.0, direction.y >= 0.0);
+        let diagonal = match (right, up) {
+            (true, true) => 1,
+            (false, true) => 3,
+            (false, false) => 5,
+            (true, false) => 7,
+        };
+        let (straight, off, share) = match x > y {
+            true => (if right { 0 } else { 4 }, x - y, y),
+            false => (if up { 2 } else { 6 }, y - x, x),
+        };
+        Self { straight, diagonal, off, share }
+    }
+}
+
 impl Spread {
     #[inline(always)]
     pub(super) fn of(x_m: &[f32], y_m: &[f32]) -> Self {
@@ -43,22 +72,10 @@ impl Spread {
         Self { most_m, radius_m: farthest_m / COS_SIXTEENTH }
     }
 
-    /// No sample lies farther along this unit vector nor, second, along its opposite: put together from the two of the eight
-    /// directions beside it.
+    /// No sample lies farther along a direction nor, second, along its opposite.
     #[inline(always)]
-    pub(super) fn both_ways_m(&self, direction: DVec2) -> [f64; 2] {
-        let (x, y) = (direction.x.abs(), direction.y.abs());
-        let (right, up) = (direction.x >= 0.0, direction.y >= 0.0);
-        let diagonal = match (right, up) {
-            (true, true) => 1,
-            (false, true) => 3,
-            (false, false) => 5,
-            (true, false) => 7,
-        };
-        let (straight, off, share) = match x > y {
-            true => (if right { 0 } else { 4 }, x - y, y),
-            false => (if up { 2 } else { 6 }, y - x, x),
-        };
+    pub(super) fn both_ways_m(&self, direction: &Between) -> [f64; 2] {
+        let Between { straight, diagonal, off, share } = *direction;
         [0, 4].map(|turned| {
             let most_m = |i: usize| self.most_m[(i + turned) % 8];
             off * most_m(straight) + share * most_m(diagonal)
@@ -68,7 +85,7 @@ impl Spread {
     /// The first of them.
     #[cfg(test)]
     fn along_m(&self, direction: DVec2) -> f64 {
-        self.both_ways_m(direction)[0]
+        self.both_ways_m(&Between::of(direction))[0]
     }
 }
 
