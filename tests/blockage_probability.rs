@@ -64,6 +64,7 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         width_scale: 1.0,
         width_scale_sigma: 0.0,
         outline_m: Default::default(),
+        canopy: None,
         gait: GaitPhase::UNKNOWN,
         points: 30,
         confirmed: true,

@@ -53,7 +53,7 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         limbs: None,
         reaches: Vec::new(),
         bands: Default::default(),
-        is_covered: false,
+        overhead: None,
         full_body: true,
         top_m: 1.7,
         top_diagonal_m: 0.2,

@@ -4,9 +4,8 @@ use super::Blockage;
 use super::algorithm1::{self, PersonBox};
 use super::counts::Chances;
 use super::numbers::Numbers;
-use super::probability::Sampler;
+use super::probability::{Drawn, Sampler};
 use super::steps::{heading_at, position_at};
-use super::trajectories::Trajectories;
 use crate::config::{BlockageConfig, BlockageMethod, BoxKind};
 use crate::forecast::Forecast;
 use crate::geometry::{DVec2, DVec3};
@@ -120,9 +119,8 @@ impl Caster {
         self.method == BlockageMethod::Probability && self.sampler.takes_fewer(&self.numbers)
     }
 
-    /// The samples of the last cast, in order of confirmed tracks, and how many of each count; `None` where the method draws
-    /// none.
-    pub(crate) fn drawn(&self) -> Option<(&[Trajectories], usize)> {
+    /// The samples of the last cast; `None` where the method draws none.
+    pub(crate) fn drawn(&self) -> Option<Drawn<'_>> {
         (self.method == BlockageMethod::Probability).then(|| self.sampler.drawn())
     }
 

@@ -4,6 +4,7 @@ use super::body_model::{Arms, BodyModel, Slice};
 use super::lanes::larger;
 use crate::detect::{LEVELS, outline::LEVEL_TOPS};
 use crate::track::outline::LevelOutline;
+use crate::track::{Canopy, Track};
 
 /// Heights between which rays may meet a body, as shares of its height.
 #[derive(Debug, Clone, Copy)]
@@ -82,6 +83,7 @@ pub(super) struct Figure {
     pub(super) still_share: f64,
     /// What of `slices` is somebody's own: for whom it was worked out.
     outline_m: [LevelOutline; LEVELS],
+    canopy: Option<Canopy>,
     of_height_m: f64,
 }
 
@@ -104,18 +106,21 @@ impl Figure {
             sway_ahead: body.sway_ahead,
             still_share: body.arms.still_share,
             outline_m: Default::default(),
+            canopy: None,
             of_height_m: 0.0,
         };
         figure.look_from_above();
         figure
     }
 
-    /// Takes the outline of somebody `height_m` tall in place of that of a `usual` body.
-    pub(super) fn take_outline(&mut self, usual: &Self, outline_m: &[LevelOutline; LEVELS], height_m: f64) {
-        if self.outline_m == *outline_m && self.of_height_m == height_m && !self.plans.is_empty() {
+    /// Takes the outline of a track in place of that of a `usual` body, and what it carries over the head.
+    pub(super) fn take_outline(&mut self, usual: &Self, track: &Track) {
+        let (outline_m, canopy, height_m) = (&track.outline_m, track.canopy, track.height_m);
+        let is_same = self.outline_m == *outline_m && self.canopy == canopy && self.of_height_m == height_m;
+        if is_same && !self.plans.is_empty() {
             return;
         }
-        (self.outline_m, self.of_height_m) = (*outline_m, height_m);
+        (self.outline_m, self.canopy, self.of_height_m) = (*outline_m, canopy, height_m);
         self.slices.clone_from(&usual.slices);
         let mut bottom = 0.0;
         for slice in &mut self.slices {
@@ -143,7 +148,13 @@ impl Figure {
                 joint.out[side] = (joint.out[side] + moves[side]).max(0.0);
             }
         }
+        self.slices.extend(canopy.into_iter().flat_map(|canopy| slices_of(&canopy, height_m)));
         self.look_from_above();
+    }
+
+    /// The highest part of the body, as a share of its height.
+    pub(super) fn top(&self) -> f64 {
+        self.slices.last().map_or(1.0, |slice| slice.top)
     }
 
     fn look_from_above(&mut self) {
@@ -177,7 +188,7 @@ impl Figure {
     /// True where a band lies between the floor and the top of the head of everybody.
     #[inline(always)]
     pub(super) fn holds(&self, band: Band) -> bool {
-        band.low >= 0.0 && self.slices.last().is_some_and(|slice| band.high <= slice.top)
+        band.low >= 0.0 && band.high <= self.top()
     }
 
     /// Of slices `low` to `high`, and of those rods whose bit is set.
@@ -208,6 +219,23 @@ impl Figure {
         }
     }
 }
+
+/// A canopy as slices above the head: what is free below it, and a dome of two.
+fn slices_of(canopy: &Canopy, height_m: f64) -> [Slice; 3] {
+    let (at, radius) = (canopy.center_m / height_m, canopy.radius_m / height_m);
+    let low = (canopy.low_m / height_m).max(1.0 + LEAST);
+    let top = (canopy.top_m / height_m).max(low + LEAST);
+    let slice = |top: f64, share: f64| {
+        let half = (radius * share).max(LEAST);
+        Slice { top, half_depth: half, half_width: half, ahead: at.x, left: at.y }
+    };
+    [slice(low, 0.0), slice(0.5 * (low + top), 1.0), slice(top, UPPER_HALF)]
+}
+
+/// No slice is thinner, nor lower: shares of the height.
+const LEAST: f64 = 1e-3;
+/// As wide is the upper half of a dome on the mean.
+const UPPER_HALF: f64 = 0.6;
 
 /// How much farther than usual a level reaches to the right and to the left, as shares of the height.
 fn aside([_, left, round, oblong]: &LevelOutline, height_m: f64) -> [f64; 2] {

@@ -72,6 +72,17 @@ pub struct Sampler {
     kept_links: usize,
 }
 
+/// Everybody's samples of one frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Drawn<'a> {
+    /// People in order of confirmed tracks, then things of some of them, which have no links.
+    pub(crate) bodies: &'a [Trajectories],
+    /// How many are people.
+    pub(crate) people: usize,
+    /// How many samples of each count.
+    pub(crate) samples: usize,
+}
+
 /// From which access point to whose UE.
 #[derive(Debug, Clone, Copy)]
 struct Aim<'a> {
@@ -169,9 +180,9 @@ impl Sampler {
         }
     }
 
-    /// Everybody's samples of the frame that was drawn, and how many of each count.
-    pub(crate) fn drawn(&self) -> (&[Trajectories], usize) {
-        (&self.people[..self.links_of], self.samples)
+    /// The samples of the frame that was drawn.
+    pub(crate) fn drawn(&self) -> Drawn<'_> {
+        Drawn { bodies: &self.people[..self.present], people: self.links_of, samples: self.samples }
     }
 
     /// Whether the frame before had more meetings than could be asked with all samples.

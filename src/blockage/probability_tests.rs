@@ -9,6 +9,7 @@ use crate::forecast::constant_velocity;
 use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 use crate::site::{AccessPoint, Pillar};
+use crate::track::Canopy;
 
 #[test]
 fn quantiles_count_those_who_come_later_than_the_last_step() {
@@ -41,6 +42,7 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
         width_scale: 1.0 + within(0.1),
         width_scale_sigma: 0.05,
         outline_m: Default::default(),
+        canopy: None,
         gait: GaitPhase { phase_rad: within(3.0), concentration: 1.0 + within(1.0) },
         points: 30,
         confirmed: true,
@@ -213,6 +215,28 @@ fn a_ray_meets_what_somebody_carries_beside_him() {
         sampler.chances(&config.site.ue, 0, aps_m[0], 1, 0.5).p_now
     };
     assert!(p(0.0) < 0.2 && p(0.1) > 0.8, "{} {}", p(0.0), p(0.1));
+}
+
+#[test]
+fn an_umbrella_blocks_the_link_that_passes_over_its_owners_head() {
+    let mut config = Config::default();
+    (config.site.pillars, config.site.furniture) = (Vec::new(), Vec::new());
+    config.site.access_points.truncate(1);
+    config.site.access_points[0].position_m = [4.0, 0.0, 3.0];
+    let umbrella = Canopy { center_m: DVec2::ZERO, radius_m: 0.5, low_m: 1.75, top_m: 2.0 };
+    let p = |canopy: Option<Canopy>| {
+        let stands = |id: u64, x: f64, y: f64| Track::new(id, DVec2::new(x, y), DVec2::ZERO);
+        // The ray is 1.8 m high there, and 0.35 m beside the head.
+        let tracks = [Track { canopy, ..stands(0, 1.0, 0.35) }, stands(1, -1.0, 0.0)];
+        let forecasts = tracks.each_ref().map(constant_velocity::forecast);
+        let mut blockages = Vec::new();
+        let mut caster = crate::blockage::Caster::new(&config.blockage, &config.site);
+        caster.cast(&tracks, &forecasts, &mut blockages);
+        blockages[1].p_now
+    };
+    assert!(p(None) < 0.05 && p(Some(umbrella)) > 0.8, "{} {}", p(None), p(Some(umbrella)));
+    let high = Canopy { low_m: 2.2, top_m: 2.4, ..umbrella };
+    assert!(p(Some(high)) < 0.05, "{}: what is between head and rim is free", p(Some(high)));
 }
 
 #[test]

@@ -113,6 +113,7 @@ impl Shadows {
             if share.and_then(|share| self.band(rises_of_second_m, share, p, p.floors_m)).is_none() {
                 continue;
             }
+            let own = p.own_figure(figure);
             // Whoever is aside at a step is so at the next, mostly: the processor guesses that.
             for (step, (bundle, rises_m)) in of_steps.iter().enumerate() {
                 let (seen, spread) = (bundle.seen(p.mean_m[step]), &p.spread[step]);
@@ -124,12 +125,12 @@ impl Shadows {
                 let Some(share) = bundle.share(&seen, p.reach_m, spreads_m) else { continue };
                 let Some(band) = self.band(*rises_m, share, p, floors_m) else { continue };
                 // What is within those heights does not reach as far, so they are fewer still.
-                let reach_m = p.reach_of_m[figure.plan_of(band)];
+                let reach_m = p.reach_of_m[own.plan_of(band)];
                 let Some(share) = bundle.share(&seen, reach_m, spreads_m) else { continue };
                 let Some(band) = self.band(*rises_m, share, p, floors_m) else { continue };
                 let off_m = seen.off_m.abs() as f32;
-                let (plan, reach_m) = (figure.plan_of(band) as u32, (reach_m + ROOM) as f32);
-                let holds = figure.holds(band);
+                let (plan, reach_m) = (own.plan_of(band) as u32, (reach_m + ROOM) as f32);
+                let holds = own.holds(band);
                 meetings[step].push(Meeting { other, step: step as u32, band, holds, plan, reach_m, off_m });
             }
         }
@@ -153,7 +154,7 @@ impl Shadows {
         let [per_short, per_tall] = p.per_height;
         let low = low_m * if low_m > 0.0 { per_tall } else { per_short } - ROOM;
         let high = high_m * if high_m > 0.0 { per_short } else { per_tall } + ROOM;
-        (low <= 1.0).then_some(Band { low, high })
+        (low <= p.top).then_some(Band { low, high })
     }
 }
 

@@ -39,7 +39,7 @@ pub(crate) struct Trajectories {
     asked: usize,
     pub(crate) track: u64,
     /// The track whose thing this is.
-    pub(super) part_of: Option<u64>,
+    pub(crate) part_of: Option<u64>,
     /// By step: the mean, round which the samples lie.
     pub(crate) mean_m: [DVec2; MOMENTS],
     /// By step: how far.
@@ -57,7 +57,9 @@ pub(crate) struct Trajectories {
     pub(crate) heights_m: [f64; 2],
     /// One over both.
     pub(super) per_height: [f64; 2],
-    /// No part of a sample's body is farther from its position; the same of what each plan holds.
+    /// No part of a sample's body is higher, as a share of its height,
+    /// or farther from its position; the same of what each plan holds.
+    pub(super) top: f64,
     pub(super) reach_m: f64,
     pub(super) reach_of_m: Vec<f64>,
     /// By sample.
@@ -131,7 +133,7 @@ impl Trajectories {
             self.place(s, numbers.joint);
         }
         let own = self.figure.get_or_insert_with(|| figure.clone());
-        own.take_outline(figure, &track.outline_m, track.height_m);
+        own.take_outline(figure, track);
         self.bound();
     }
 
@@ -258,6 +260,7 @@ impl Trajectories {
         self.per_height = self.heights_m.map(|height_m| 1.0 / height_m);
         let (height_m, width) = (self.heights_m[1], f64::from(largest(&self.width_scale)).max(1.0));
         let fastest_hz = body::relative_speed_hz(f64::from(largest(&self.speed_mps)), height_m);
+        self.top = figure.top();
         self.reach_of_m.clear();
         let arms: [f64; RODS] = std::array::from_fn(|i| {
             figure.plans.get(i).map_or(0.0, |plan| plan.arms_reach(width, fastest_hz))

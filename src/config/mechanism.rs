@@ -35,6 +35,10 @@ pub enum Mechanism {
     Height,
     /// Stage 1: the outline of each body, learned by watching; plainest: a usual one.
     Outline,
+    /// Stage 1: where the points of each body lie, learned by watching, and what is carried over the head; plainest: a usual body.
+    Shape,
+    /// Stage 1: prams, walking frames and laps that go with somebody; plainest: people.
+    Things,
     /// Stage 1: children and people who sit.
     ChildrenAndSeated,
     /// Stage 2: the residual network; plainest: constant velocity.
@@ -55,7 +59,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All, in the order of the data.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 21] = [
         Self::RangeModel,
         Self::CountTest,
         Self::GuidedAssignment,
@@ -67,6 +71,8 @@ impl Mechanism {
         Self::LimbPhase,
         Self::Height,
         Self::Outline,
+        Self::Shape,
+        Self::Things,
         Self::ChildrenAndSeated,
         Self::Residual,
         Self::ResidualDeparture,
@@ -97,7 +103,9 @@ impl Mechanism {
             | Self::Sway
             | Self::LimbPhase
             | Self::Height
-            | Self::Outline => &["track"],
+            | Self::Outline
+            | Self::Shape
+            | Self::Things => &["track"],
             Self::ResidualDeparture | Self::ResidualNeighbours => &["forecast"],
             Self::Arms | Self::ArmSwing | Self::TrunkSway | Self::JointSampling => &["blockage"],
         }
@@ -121,6 +129,8 @@ impl Mechanism {
             Self::LimbPhase => "limb-phase",
             Self::Height => "height",
             Self::Outline => "outline",
+            Self::Shape => "shape",
+            Self::Things => "things",
             Self::ChildrenAndSeated => "children-and-seated",
             Self::Residual => "residual",
             Self::ResidualDeparture => "residual-departure",

@@ -2,7 +2,47 @@
 //! where somebody stands or how many they are.
 
 use super::cluster::PlanGrid;
+use super::shape::Moments;
 use crate::geometry::{Aabb, DVec2, DVec3};
+
+/// What hangs over somebody in one frame.
+///
+/// ```
+/// use umbracast::detect::{Moments, Overhead};
+///
+/// let umbrella = Overhead { points: Moments::default(), low_m: 1.85, top_m: 2.0 };
+/// assert!(umbrella.top_m - umbrella.low_m < 0.2);
+/// ```
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Overhead {
+    /// Where its points lie about the detection's position, along the site's axes. Those of each sensor count alike together, for each
+    /// shows the side toward it.
+    pub points: Moments,
+    /// Height of the lowest of them above the floor,
+    pub low_m: f64,
+    /// and of the highest.
+    pub top_m: f64,
+}
+
+impl Overhead {
+    /// Of what hangs about a place: points above the floor with their sensors, one after another.
+    pub(super) fn about(at_m: DVec2, overhead_m: &[(DVec3, u16)]) -> Option<Self> {
+        let mut found = Self { low_m: f64::INFINITY, ..Self::default() };
+        let mut sensors = 0.0;
+        for of_sensor in overhead_m.chunk_by(|(_, a), (_, b)| a == b) {
+            let mut points = Moments::default();
+            for (p, _) in of_sensor.iter().filter(|(p, _)| p.truncate().distance(at_m) < OVER_M) {
+                points.add(p.truncate() - at_m);
+                (found.low_m, found.top_m) = (found.low_m.min(p.z), found.top_m.max(p.z));
+            }
+            if points.n > 0.0 {
+                sensors += 1.0;
+                found.points.mix(&points, 1.0 / sensors, points.n);
+            }
+        }
+        (sensors > 0.0).then_some(found)
+    }
+}
 
 /// Of who stands, a head alone reaches as high: shoulders of somebody of 2 m end below.
 pub(super) const OVERHEAD_M: f64 = 1.7;
@@ -12,6 +52,9 @@ const APART_M: f64 = 0.25;
 const HEAD_M: f64 = 0.55;
 /// What is as high and no farther from a canopy is a piece of it that beams met apart from the rest.
 const PIECES_M: f64 = 0.5;
+
+/// What hangs so near to somebody's axis, in plan view, is his.
+const OVER_M: f64 = 0.7;
 
 /// Kept from frame to frame.
 #[derive(Debug, Clone, Default)]
@@ -79,6 +122,24 @@ mod tests {
         let mut shown = Vec::new();
         Canopies::default().leave_out(points_m, &mut shown);
         shown.len()
+    }
+
+    #[test]
+    fn an_umbrella_is_in_the_middle_of_what_the_sensors_see_and_nobody_elses() {
+        let rim = |toward: f64, n: u32| {
+            let at =
+                move |i: u32| DVec2::from_angle(toward + 3.0 * (f64::from(i) / f64::from(n) - 0.5)) * 0.5;
+            (0..=n).map(move |i| (DVec2::new(3.0, 1.0) + at(i)).extend(1.8))
+        };
+        // The near sensor sees much, the far one little of the other side.
+        let near = rim(std::f64::consts::PI, 40).map(|p| (p, 0));
+        let far = rim(0.0, 8).chain([DVec3::new(9.0, 1.0, 1.9)]).map(|p| (p, 1));
+        let all: Vec<(DVec3, u16)> = near.chain(far).collect();
+        let found = Overhead::about(DVec2::new(3.1, 1.0), &all).expect("it hangs there");
+        let (mean_m, variance_m2) = found.points.spread();
+        assert!(mean_m.distance(DVec2::new(-0.1, 0.0)) < 0.03, "{mean_m:?}");
+        assert!((variance_m2.x + variance_m2.y - 0.25).abs() < 0.02 && found.top_m == 1.8, "{variance_m2:?}");
+        assert_eq!(Overhead::about(DVec2::new(5.0, 1.0), &all), None);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! frame.
 
 use super::axis::{AxisModel, Network};
-use super::canopy::OVERHEAD_M;
+use super::canopy::{OVERHEAD_M, Overhead};
 use super::evidence::FULL_BODY_TOP_M;
 use super::features::{AxisFeatures, Seen};
 use super::limbs::LimbCovariance;
@@ -24,8 +24,6 @@ const EXPECTED_M: f64 = 0.55;
 const HEAD_M: f64 = 0.2;
 /// A prior farther than this from a cluster does not tell where its person walks.
 const OWN_M: f64 = 0.5;
-/// What hangs so near to somebody's axis, in plan view, may hide the head.
-const OVER_M: f64 = 0.6;
 /// A wheelchair is 1.3 m from corner to corner, and who sits in one reaches no higher than this.
 const SEATED_DIAGONAL_MAX_M: f64 = 1.5;
 const SEATED_HEIGHT_M: f64 = 1.5;
@@ -92,8 +90,8 @@ pub struct Measurer {
     axis: Network,
     /// By point: whether a cluster has it.
     is_taken: Vec<bool>,
-    /// Where points lie that hang over people.
-    overhead_m: Vec<DVec2>,
+    /// Points that hang over people, above the floor, with their sensors.
+    overhead_m: Vec<(DVec3, u16)>,
     /// A person's points, moved.
     seen: Vec<Seen>,
     /// Memory of the last frame's detections.
@@ -173,11 +171,14 @@ impl Measurer {
         self.is_taken.clear();
         self.is_taken.resize(points.len(), false);
         clusters.iter().flatten().for_each(|&i| self.is_taken[i as usize] = true);
-        let nobodys =
-            points.iter().zip(&self.is_taken).filter(|(_, taken)| !**taken).map(|(p, _)| p.position_m);
-        let high = nobodys.filter(|p| p.z - self.hall.floor_m(p.truncate()) > OVERHEAD_M);
+        let nobodys = points.iter().zip(&self.is_taken).filter(|(_, taken)| !**taken);
+        let moved_m = nobodys.map(|(p, _)| {
+            let sensor_m = self.sensors_m.get(usize::from(p.sensor)).copied().unwrap_or(p.position_m);
+            let away = (p.position_m - sensor_m).truncate().normalize_or_zero();
+            (super::above_floor(&self.hall, p.position_m) + (away * SHIFT_M).extend(0.0), p.sensor)
+        });
         self.overhead_m.clear();
-        self.overhead_m.extend(high.map(|p| p.truncate()));
+        self.overhead_m.extend(moved_m.filter(|(p, _)| p.z > OVERHEAD_M));
     }
 
     /// How high the floor is where a person's points are in the middle, and the box of the points from there.
@@ -280,7 +281,7 @@ impl Measurer {
             limbs,
             reaches: all_reaches,
             bands,
-            is_covered: self.overhead_m.iter().any(|p| p.distance(position_m) < OVER_M),
+            overhead: Overhead::about(position_m, &self.overhead_m),
             z_m,
             time_ns,
             points: cluster.len() as u32,

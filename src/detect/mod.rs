@@ -36,6 +36,7 @@ mod doubled;
 pub use background::Background;
 #[doc(hidden)] // For who joins the foreground of several front ends.
 pub use background::keep_most;
+pub use canopy::Overhead;
 pub use clocks::Clocks;
 pub use doubled::doubled;
 pub use limbs::LimbCovariance;
@@ -128,8 +129,8 @@ pub struct Detection {
     pub top_m: f64,
     /// Diagonal in plan view of what lies at most 0.2 m below the highest point: a head is small, a cupboard's top is not.
     pub top_diagonal_m: f64,
-    /// Whether something hangs over it, such as an umbrella: its top need not be a head.
-    pub is_covered: bool,
+    /// What hangs over it, such as an umbrella: the top need not be a head.
+    pub overhead: Option<Overhead>,
     /// How arms and legs of a known walker lie.
     pub limbs: Option<LimbCovariance>,
     /// How far the body of somebody known reaches, by sensor and level.
@@ -140,6 +141,29 @@ pub struct Detection {
     pub aabb: Aabb,
     /// Box along the cluster's axes, the same.
     pub obb: Obb,
+}
+
+#[cfg(test)]
+impl Detection {
+    /// A whole body whose points fill a box that stands on the floor at the origin.
+    pub(crate) fn of_box(aabb: Aabb) -> Self {
+        Self {
+            position_m: DVec2::ZERO,
+            covariance_m2: None,
+            z_m: 0.5 * aabb.max_m.z,
+            time_ns: 0,
+            points: 40,
+            full_body: true,
+            top_m: aabb.max_m.z,
+            top_diagonal_m: 0.2,
+            overhead: None,
+            limbs: None,
+            reaches: Vec::new(),
+            bands: Default::default(),
+            aabb,
+            obb: Obb::from_aabb(&aabb),
+        }
+    }
 }
 
 /// A place with its height above the floor below it: whoever walks on a ramp is upright there.

@@ -31,12 +31,31 @@ pub struct Moments {
 }
 
 impl Moments {
+    /// Its numbers in their order.
+    pub fn numbers(&self) -> [f64; 6] {
+        let Self { n, sum_m, squares_m2: [xx, yy, xy] } = *self;
+        [n, sum_m.x, sum_m.y, xx, yy, xy]
+    }
+
+    /// The moments with these numbers.
+    pub fn of_numbers([n, x_m, y_m, xx_m2, yy_m2, xy_m2]: [f64; 6]) -> Self {
+        Self { n, sum_m: DVec2::new(x_m, y_m), squares_m2: [xx_m2, yy_m2, xy_m2] }
+    }
+
     /// Takes a point.
     pub fn add(&mut self, at_m: DVec2) {
         self.n += 1.0;
         self.sum_m += at_m;
         let squares_m2 = [at_m.x * at_m.x, at_m.y * at_m.y, at_m.x * at_m.y];
         (0..3).for_each(|i| self.squares_m2[i] += squares_m2[i]);
+    }
+
+    /// Mean of the points and their variances along both axes.
+    pub(crate) fn spread(&self) -> (DVec2, DVec2) {
+        let n = self.n.max(f64::MIN_POSITIVE);
+        let mean_m = self.sum_m / n;
+        let square_m2 = DVec2::new(self.squares_m2[0], self.squares_m2[1]) / n;
+        (mean_m, (square_m2 - mean_m * mean_m).max(DVec2::ZERO))
     }
 
     /// The same points moved by `by_m`, then seen from axes of which the first points along `ahead`.
@@ -90,11 +109,7 @@ impl Shape {
     /// Mean of a band's points, ahead and left, and their variances; nothing of a band that shows too little.
     pub(super) fn band(&self, band: usize) -> Option<(DVec2, DVec2)> {
         let of = &self.bands[band];
-        (of.n > SHARE_MIN).then(|| {
-            let mean_m = of.sum_m / of.n;
-            let square_m2 = DVec2::new(of.squares_m2[0], of.squares_m2[1]) / of.n;
-            (mean_m, (square_m2 - mean_m * mean_m).max(DVec2::ZERO))
-        })
+        (of.n > SHARE_MIN).then(|| of.spread())
     }
 
     /// One standard deviation of all points along the direction in which it is largest.

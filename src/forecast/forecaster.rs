@@ -218,6 +218,7 @@ pub(super) mod tests {
             width_scale: 1.0,
             width_scale_sigma: 0.0,
             outline_m: Default::default(),
+            canopy: None,
             gait: crate::gait::GaitPhase::UNKNOWN,
             points: 30,
             confirmed: true,

@@ -143,6 +143,7 @@ impl Straight {
 mod tests {
     use super::*;
     use crate::blockage::Caster;
+    use crate::blockage::probability::Drawn;
     use crate::forecast::{Forecast, constant_velocity};
     use crate::radio::links::tests::somebody;
     use crate::{Config, STEP_S};
@@ -158,9 +159,9 @@ mod tests {
         let config = Config::default();
         let mut caster = Caster::new(&config.blockage, &config.site);
         caster.cast(&tracks, &forecasts, &mut Vec::new());
-        let (people, samples) = caster.drawn().unwrap();
+        let Drawn { bodies, samples, .. } = caster.drawn().unwrap();
         let (mut beyond, mut bits) = (Beyond::default(), vec![0; samples / WORD]);
-        beyond.take(people, config.site.ue.height_share);
+        beyond.take(bodies, config.site.ue.height_share);
         beyond.mark(DVec3::new(14.0, 0.0, ap_z), 1, &mut bits);
         bits.iter().map(|word| word.count_ones()).sum::<u32>() * 100 / samples as u32
     }

@@ -165,28 +165,29 @@ impl Fader {
         losses.clear();
         self.outages.begin(0, 0, 0);
         self.takes_fewer = false;
-        let Some((people, drawn)) = caster.drawn() else { return };
+        let Some(drawn) = caster.drawn() else { return };
+        let (bodies, people) = (drawn.bodies, &drawn.bodies[..drawn.people]);
         if self.radios.iter().all(Option::is_none) || people.is_empty() {
             return;
         }
         self.legs.lay(&self.radios, self.mirrors.as_ref(), &self.ue, people);
-        self.meet(people);
+        self.meet(bodies);
         // Reflections make nothing coarser that is told of links.
         let straight = self.legs.straight();
         let meetings = straight.checked_sub(1).map_or(0, |last| self.ends[last]);
         let affordable = LOSSES_MAX / meetings.max(1) / WORD * WORD;
-        let (samples, asked) = (drawn.min(affordable.max(WORD)), caster.samples_asked());
-        self.takes_fewer = samples < drawn;
+        let (samples, asked) = (drawn.samples.min(affordable.max(WORD)), caster.samples_asked());
+        self.takes_fewer = samples < drawn.samples;
         self.outages.begin(self.radios.len(), people.len(), samples);
         self.spreads.retain(|&(_, track), _| people.iter().any(|person| person.track == track));
-        if self.turns.len() < people.len() {
-            self.turns.resize(people.len(), Default::default());
+        if self.turns.len() < bodies.len() {
+            self.turns.resize(bodies.len(), Default::default());
         }
         self.turns.iter_mut().for_each(|[cos, _]| cos.clear());
         if let Some(beyond) = &mut self.beyond {
             beyond.take(people, self.ue.height_share);
         }
-        losses.extend((0..straight).map(|leg| self.of_link(leg, people, [samples, asked])));
+        losses.extend((0..straight).map(|leg| self.of_link(leg, bodies, [samples, asked])));
         let mut left = REFLECTED_MAX;
         for k in 0..self.legs.reflected.len() {
             let [before, after] = [straight + 2 * k, straight + 2 * k + 2].map(|leg| self.ends[leg - 1]);
@@ -195,7 +196,7 @@ impl Fader {
                 continue;
             }
             left -= losses;
-            self.reflect(self.legs.reflected[k], straight + 2 * k, people, [samples, asked]);
+            self.reflect(self.legs.reflected[k], straight + 2 * k, bodies, [samples, asked]);
         }
     }
 
@@ -210,29 +211,30 @@ impl Fader {
     }
 
     /// Finds the bodies that may cost a leg something, erring on the side of asking the samples.
-    fn meet(&mut self, people: &[Trajectories]) {
+    fn meet(&mut self, bodies: &[Trajectories]) {
         self.meetings.clear();
         self.ends.clear();
         self.halves_m.clear();
-        self.halves_m.extend(people.iter().map(|p| {
+        self.halves_m.extend(bodies.iter().map(|p| {
             let scales = p.height_m.iter().zip(&p.width_scale).map(|(h, width)| Wave::scale(*h, *width));
             f64::from(Wave::half_m(scales.fold(0.0, larger)))
         }));
         let [reach_m, rises_m] = self.ue.reach_m();
         for leg in &self.legs.legs {
             let Some(antenna) = &self.radios[leg.access_point] else { continue };
-            let q = &people[leg.owner];
+            let q = &bodies[leg.owner];
             let heights_m = [0, 1].map(|most| self.ue.height_share * q.heights_m[most] + q.floors_m[most]);
             let lowest_m = leg.lowest_end_m([heights_m[0] - rises_m, heights_m[1] + rises_m]);
             let near = |aim: Disc, p: usize, body: Disc| {
                 let aim = Disc { center_m: leg.end_m(aim.center_m), radius_m: aim.radius_m + reach_m };
-                let top_m = people[p].floors_m[1] + people[p].heights_m[1];
+                let top_m = bodies[p].floors_m[1] + bodies[p].heights_m[1];
                 antenna.meets(leg.start_m, aim, lowest_m, body, self.halves_m[p], top_m)
             };
-            for (body, p) in people.iter().enumerate() {
+            for (body, p) in bodies.iter().enumerate() {
                 let own = body == leg.owner;
                 let is_behind = leg.mirror.is_some_and(|of| of.parts(q.second.center_m, p.second.center_m));
-                if (own && reach_m == 0.0) || is_behind || !near(q.second, body, p.second) {
+                let is_of_owner = p.part_of == Some(q.track);
+                if (own && reach_m == 0.0) || is_of_owner || is_behind || !near(q.second, body, p.second) {
                     continue;
                 }
                 for step in 0..MOMENTS {
@@ -250,14 +252,14 @@ impl Fader {
     }
 
     /// What a straight way loses.
-    fn of_link(&mut self, leg: usize, people: &[Trajectories], [samples, asked]: [usize; 2]) -> Loss {
+    fn of_link(&mut self, leg: usize, bodies: &[Trajectories], [samples, asked]: [usize; 2]) -> Loss {
         let Leg { access_point, owner, start_m, .. } = self.legs.legs[leg];
         if let Some(beyond) = &self.beyond {
             beyond.mark(start_m, owner, self.outages.beyond_mut(access_point, owner));
         }
-        let track = people[owner].track;
+        let track = bodies[owner].track;
         let mut loss = Loss::clear(access_point, track);
-        let Some(margin_db) = self.lose(access_point, leg..leg + 1, people, [samples, asked]) else {
+        let Some(margin_db) = self.lose(access_point, leg..leg + 1, bodies, [samples, asked]) else {
             return loss;
         };
         for step in 0..MOMENTS {
@@ -277,13 +279,13 @@ impl Fader {
 
     /// Notes when a way by a reflection is out, whose two legs begin at `leg`: a beam takes the reflection that is free, so the way
     /// is out in those samples in which every one is.
-    fn reflect(&mut self, way: Reflected, leg: usize, people: &[Trajectories], [samples, asked]: [usize; 2]) {
+    fn reflect(&mut self, way: Reflected, leg: usize, bodies: &[Trajectories], [samples, asked]: [usize; 2]) {
         let Reflected { access_point, owner, excess_db } = way;
         let [from_image, to_image] = [self.legs.legs[leg], self.legs.legs[leg + 1]];
         let Some(mirror) = to_image.mirror else { return };
         let Some(Antenna { margin_db, .. }) = self.radios[access_point] else { return };
         let way = self.radios.len() + access_point;
-        if self.lose(way, leg..leg + 2, people, [samples, asked]).is_none() {
+        if self.lose(way, leg..leg + 2, bodies, [samples, asked]).is_none() {
             self.losses_db.clear();
             self.losses_db.resize(MOMENTS * samples, 0.0);
         }
@@ -303,7 +305,7 @@ impl Fader {
         &mut self,
         way: usize,
         legs: std::ops::Range<usize>,
-        people: &[Trajectories],
+        bodies: &[Trajectories],
         [samples, asked]: [usize; 2],
     ) -> Option<f64> {
         let first = legs.start.checked_sub(1).map_or(0, |before| self.ends[before]);
@@ -313,17 +315,17 @@ impl Fader {
         let Leg { access_point, owner, .. } = self.legs.legs[legs.start];
         self.losses_db.clear();
         self.losses_db.resize(MOMENTS * samples, 0.0);
-        self.turn(people, owner);
+        self.turn(bodies, owner);
         let mut begin = first;
         for leg in legs {
             for meeting in begin..self.ends[leg] {
-                self.turn(people, self.meetings[meeting].body);
-                self.cross(leg, people, self.meetings[meeting], samples);
+                self.turn(bodies, self.meetings[meeting].body);
+                self.cross(leg, bodies, self.meetings[meeting], samples);
             }
             begin = self.ends[leg];
         }
         let antenna = self.radios[access_point].as_ref()?;
-        let track = people[owner].track;
+        let track = bodies[owner].track;
         let spread = self.spreads.entry((way, track)).or_insert_with(|| {
             let quantiles = self.quantiles.get_or_insert_with(|| Quantiles::new(asked));
             quantiles.normal(track.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (way as u64 + 1) << 32)
@@ -337,10 +339,10 @@ impl Fader {
     }
 
     /// Works out how a person's samples turn, once a frame.
-    fn turn(&mut self, people: &[Trajectories], person: usize) {
+    fn turn(&mut self, bodies: &[Trajectories], person: usize) {
         let turn = &mut self.turns[person];
         if turn[0].is_empty() {
-            turn[0].extend_from_slice(&people[person].turn_rad);
+            turn[0].extend_from_slice(&bodies[person].turn_rad);
             cos_sin(turn);
         }
     }
@@ -348,16 +350,16 @@ impl Fader {
     wide! {
         /// Adds what a body that may stand across a leg costs each sample at a step.
         fn cross(
-            &mut self, leg: usize, people: &[Trajectories], meeting: Meeting, samples: usize,
+            &mut self, leg: usize, bodies: &[Trajectories], meeting: Meeting, samples: usize,
         ) = cross_avx2 or cross_portably
     }
 
     #[inline(always)]
-    fn cross_portably(&mut self, leg: usize, people: &[Trajectories], meeting: Meeting, samples: usize) {
+    fn cross_portably(&mut self, leg: usize, bodies: &[Trajectories], meeting: Meeting, samples: usize) {
         let Leg { access_point, owner, start_m, mirror, ends_at_image } = self.legs.legs[leg];
         let Some(antenna) = &self.radios[access_point] else { return };
         let Meeting { body, step } = meeting;
-        let (q, p, wave) = (&people[owner], &people[body], &antenna.wave);
+        let (q, p, wave) = (&bodies[owner], &bodies[body], &antenna.wave);
         let [ap_x, ap_y, ap_z] = start_m.to_array();
         let from_ap =
             |of: &Trajectories| [of.mean_m[step].x - ap_x, of.mean_m[step].y - ap_y].map(|m| m as f32);

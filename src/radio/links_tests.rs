@@ -28,6 +28,7 @@ pub(in crate::radio) fn somebody(id: u64, position_m: DVec2, velocity_mps: DVec2
         width_scale: 1.0,
         width_scale_sigma: 0.02,
         outline_m: Default::default(),
+        canopy: None,
         gait: crate::gait::GaitPhase::UNKNOWN,
         points: 30,
         confirmed: true,
@@ -83,6 +84,21 @@ fn somebody_who_crosses_a_link_takes_it_out_when_he_is_there() {
 }
 
 #[test]
+fn a_pram_costs_others_power_but_not_its_owner() {
+    let mut config = config(false);
+    config.site.access_points.truncate(1);
+    config.site.access_points[0].position_m = [8.0, 0.0, 0.8];
+    let stands = |id: u64, x: f64, y: f64| somebody(id, DVec2::new(x, y), DVec2::ZERO);
+    let median_db = |owner: u64| {
+        let pram = Track { confirmed: false, part_of: Some(owner), height_m: 1.2, ..stands(2, 1.0, 0.0) };
+        let (_, _, losses) = faded(&config, &[stands(0, 1.0, 3.0), stands(1, 0.0, 0.0), pram]);
+        losses.iter().map(|loss| loss.now_db[1]).collect::<Vec<_>>()
+    };
+    assert_eq!(median_db(1), [0.0, 0.0], "one loss each for two people, and none by the owner's own");
+    assert!(median_db(0)[0] == 0.0 && median_db(0)[1] > 6.0, "{:?}", median_db(0));
+}
+
+#[test]
 fn the_spread_of_real_fades_widens_what_is_told() {
     let tracks = [(4.0, 0), (2.0, 1)].map(|(x, id)| somebody(id, DVec2::new(x, 0.0), DVec2::ZERO));
     let width_of = |losses: &[Loss]| {
@@ -110,7 +126,7 @@ fn a_crowd_in_each_others_links_loses_by_fewer_samples_and_says_so() {
     };
     let takes_fewer = |people: &[Track]| {
         let (caster, fader, _) = faded(&config(true), people);
-        let (_, drawn) = caster.drawn().unwrap();
+        let drawn = caster.drawn().unwrap().samples;
         (fader.took_fewer_samples(), fader.outages().samples() < drawn)
     };
     assert_eq!(takes_fewer(&crowd(2)), (false, false));
@@ -139,7 +155,7 @@ fn losses_are_those_of_everybody_asked_one_by_one() {
         fader.spreads.values_mut().for_each(|spread| spread.fill(0.0));
         fader.fade(&caster, &mut losses);
         // Where bodies are many, not all samples are asked.
-        let ((people, _), samples) = (caster.drawn().unwrap(), fader.outages().samples());
+        let (people, samples) = (caster.drawn().unwrap().bodies, fader.outages().samples());
         for person in 0..people.len() {
             fader.turn(people, person);
         }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use super::outline::LevelOutline;
 use super::remembered::{Remembered, Words};
+use super::shape::Canopy;
 use crate::detect::LEVELS;
 use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, Obb};
@@ -53,6 +54,8 @@ pub struct Track {
     pub width_scale_sigma: f64,
     /// How the outline of each level differs from that of a usual body: ahead, left, round, oblong, metres.
     pub outline_m: [LevelOutline; LEVELS],
+    /// What is carried over the head, such as an umbrella.
+    pub canopy: Option<Canopy>,
     /// Where in the stride, as arms and legs tell it.
     pub gait: GaitPhase,
     /// Points of this frame's detection; 0 while it coasts.

@@ -53,6 +53,7 @@ impl Track {
             width_scale: 1.0,
             width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m: Default::default(),
+            canopy: None,
             gait: GaitPhase::UNKNOWN,
             points: 0,
             confirmed: true,

@@ -224,7 +224,7 @@ impl MixtureTracker {
                         place.distance_squared(person.filter.position_m()) < ALONE_M * ALONE_M
                     };
                     // The person is one of them.
-                    if places_m.iter().filter(near).count() < 2 {
+                    if numbers.shape && places_m.iter().filter(near).count() < 2 {
                         person.see_alone(detection, &expected.view);
                     }
                 }
@@ -253,6 +253,9 @@ impl MixtureTracker {
 
     /// Finds who moves with somebody.
     fn mark_attached(&mut self, step_s: f64) {
+        if !self.numbers.things {
+            return;
+        }
         let beside = &mut self.memory.beside;
         beside.clear();
         beside.extend(self.people.iter().map(Person::beside));

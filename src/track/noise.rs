@@ -42,7 +42,7 @@ pub(super) fn sway(numbers: &Numbers) -> Mat2 {
 mod tests {
     use super::*;
     use crate::Config;
-    use crate::geometry::{Aabb, DVec2, DVec3, Obb};
+    use crate::geometry::{Aabb, DVec3};
 
     /// Variance for the filter of a whole body's height with so many returns, where a body in free sight gives 40.
     fn variance_m2(points: u32, beams_known: bool) -> f64 {
@@ -53,22 +53,7 @@ mod tests {
 
     fn whole_body(points: u32) -> Detection {
         let aabb = Aabb { min_m: DVec3::ZERO, max_m: DVec3::new(0.4, 0.4, HEIGHT_MEAN_M) };
-        Detection {
-            position_m: DVec2::ZERO,
-            covariance_m2: None,
-            z_m: 0.9,
-            time_ns: 0,
-            points,
-            limbs: None,
-            reaches: Vec::new(),
-            bands: Default::default(),
-            is_covered: false,
-            full_body: true,
-            top_m: HEIGHT_MEAN_M,
-            top_diagonal_m: 0.2,
-            aabb,
-            obb: Obb::from_aabb(&aabb),
-        }
+        Detection { points, ..Detection::of_box(aabb) }
     }
 
     #[test]

@@ -49,6 +49,10 @@ pub struct Numbers {
     pub usual: UsualOutline,
     /// Whether outlines are learned.
     pub outline: bool,
+    /// Whether it is learned where the points of a body lie, and what hangs over it.
+    pub shape: bool,
+    /// Whether a track may be somebody's thing.
+    pub things: bool,
     /// One standard deviation of adults' heights.
     pub height_sigma_m: f64,
     /// Chance that somebody new is a child, or sits: of any height up to 1.5 m. Below 1. How often they come does not
@@ -81,6 +85,8 @@ impl Numbers {
             limb_phase: !without(Mechanism::LimbPhase),
             usual: UsualOutline::shipped(),
             outline: !without(Mechanism::Outline),
+            shape: !without(Mechanism::Shape),
+            things: !without(Mechanism::Things),
             height_sigma_m: if without(Mechanism::Height) { 1e-3 } else { 0.09 },
             children_share: 0.1,
             clutter_per_m2: config.clutter_per_m2,

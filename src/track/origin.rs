@@ -100,7 +100,7 @@ impl Origin {
         let diagonal_m = detection.aabb.size_m().truncate().length();
         // What seems to hang over it may be its own top: a cupboard's.
         let may_be_person = !is_left
-            && !detection.is_covered
+            && detection.overhead.is_none()
             && detection.top_m > PERSON_TOP_M
             && diagonal_m < PERSON_DIAGONAL_M
             && detection.top_diagonal_m < HEAD_DIAGONAL_M;
@@ -122,7 +122,8 @@ impl Origin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Aabb, DVec3, Obb};
+    use crate::detect::Overhead;
+    use crate::geometry::{Aabb, DVec3};
 
     /// Seen ten times a second for `seconds`, with this height and these diagonals, going along x.
     fn is_furniture(seconds: i64, top_m: f64, top_diagonal_m: f64, speed_mps: f64) -> bool {
@@ -130,22 +131,7 @@ mod tests {
     }
 
     fn of(aabb: Aabb, top_m: f64, top_diagonal_m: f64) -> Detection {
-        Detection {
-            position_m: DVec2::ZERO,
-            covariance_m2: None,
-            z_m: 0.5 * top_m,
-            time_ns: 0,
-            points: 40,
-            full_body: true,
-            top_m,
-            top_diagonal_m,
-            limbs: None,
-            reaches: Vec::new(),
-            bands: Default::default(),
-            is_covered: false,
-            aabb,
-            obb: Obb::from_aabb(&aabb),
-        }
+        Detection { top_m, top_diagonal_m, ..Detection::of_box(aabb) }
     }
 
     fn seen(mut origin: Origin, seconds: i64, top_m: f64, top_diagonal_m: f64, speed_mps: f64) -> bool {
@@ -190,7 +176,8 @@ mod tests {
             let mut origin = Origin::new(DVec2::ZERO, 0, false);
             for k in 0..60 {
                 let position_m = DVec2::new(0.1 * f64::from(k) * speed_mps, 0.0);
-                let covered = Detection { is_covered: true, position_m, ..of(aabb, 1.65, 0.25) };
+                let covered =
+                    Detection { overhead: Some(Overhead::default()), position_m, ..of(aabb, 1.65, 0.25) };
                 origin.see(&covered, &BodyView::default(), position_m, speed_mps, crate::STEP_S);
             }
             origin.is_furniture(60 * crate::STEP_NS)

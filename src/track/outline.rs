@@ -129,8 +129,10 @@ const DEVIATIONS_MAX: f64 = 3.0;
 
 /// Within this time the axis moves to where the outline says.
 const CENTRED_S: f64 = 2.0;
-/// What reaches so much farther all round than a usual body is a chair's, and the axis is not in its middle.
+/// What reaches so much farther all round than a usual body is a chair's or a pram's, and the axis is not in its middle but below the
+/// head.
 const ROUND_MAX_M: f64 = 0.06;
+const HEAD_ALONE: [f64; LEVELS] = [0.0, 0.0, 0.0, 0.0, 1.0];
 /// Detections of nobody's axis are farther off in the long run: who sits shows his feet ahead, which tells nothing.
 const OFFSET_MAX_M: f64 = 0.06;
 
@@ -189,10 +191,12 @@ impl Outline {
                 .map(|(level, weight)| from_detections_m(level) * weight)
                 .sum::<f64>()
         };
-        let told_m = match self.levels.iter().any(|level| level.mean_m[2] > ROUND_MAX_M) {
-            true => DVec2::ZERO,
-            false => DVec2::new(told(0, &usual.centre_ahead), told(1, &usual.centre_left)),
+        let is_round = self.levels.iter().any(|level| level.mean_m[2] > ROUND_MAX_M);
+        let [ahead, left] = match is_round {
+            true => [&HEAD_ALONE; 2],
+            false => [&usual.centre_ahead, &usual.centre_left],
         };
+        let told_m = DVec2::new(told(0, ahead), told(1, left));
         let moved_m = (told_m.clamp_length_max(OFFSET_MAX_M) - self.offset_m) * (step_s / CENTRED_S).min(1.0);
         self.offset_m += moved_m;
         for level in &mut self.levels {
@@ -344,6 +348,17 @@ mod tests {
         };
         let (feet_and_head, waist) = (moved_by(&[0, 4]), moved_by(&[2]));
         assert!((0.012..0.03).contains(&feet_and_head) && waist.abs() < 0.005, "{feet_and_head} {waist}");
+    }
+
+    #[test]
+    fn who_sits_in_something_round_is_below_the_head() {
+        let usual = UsualOutline::shipped();
+        let mut outline = watched(|level, cos, sin| if level == 4 { 0.03 * sin } else { 0.1 + 0.2 * cos });
+        for _ in 0..200 {
+            outline.centre(&usual, 0.1);
+        }
+        let offset_m = outline.offset_m();
+        assert!(offset_m.distance(DVec2::Y * 0.03) < 0.01, "{offset_m:?}");
     }
 
     #[test]

@@ -316,6 +316,7 @@ impl Person {
             width_scale: 1.0,
             width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m,
+            canopy: self.shape.canopy(),
             gait: self.limb_phase.phase(velocity_mps.length()),
             points: self.points,
             confirmed: self.confirmed
@@ -356,7 +357,7 @@ impl Person {
         if let Some(limbs) = detection.limbs.as_ref().filter(|_| numbers.limb_phase) {
             self.limb_phase.see(limbs, speed_mps, self.height.mean_m());
         }
-        if !view.on_step && !detection.is_covered {
+        if !view.on_step && detection.overhead.is_none() {
             self.height.see(detection.top_m, view.beams_per_m_at_top);
         }
         self.heading.see(detection, view, speed_mps);
@@ -385,7 +386,7 @@ impl Person {
         {
             return;
         }
-        self.shape.see(&detection.bands, detection.position_m - position_m, velocity_mps.normalize());
+        self.shape.see(detection, position_m, velocity_mps.normalize());
     }
 
     /// Learns the outline from a detection in free sight, where it is known which way the body faces.

@@ -40,7 +40,7 @@ pub fn detection(x_m: f64, time_ns: i64) -> umbracast::detect::Detection {
         limbs: None,
             reaches: Vec::new(),
             bands: Default::default(),
-            is_covered: false,
+            overhead: None,
         aabb,
         obb: Obb::from_aabb(&aabb),
     }

@@ -4,11 +4,11 @@
 use std::collections::VecDeque;
 
 use umbracast::Health;
-use umbracast::detect::{Point, Prior};
+use umbracast::detect::{Moments, Point, Prior, Shape};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb, Pose};
 use umbracast::lidar::{Fan, SECTORS, View};
-use umbracast::track::{GaitPhase, Observed, Track};
+use umbracast::track::{Canopy, GaitPhase, Observed, Track};
 
 use crate::fields::{Fields, Message, index, matrix, schema, vec2, vec3};
 use crate::messages::Schema;
@@ -381,6 +381,11 @@ impl Message for Prior {
         f.bool("confirmed", &mut self.confirmed);
         f.bool("is_furniture", &mut self.is_furniture);
         f.bool("walked", &mut self.walked);
+        let (mut is_known, shape) = (self.shape.is_some(), self.shape.unwrap_or_default());
+        f.bool("shape_is_known", &mut is_known);
+        let mut bands = shape.bands.map(|of| of.numbers());
+        f.f64_array("shape", bands.as_flattened_mut());
+        self.shape = is_known.then(|| Shape { bands: bands.map(Moments::of_numbers) });
     }
 }
 
@@ -402,6 +407,7 @@ impl Message for Track {
             width_scale: 0.0,
             width_scale_sigma: 0.0,
             outline_m: Default::default(),
+            canopy: None,
             gait: GaitPhase::UNKNOWN,
             points: 0,
             confirmed: false,
@@ -425,6 +431,11 @@ impl Message for Track {
         f.f64("width_scale", &mut self.width_scale);
         f.f64("width_scale_sigma", &mut self.width_scale_sigma);
         f.f64_array("outline_m", self.outline_m.as_flattened_mut());
+        let (mut is_covered, mut canopy) =
+            (self.canopy.is_some(), self.canopy.map_or([0.0; 5], |c| c.numbers()));
+        f.bool("is_covered", &mut is_covered);
+        f.f64_array("canopy_m", &mut canopy);
+        self.canopy = is_covered.then(|| Canopy::of_numbers(canopy));
         f.f64("gait_phase_rad", &mut self.gait.phase_rad);
         f.f64("gait_concentration", &mut self.gait.concentration);
         f.u32("points", &mut self.points);

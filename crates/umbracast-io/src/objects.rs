@@ -161,7 +161,7 @@ fn detection(object: &Object, after_s: f64, time_ns: i64) -> Option<Detection> {
         limbs: None,
         reaches: Vec::new(),
         bands: Default::default(),
-        is_covered: false,
+        overhead: None,
         aabb: Aabb { min_m: obb.center_m - reach_m, max_m: obb.center_m + reach_m },
         obb,
     })

@@ -232,9 +232,10 @@ fn track(row: &TrackRow, site: &Site) -> Track {
     put(&mut track.width_scale_sigma, row.width_scale_sigma);
     let outline_m = track.outline_m.as_flattened_mut().iter_mut().zip(row.outline_m.as_flattened());
     outline_m.for_each(|(to, given)| put(to, *given));
+    track.canopy = row.canopy();
     put(&mut track.gait.phase_rad, row.gait_phase_rad);
     put(&mut track.gait.concentration, row.gait_concentration);
-    (track.points, track.confirmed) = (row.points, row.confirmed);
+    (track.points, track.confirmed, track.part_of) = (row.points, row.confirmed, row.part_of);
     track.stand_up(site.hall.floor_m(track.position_m));
     track
 }

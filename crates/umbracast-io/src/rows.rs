@@ -10,7 +10,7 @@ use umbracast::detect::Detection;
 use umbracast::detect::LEVELS;
 use umbracast::geometry::{Aabb, Obb};
 use umbracast::radio::{Binding, Surface};
-use umbracast::track::Track;
+use umbracast::track::{Canopy, Track};
 use umbracast::{Outcome, STEPS};
 
 /// Truth: one body in one frame. Arrived ones too.
@@ -97,16 +97,28 @@ pub struct TrackRow {
     pub width_scale_sigma: f64,
     /// By level: ahead, left, round, oblong.
     pub outline_m: [[f64; 4]; LEVELS],
+    /// What is carried over the head: its middle ahead and left of the axis, radius, rim, top; null where nothing is.
+    pub canopy_m: [Option<f64>; 5],
     pub gait_phase_rad: f64,
     pub gait_concentration: f64,
     pub points: u32,
     pub confirmed: bool,
+    /// Whose thing this is, a track; null for people.
+    pub part_of: Option<u64>,
     /// min x y z, max x y z.
     pub aabb_m: [f64; 6],
     /// centre x y z, half x y z, then the rotation's columns.
     pub obb: [f64; 15],
     /// Steps 1..=9: x, y, cov xx, xy, yy.
     pub steps: [[f64; 5]; STEPS],
+}
+
+impl TrackRow {
+    /// What is carried over the head, if all its numbers are there.
+    pub fn canopy(&self) -> Option<Canopy> {
+        let numbers = self.canopy_m.map(|m| m.unwrap_or(f64::NAN));
+        numbers.iter().all(|m| m.is_finite()).then(|| Canopy::of_numbers(numbers))
+    }
 }
 
 /// Our answer: one link in one frame.
@@ -380,10 +392,12 @@ pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
         width_scale: track.width_scale,
         width_scale_sigma: track.width_scale_sigma,
         outline_m: track.outline_m,
+        canopy_m: track.canopy.map_or([None; 5], |canopy| canopy.numbers().map(Some)),
         gait_phase_rad: track.gait.phase_rad,
         gait_concentration: track.gait.concentration,
         points: track.points,
         confirmed: track.confirmed,
+        part_of: track.part_of,
         aabb_m: of_aabb(&track.aabb),
         obb: of_obb(&track.obb),
         ..TrackRow::default()

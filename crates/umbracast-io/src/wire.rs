@@ -87,7 +87,7 @@ pub fn fields<R: WireRow>() -> String {
     each(&mut R::default(), |name, cell| {
         let kind = match cell {
             Cell::U32(_) => "uint32",
-            Cell::U64(_) => "uint64",
+            Cell::U64(_) | Cell::MaybeU64(_) => "uint64",
             Cell::I64(_) => "int64",
             Cell::F64(_) | Cell::MaybeF64(_) => "float64",
             Cell::Bool(_) => "bool",
@@ -97,6 +97,7 @@ pub fn fields<R: WireRow>() -> String {
             }
         };
         let remark = match cell {
+            Cell::MaybeU64(_) => " # 18446744073709551615: none",
             Cell::MaybeF64(_) => " # NaN: none",
             Cell::MaybeBool(_) => " # 0 no, 1 yes, 2 unknown",
             Cell::MaybeAccessPoint(_) => " # empty: none",
@@ -141,6 +142,7 @@ pub fn encode<R: WireRow>(time_ns: i64, frame: u64, rows: &[R], access_points: &
         each(&mut { row }, |_, cell| match cell {
             Cell::U32(v) => e.u32(*v),
             Cell::U64(v) => e.u64(*v),
+            Cell::MaybeU64(v) => e.u64(v.unwrap_or(u64::MAX)),
             Cell::I64(v) => e.u64(*v as u64),
             Cell::F64(v) => e.f64(*v),
             Cell::Bool(v) => e.bool(*v),
@@ -185,6 +187,7 @@ pub(crate) fn decode_without<R: WireRow>(
                 (name, _) if name == column => true,
                 (_, Cell::U32(v)) => set(v, d.u32()),
                 (_, Cell::U64(v)) => set(v, d.u64()),
+                (_, Cell::MaybeU64(v)) => set(v, d.u64().map(|v| (v != u64::MAX).then_some(v))),
                 (_, Cell::I64(v)) => set(v, d.u64().map(|v| v as i64)),
                 (_, Cell::F64(v)) => set(v, d.f64()),
                 (_, Cell::Bool(v)) => set(v, d.bool()),
@@ -286,6 +289,7 @@ impl<R: WireRow> Serialize for JsonRow<'_, R> {
             written = match cell {
                 Cell::U32(v) => object.serialize_entry(name, v),
                 Cell::U64(v) => object.serialize_entry(name, v),
+                Cell::MaybeU64(v) => object.serialize_entry(name, v),
                 Cell::I64(v) => object.serialize_entry(name, v),
                 Cell::F64(v) => object.serialize_entry(name, &rounded(*v)),
                 Cell::Bool(v) => object.serialize_entry(name, v),
@@ -324,6 +328,7 @@ pub fn json_schema<R: WireRow>() -> Value {
     each(&mut R::default(), |name, cell| {
         let kind: Value = match cell {
             Cell::U32(_) | Cell::U64(_) | Cell::I64(_) => "integer".into(),
+            Cell::MaybeU64(_) => vec!["integer", "null"].into(),
             Cell::F64(_) | Cell::MaybeF64(_) => vec!["number", "null"].into(),
             Cell::Bool(_) => "boolean".into(),
             Cell::MaybeBool(_) => vec!["boolean", "null"].into(),

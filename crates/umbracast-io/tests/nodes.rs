@@ -1,10 +1,10 @@
 //! Messages between nodes survive the network to the last bit, and no other bytes are accepted.
 
-use umbracast::detect::{Point, Prior};
+use umbracast::detect::{Point, Prior, Shape};
 use umbracast::forecast::Forecast;
 use umbracast::geometry::{DVec2, DVec3, Pose};
 use umbracast::lidar::{Fan, SECTORS, View};
-use umbracast::track::{Observed, Track};
+use umbracast::track::{Canopy, Observed, Track};
 use umbracast_io::fields::{Message, decode, encode};
 use umbracast_io::nodes::{Followed, Foreground, NodeHealth, Priors, TrackerState, Warning};
 
@@ -32,7 +32,8 @@ fn foreground() -> Foreground {
 
 fn followed() -> Followed {
     let observed = Observed { time_ns: TIME_NS, position_m: DVec2::new(0.1, 0.2), velocity_mps: DVec2::X };
-    let mut track = Track { id: 3, points: 7, confirmed: true, ..Track::empty() };
+    let canopy = Some(Canopy::of_numbers([0.1, 0.2, 0.5, 1.8, 2.0]));
+    let mut track = Track { id: 3, points: 7, confirmed: true, canopy, part_of: Some(2), ..Track::empty() };
     track.covariance[1][2] = 0.1;
     track.observed.extend([observed; 2]);
     let mut forecast = Forecast { track: 3, ..Forecast::empty() };
@@ -61,8 +62,10 @@ fn survives<M: Message + PartialEq + std::fmt::Debug>(mut message: M) {
 fn every_message_survives_and_a_part_of_it_is_none() {
     survives(foreground());
     survives(followed());
+    let mut shape = Shape::default();
+    shape.bands[4].add(DVec2::new(0.2, -0.1));
     let prior = Prior { height_m: 1.7, confirmed: true, ..Prior::empty() };
-    let priors = vec![prior; 2];
+    let priors = vec![prior, Prior { shape: Some(shape), ..prior }];
     survives(Priors { time_ns: TIME_NS, tracker: "a".to_owned(), term: 5, numbers: 6, priors });
     survives(TrackerState {
         time_ns: 1,

@@ -16,6 +16,7 @@ use crate::told::wrong;
 enum Column<'a> {
     U32(Vec<u32>),
     U64(Vec<u64>),
+    MaybeU64(Vec<Option<u64>>),
     I64(Vec<i64>),
     F64(Vec<f64>),
     MaybeF64(Vec<f64>, Vec<bool>),
@@ -36,6 +37,7 @@ pub fn of_rows<R: Row>(rows: &[R], access_points: &[String]) -> PyResult<RecordB
         columns.push(match cell {
             Cell::U32(_) => Column::U32(Vec::with_capacity(rows.len())),
             Cell::U64(_) => Column::U64(Vec::with_capacity(rows.len())),
+            Cell::MaybeU64(_) => Column::MaybeU64(Vec::with_capacity(rows.len())),
             Cell::I64(_) => Column::I64(Vec::with_capacity(rows.len())),
             Cell::F64(_) => Column::F64(Vec::with_capacity(rows.len())),
             Cell::MaybeF64(_) => Column::MaybeF64(Vec::with_capacity(rows.len()), Vec::new()),
@@ -57,6 +59,7 @@ pub fn of_rows<R: Row>(rows: &[R], access_points: &[String]) -> PyResult<RecordB
         row.visit(&mut |_, cell| match (column.next(), cell) {
             (Some(Column::U32(values)), Cell::U32(v)) => values.push(*v),
             (Some(Column::U64(values)), Cell::U64(v)) => values.push(*v),
+            (Some(Column::MaybeU64(values)), Cell::MaybeU64(v)) => values.push(*v),
             (Some(Column::I64(values)), Cell::I64(v)) => values.push(*v),
             (Some(Column::F64(values)), Cell::F64(v)) => values.push(*v),
             (Some(Column::MaybeF64(values, there)), Cell::MaybeF64(v)) => {
@@ -103,6 +106,7 @@ fn made(column: Column) -> (ArrayRef, bool) {
     match column {
         Column::U32(values) => (Arc::new(UInt32Array::from(values)), false),
         Column::U64(values) => (Arc::new(UInt64Array::from(values)), false),
+        Column::MaybeU64(values) => (Arc::new(UInt64Array::from(values)), true),
         Column::I64(values) => (Arc::new(Int64Array::from(values)), false),
         Column::F64(values) => (Arc::new(Float64Array::from(values)), false),
         Column::MaybeF64(values, there) => {

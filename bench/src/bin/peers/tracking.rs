@@ -83,7 +83,7 @@ fn detection(at_m: DVec2, time_ns: i64) -> Detection {
         limbs: None,
         reaches: Vec::new(),
         bands: Default::default(),
-        is_covered: false,
+        overhead: None,
         aabb,
         obb: Obb::from_aabb(&aabb),
     }

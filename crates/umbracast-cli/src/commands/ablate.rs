@@ -95,7 +95,8 @@ fn drawn(args: &Ablate) -> Result<Vec<DataSet>, Error> {
         set("height-6", low, crowd(Preset::Orca03)),
         set("lost-sensor", lost, crowd(Preset::Orca03)),
     ];
-    for kind in [Kind::Bag, Kind::Phone, Kind::Pockets, Kind::Child, Kind::Wheelchair] {
+    let carried = [Kind::Bag, Kind::Phone, Kind::Pockets, Kind::Umbrella];
+    for kind in carried.into_iter().chain([Kind::Child, Kind::Wheelchair, Kind::Pram]) {
         sets.push(set(kind.name(), Config::default(), dressed(crowd(Preset::Orca03), kind, None)?));
     }
     Ok(sets)

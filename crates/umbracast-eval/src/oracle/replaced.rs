@@ -45,7 +45,7 @@ pub fn algorithm_1(run: &SceneRun, config: &Config, person_box: BoxKind) -> Said
         BlockageConfig { method: BlockageMethod::Algorithm1, person_box, ..config.blockage.clone() };
     let mut caster = Caster::new(&blockage, &config.site);
     let (mut said, mut blockages) = (Said::default(), Vec::new());
-    for (frame, rows) in confirmed_by_frame(run) {
+    for (frame, rows) in present_by_frame(run) {
         let ahead = |row: &&TrackRow| with_own_future(row);
         let (tracks, forecasts): (Vec<Track>, Vec<Forecast>) = rows.iter().map(ahead).unzip();
         caster.cast(&tracks, &forecasts, &mut blockages);
@@ -94,7 +94,7 @@ pub fn true_future(truth: &TruthIndex, run: &SceneRun, matching: &Matching, conf
     let person_of: BTreeMap<(u64, u64), u32> =
         matching.iter().map(|(&(frame, person), &track)| ((frame, track), person)).collect();
     let (mut said, mut blockages) = (Said::default(), Vec::new());
-    for (frame, rows) in confirmed_by_frame(run) {
+    for (frame, rows) in present_by_frame(run) {
         let ahead = |row: &&TrackRow| {
             let person = person_of.get(&(frame, row.track));
             match person.and_then(|&person| truth.person(frame, person)) {
@@ -126,9 +126,10 @@ pub fn forecast_of(row: &TrackRow) -> [Gaussian2; STEPS] {
 }
 
 /// What stage 3 gets: confirmed tracks, frame by frame.
-fn confirmed_by_frame(run: &SceneRun) -> BTreeMap<u64, Vec<&TrackRow>> {
+/// Confirmed tracks, and things that somebody moves.
+fn present_by_frame(run: &SceneRun) -> BTreeMap<u64, Vec<&TrackRow>> {
     let mut by_frame: BTreeMap<u64, Vec<&TrackRow>> = BTreeMap::new();
-    for row in run.tracks.iter().filter(|row| row.confirmed) {
+    for row in run.tracks.iter().filter(|row| row.confirmed || row.part_of.is_some()) {
         by_frame.entry(row.frame).or_default().push(row);
     }
     by_frame
@@ -144,7 +145,7 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, hall: &H
     let walks = track.velocity_mps.length() > WALKS_FROM_MPS;
     let (heading_rad, heading_sigma_rad) =
         if walks { (track.velocity_mps.to_angle(), 0.0) } else { (own.heading_rad, own.heading_sigma_rad) };
-    let Track { height_m, height_sigma_m, width_scale, width_scale_sigma, outline_m, gait, .. } =
+    let Track { height_m, height_sigma_m, width_scale, width_scale_sigma, outline_m, canopy, gait, .. } =
         track_of(own);
     Track {
         heading_rad,
@@ -154,6 +155,7 @@ fn with_true_state(truth: &TruthIndex, own: &TrackRow, row: &PeopleRow, hall: &H
         width_scale,
         width_scale_sigma,
         outline_m,
+        canopy,
         gait,
         ..track
     }
@@ -208,6 +210,7 @@ pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb))
         width_scale: 1.0,
         width_scale_sigma: WIDTH_SCALE_SIGMA,
         outline_m: Default::default(),
+        canopy: None,
         gait: GaitPhase::UNKNOWN,
         points: row.returns,
         confirmed: true,
@@ -269,10 +272,11 @@ fn track_of(row: &TrackRow) -> Track {
         width_scale: row.width_scale,
         width_scale_sigma: row.width_scale_sigma,
         outline_m: row.outline_m,
+        canopy: row.canopy(),
         gait: GaitPhase { phase_rad: row.gait_phase_rad, concentration: row.gait_concentration },
         points: row.points,
         confirmed: row.confirmed,
-        part_of: None,
+        part_of: row.part_of,
         aabb,
         obb,
         observed: VecDeque::new(),

@@ -49,6 +49,7 @@ fn table_of<R: Row>(kind: u8) -> Vec<u8> {
             match cell {
                 Cell::U32(value) => *value = counter,
                 Cell::U64(value) => *value = u64::from(counter),
+                Cell::MaybeU64(value) => *value = (!counter.is_multiple_of(3)).then_some(counter.into()),
                 Cell::I64(value) => *value = i64::from(counter),
                 Cell::F64(value) => *value = f64::from(counter) / 3.0,
                 Cell::Bool(value) => *value = counter.is_multiple_of(3),

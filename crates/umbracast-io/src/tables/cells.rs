@@ -31,6 +31,8 @@ pub enum Cell<'a> {
     U32(&'a mut u32),
     /// A frame or a track.
     U64(&'a mut u64),
+    /// A track or null.
+    MaybeU64(&'a mut Option<u64>),
     /// A time.
     I64(&'a mut i64),
     /// A measure.
@@ -56,7 +58,11 @@ impl Cell<'_> {
     pub fn may_be_null(&self) -> bool {
         matches!(
             self,
-            Self::MaybeBool(_) | Self::MaybeF64(_) | Self::MaybeAccessPoint(_) | Self::MaybeSurface(_)
+            Self::MaybeU64(_)
+                | Self::MaybeBool(_)
+                | Self::MaybeF64(_)
+                | Self::MaybeAccessPoint(_)
+                | Self::MaybeSurface(_)
         )
     }
 }
@@ -141,6 +147,8 @@ const OBB: [&str; 15] = [
     "obb_axis_3_z",
 ];
 const OUTLINE: [&str; 4] = ["outline_ahead_", "outline_left_", "outline_round_", "outline_oblong_"];
+const CANOPY: [&str; 5] =
+    ["canopy_ahead_m", "canopy_left_m", "canopy_radius_m", "canopy_low_m", "canopy_top_m"];
 const STEP: [(&str, &str); 5] =
     [("x_s", "_m"), ("y_s", "_m"), ("cov_xx_s", "_m2"), ("cov_xy_s", "_m2"), ("cov_yy_s", "_m2")];
 
@@ -210,10 +218,14 @@ impl Row for TrackRow {
                 see(Name(name, Some(level), "_m"), Cell::F64(value));
             }
         }
+        for (name, value) in CANOPY.into_iter().zip(&mut self.canopy_m) {
+            see(plain(name), Cell::MaybeF64(value));
+        }
         see(plain("gait_phase_rad"), Cell::F64(&mut self.gait_phase_rad));
         see(plain("gait_concentration"), Cell::F64(&mut self.gait_concentration));
         see(plain("points"), Cell::U32(&mut self.points));
         see(plain("confirmed"), Cell::Bool(&mut self.confirmed));
+        see(plain("part_of"), Cell::MaybeU64(&mut self.part_of));
         see_boxes(&mut self.aabb_m, &mut self.obb, see);
         for (h, step) in (1..).zip(&mut self.steps) {
             for ((before, after), value) in STEP.into_iter().zip(step) {

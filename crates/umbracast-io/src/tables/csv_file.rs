@@ -39,11 +39,12 @@ impl CsvFile {
                 // Writing to a String cannot fail.
                 let _ = match cell {
                     Cell::U32(v) => write!(text, "{v}"),
-                    Cell::U64(v) => write!(text, "{v}"),
+                    Cell::U64(v) | Cell::MaybeU64(Some(v)) => write!(text, "{v}"),
                     Cell::I64(v) => write!(text, "{v}"),
                     Cell::F64(v) | Cell::MaybeF64(Some(v)) => write!(text, "{v}"),
                     Cell::Bool(v) | Cell::MaybeBool(Some(v)) => write!(text, "{v}"),
-                    Cell::MaybeBool(None)
+                    Cell::MaybeU64(None)
+                    | Cell::MaybeBool(None)
                     | Cell::MaybeF64(None)
                     | Cell::MaybeAccessPoint(None)
                     | Cell::MaybeSurface(None) => Ok(()),

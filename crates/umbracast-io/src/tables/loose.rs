@@ -175,7 +175,7 @@ fn of_text(cell: &str) -> Value {
 fn kind(cell: &Cell) -> &'static str {
     match cell {
         Cell::U32(_) => "a whole number from 0 to 4294967295",
-        Cell::U64(_) | Cell::I64(_) => "a whole number",
+        Cell::U64(_) | Cell::MaybeU64(_) | Cell::I64(_) => "a whole number",
         Cell::F64(_) | Cell::MaybeF64(_) => "a number",
         Cell::Bool(_) | Cell::MaybeBool(_) => "true or false",
         Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) => "the name of an access point of the site",
@@ -207,6 +207,9 @@ fn set(cell: Cell, value: &Value, access_points: &[String]) -> bool {
     match cell {
         Cell::U32(to) => put(to, whole.and_then(|v| u32::try_from(v).ok())),
         Cell::U64(to) => put(to, whole.map(i64::cast_unsigned)),
+        Cell::MaybeU64(to) => {
+            put(to, if nothing { Some(None) } else { whole.map(|v| Some(v.cast_unsigned())) })
+        }
         Cell::I64(to) => put(to, whole),
         Cell::F64(to) => put(to, real),
         Cell::Bool(to) => put(to, truth),

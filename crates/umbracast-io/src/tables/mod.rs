@@ -221,6 +221,7 @@ mod tests {
             match cell {
                 Cell::U32(v) => *v = u32::MAX - counter,
                 Cell::U64(v) => *v = u64::MAX - u64::from(counter),
+                Cell::MaybeU64(v) => *v = (!counter.is_multiple_of(3)).then(|| u64::MAX - u64::from(counter)),
                 Cell::I64(v) => *v = -i64::from(counter),
                 Cell::F64(v) => *v = f64::from(counter) / 3.0,
                 Cell::Bool(v) => *v = counter.is_multiple_of(3),

@@ -13,6 +13,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::file::serialized_reader::SerializedPageReader;
+use umbracast::Error;
 
 /// A byte of a dictionary holds as many values at most: those of a column of bits.
 const VALUES_A_BYTE: usize = 8;
@@ -156,6 +157,22 @@ impl PageReader for Pages {
     fn skip_next_page(&mut self) -> Result<(), ParquetError> {
         self.pages.skip_next_page()
     }
+}
+
+/// Who writes a table with another program may not know how it is compressed; polars does it with zstd.
+pub(super) fn refuse_codec(codec: Compression) -> Result<(), Error> {
+    let with_zstd = cfg!(feature = "compression");
+    let found = match codec {
+        Compression::UNCOMPRESSED | Compression::SNAPPY => return Ok(()),
+        Compression::ZSTD(_) if with_zstd => return Ok(()),
+        Compression::ZSTD(_) => "zstd, which a build with `--features compression` reads".to_owned(),
+        other => format!("{other:?}"),
+    };
+    let known = if with_zstd { "snappy, zstd" } else { "snappy" };
+    Err(Error::new(format!(
+        "expected values compressed with {known} or not at all, found {found}; polars writes snappy with \
+         `write_parquet(file, compression=\"snappy\")`"
+    )))
 }
 
 #[cfg(test)]

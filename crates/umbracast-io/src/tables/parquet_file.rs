@@ -20,7 +20,7 @@ use umbracast::decide::Action;
 use umbracast::radio::Surface;
 
 use super::cells::{Cell, Row};
-use super::pages::column_reader;
+use super::pages::{column_reader, refuse_codec};
 use super::values::{Value, Values};
 use crate::seam::guarded;
 
@@ -67,6 +67,9 @@ impl ParquetFile {
             match (open.untyped(), column) {
                 (ColumnWriter::Int32ColumnWriter(w), Column::Int32(v)) => w.write_batch(v, None, None)?,
                 (ColumnWriter::Int64ColumnWriter(w), Column::Int64(v)) => w.write_batch(v, None, None)?,
+                (ColumnWriter::Int64ColumnWriter(w), Column::MaybeInt64(v, there)) => {
+                    w.write_batch(v, Some(there), None)?
+                }
                 (ColumnWriter::DoubleColumnWriter(w), Column::Double(v)) => w.write_batch(v, None, None)?,
                 (ColumnWriter::ByteArrayColumnWriter(w), Column::Text(v)) => w.write_batch(v, None, None)?,
                 (ColumnWriter::ByteArrayColumnWriter(w), Column::MaybeText(v, there)) => {
@@ -130,6 +133,8 @@ enum Column {
     /// The values that are there, and for each row 1 where one is.
     MaybeBool(Vec<bool>, Vec<i16>),
     /// The same.
+    MaybeInt64(Vec<i64>, Vec<i16>),
+    /// The same.
     MaybeDouble(Vec<f64>, Vec<i16>),
     /// The same.
     MaybeText(Vec<ByteArray>, Vec<i16>),
@@ -173,7 +178,7 @@ fn fields_of<R: Row>() -> Vec<Field> {
     R::default().visit(&mut |name, cell| {
         let (physical, logical) = match cell {
             Cell::U32(_) => (Physical::INT32, unsigned(32)),
-            Cell::U64(_) => (Physical::INT64, unsigned(64)),
+            Cell::U64(_) | Cell::MaybeU64(_) => (Physical::INT64, unsigned(64)),
             Cell::I64(_) => (Physical::INT64, None),
             Cell::F64(_) | Cell::MaybeF64(_) => (Physical::DOUBLE, None),
             Cell::Bool(_) | Cell::MaybeBool(_) => (Physical::BOOLEAN, None),
@@ -215,6 +220,7 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
         columns.push(match cell {
             Cell::U32(_) => Column::Int32(Vec::new()),
             Cell::U64(_) | Cell::I64(_) => Column::Int64(Vec::new()),
+            Cell::MaybeU64(_) => Column::MaybeInt64(Vec::new(), Vec::new()),
             Cell::F64(_) => Column::Double(Vec::new()),
             Cell::Bool(_) => Column::Bool(Vec::new()),
             Cell::MaybeBool(_) => Column::MaybeBool(Vec::new(), Vec::new()),
@@ -231,16 +237,13 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
             (Some(Column::Int32(values)), Cell::U32(v)) => values.push(v.cast_signed()),
             (Some(Column::Int64(values)), Cell::U64(v)) => values.push(v.cast_signed()),
             (Some(Column::Int64(values)), Cell::I64(v)) => values.push(*v),
+            (Some(Column::MaybeInt64(values, there)), Cell::MaybeU64(v)) => {
+                push(values, there, v.map(u64::cast_signed))
+            }
             (Some(Column::Double(values)), Cell::F64(v)) => values.push(*v),
             (Some(Column::Bool(values)), Cell::Bool(v)) => values.push(*v),
-            (Some(Column::MaybeBool(values, there)), Cell::MaybeBool(v)) => {
-                values.extend(*v);
-                there.push(i16::from(v.is_some()));
-            }
-            (Some(Column::MaybeDouble(values, there)), Cell::MaybeF64(v)) => {
-                values.extend(*v);
-                there.push(i16::from(v.is_some()));
-            }
+            (Some(Column::MaybeBool(values, there)), Cell::MaybeBool(v)) => push(values, there, *v),
+            (Some(Column::MaybeDouble(values, there)), Cell::MaybeF64(v)) => push(values, there, *v),
             (Some(Column::Text(values)), Cell::AccessPoint(v)) => match names.get(*v as usize) {
                 Some(name) => values.push(name.clone()),
                 None => unknown = Some((column_name, *v)),
@@ -255,8 +258,7 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
             }
             (Some(Column::Text(values)), Cell::Action(v)) => values.push(v.name().into()),
             (Some(Column::MaybeText(values, there)), Cell::MaybeSurface(v)) => {
-                values.extend(v.map(|v| ByteArray::from(v.to_string().as_str())));
-                there.push(i16::from(v.is_some()));
+                push(values, there, v.map(|v| ByteArray::from(v.to_string().as_str())))
             }
             _ => {}
         });
@@ -268,6 +270,11 @@ fn gathered<R: Row>(rows: &mut [R], access_points: &[String]) -> Result<Vec<Colu
             access_points.len()
         ))),
     }
+}
+
+fn push<T>(values: &mut Vec<T>, there: &mut Vec<i16>, value: Option<T>) {
+    there.push(i16::from(value.is_some()));
+    values.extend(value);
 }
 
 /// Reads the table row group by row group.
@@ -346,7 +353,7 @@ fn read_column(
         return Ok(vec![Value::Null; count]);
     }
     let expected = match cell {
-        Cell::U32(_) | Cell::U64(_) | Cell::I64(_) => "whole numbers",
+        Cell::U32(_) | Cell::U64(_) | Cell::MaybeU64(_) | Cell::I64(_) => "whole numbers",
         Cell::F64(_) | Cell::MaybeF64(_) => "real numbers",
         Cell::Bool(_) | Cell::MaybeBool(_) => "true or false",
         Cell::AccessPoint(_) | Cell::MaybeAccessPoint(_) => "names of access points",
@@ -361,12 +368,13 @@ fn read_column(
         (ColumnReader::Int32ColumnReader(r), Cell::U32(_)) => {
             values(r, count, |&v: &i32| whole(i64::from(v.cast_unsigned())))
         }
-        (ColumnReader::Int32ColumnReader(r), Cell::U64(_) | Cell::I64(_)) => {
+        (ColumnReader::Int32ColumnReader(r), Cell::U64(_) | Cell::MaybeU64(_) | Cell::I64(_)) => {
             values(r, count, |&v: &i32| whole(i64::from(v)))
         }
-        (ColumnReader::Int64ColumnReader(r), Cell::U32(_) | Cell::U64(_) | Cell::I64(_)) => {
-            values(r, count, |&v: &i64| whole(v))
-        }
+        (
+            ColumnReader::Int64ColumnReader(r),
+            Cell::U32(_) | Cell::U64(_) | Cell::MaybeU64(_) | Cell::I64(_),
+        ) => values(r, count, |&v: &i64| whole(v)),
         (ColumnReader::DoubleColumnReader(r), Cell::F64(_) | Cell::MaybeF64(_)) => {
             values(r, count, |&v: &f64| Value::Real(v))
         }
@@ -457,22 +465,6 @@ fn loose_values(reader: ColumnReader, count: usize) -> Result<Option<Vec<Value>>
         ColumnReader::ByteArrayColumnReader(r) => values(r, count, text)?,
         _ => return Ok(None),
     }))
-}
-
-/// Who writes a table with another program may not know how it is compressed; polars does it with zstd.
-fn refuse_codec(codec: Compression) -> Result<(), Error> {
-    let with_zstd = cfg!(feature = "compression");
-    let found = match codec {
-        Compression::UNCOMPRESSED | Compression::SNAPPY => return Ok(()),
-        Compression::ZSTD(_) if with_zstd => return Ok(()),
-        Compression::ZSTD(_) => "zstd, which a build with `--features compression` reads".to_owned(),
-        other => format!("{other:?}"),
-    };
-    let known = if with_zstd { "snappy, zstd" } else { "snappy" };
-    Err(Error::new(format!(
-        "expected values compressed with {known} or not at all, found {found}; polars writes snappy with \
-         `write_parquet(file, compression=\"snappy\")`"
-    )))
 }
 
 /// All values of a flat column, `Null` where there is none.

@@ -39,6 +39,8 @@ impl Value {
         match (cell, self) {
             (Cell::U32(to) | Cell::AccessPoint(to), Self::Whole(v)) => *to = v as u32,
             (Cell::U64(to), Self::Whole(v)) => *to = v.cast_unsigned(),
+            (Cell::MaybeU64(to), Self::Whole(v)) => *to = Some(v.cast_unsigned()),
+            (Cell::MaybeU64(to), _) => *to = None,
             (Cell::I64(to), Self::Whole(v)) => *to = v,
             (Cell::F64(to), Self::Real(v)) => *to = v,
             (Cell::Bool(to), Self::Truth(v)) => *to = v,
