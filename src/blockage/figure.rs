@@ -115,6 +115,9 @@ impl Figure {
 
     /// Takes the outline of a track in place of that of a `usual` body, and what it carries over the head.
     pub(super) fn take_outline(&mut self, usual: &Self, track: &Track) {
+        if track.part_of.is_some() {
+            return self.take_box(usual, track);
+        }
         let (outline_m, canopy, height_m) = (&track.outline_m, track.canopy, track.height_m);
         let is_same = self.outline_m == *outline_m && self.canopy == canopy && self.of_height_m == height_m;
         if is_same && !self.plans.is_empty() {
@@ -148,7 +151,19 @@ impl Figure {
                 joint.out[side] = (joint.out[side] + moves[side]).max(0.0);
             }
         }
-        self.slices.extend(canopy.into_iter().flat_map(|canopy| slices_of(&canopy, height_m)));
+        self.slices.extend(canopy.into_iter().flat_map(|canopy| slices_of_canopy(&canopy, height_m)));
+        self.look_from_above();
+    }
+
+    /// Takes the box of somebody's thing: as thick from the floor to its top, and without arms.
+    fn take_box(&mut self, usual: &Self, track: &Track) {
+        let half_m = 0.5 * track.aabb.size_m().truncate();
+        let half = (OF_BOX * (half_m.x * half_m.y).sqrt() / track.height_m).max(LEAST);
+        let slice = |of: &Slice| Slice { half_depth: half, half_width: half, ahead: 0.0, left: 0.0, ..*of };
+        self.slices.clear();
+        self.slices.extend(usual.slices.iter().map(slice));
+        self.rods = usual.rods.map(|rod| Rod { radius: 0.0, ..rod });
+        self.of_height_m = 0.0;
         self.look_from_above();
     }
 
@@ -220,8 +235,17 @@ impl Figure {
     }
 }
 
+/// The slices of a track's body from the floor up, shares of its height: as rays meet it.
+#[doc(hidden)] // For who draws it.
+pub fn slices_of(body: &BodyModel, track: &Track) -> Vec<Slice> {
+    let usual = Figure::new(body);
+    let mut own = usual.clone();
+    own.take_outline(&usual, track);
+    own.slices
+}
+
 /// A canopy as slices above the head: what is free below it, and a dome of two.
-fn slices_of(canopy: &Canopy, height_m: f64) -> [Slice; 3] {
+fn slices_of_canopy(canopy: &Canopy, height_m: f64) -> [Slice; 3] {
     let (at, radius) = (canopy.center_m / height_m, canopy.radius_m / height_m);
     let low = (canopy.low_m / height_m).max(1.0 + LEAST);
     let top = (canopy.top_m / height_m).max(low + LEAST);
@@ -234,6 +258,8 @@ fn slices_of(canopy: &Canopy, height_m: f64) -> [Slice; 3] {
 
 /// No slice is thinner, nor lower: shares of the height.
 const LEAST: f64 = 1e-3;
+/// Boxes are averaged over frames with something else in them, and things do not fill them.
+const OF_BOX: f64 = 0.7;
 /// As wide is the upper half of a dome on the mean.
 const UPPER_HALF: f64 = 0.6;
 

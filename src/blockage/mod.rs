@@ -29,6 +29,8 @@ mod caster;
 #[doc(hidden)] // For its fit.
 pub use body_model::BodyModel;
 pub use caster::Caster;
+#[doc(hidden)] // For who draws bodies.
+pub use figure::slices_of;
 #[doc(hidden)] // What tests and ablations turn.
 pub use numbers::Numbers;
 

@@ -60,7 +60,7 @@ const fn job(
 }
 
 #[rustfmt::skip]
-const JOBS: [Job; 54] = [
+const JOBS: [Job; 55] = [
     job("orca-03-100-scenes", "what the default mode scores on 100 test scenes", 8, Needs::Nothing, scores::headline),
     job("orca-40-scenes", "40 test scenes, every mode, baselines, error budget, oracles", 8, Needs::Nothing, scores::modes),
     job("coverage", "what the sensors see of a standing person", 1, Needs::Nothing, house::coverage),
@@ -103,6 +103,7 @@ const JOBS: [Job; 54] = [
     job("mutations", "damaged files of every format, given to the command", 60, Needs::Nothing, mutations::mutations),
     job("same-bytes", "the same seed on one thread and on two", 1, Needs::Nothing, house::same_bytes),
     job("resume", "an experiment killed and gone on with", 3, Needs::Nothing, house::resume),
+    job("bodies", "what is learned of ten bodies, beside their meshes", 1, Needs::Nothing, scores::bodies),
     job("explain", "why the paper's figures are what they are", 4, Needs::Nothing, scores::explain),
     job("ablation", "each mechanism off alone", 45, Needs::Data, scores::ablation),
     job("reproduce-quick", "the paper's experiment in 40 scenes", 6, Needs::Nothing, scores::reproduce_quick),

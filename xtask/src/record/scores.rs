@@ -42,6 +42,15 @@ pub fn explain(book: &mut Book) -> Result<()> {
     Ok(())
 }
 
+/// What the program learned of ten bodies after ten seconds.
+pub fn bodies(book: &mut Book) -> Result<()> {
+    let line = "cargo run --release --quiet -p umbracast-eval --example bodies -- record/bodies.svg";
+    book.command(line);
+    let said = book.bash(&root(), line)?;
+    book.line(&said);
+    Ok(())
+}
+
 /// Each mechanism of the default mode off alone.
 pub fn ablation(book: &mut Book) -> Result<()> {
     let out = book.scratch("ablation");
