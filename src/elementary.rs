@@ -41,6 +41,22 @@ const WHOLE: f64 = 6_755_399_441_055_744.0;
 /// ln 2 in two parts, the first with so few bits that whole multiples of it are exact.
 const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
 
+/// Whole numbers below 2^52 stand in the low bits of this and them.
+const TWO_52: f64 = 4_503_599_627_370_496.0;
+
+/// The whole part of a number from 0 to below 2^51: neither a call nor a cast, which is not done in vector registers.
+#[inline(always)]
+pub(crate) fn whole(x: f64) -> f64 {
+    let rounded = (x + TWO_52) - TWO_52;
+    rounded - if rounded > x { 1.0 } else { 0.0 }
+}
+
+/// The same as an index; of any other number it is no less than 2^51.
+#[inline(always)]
+pub(crate) fn index(x: f64) -> u64 {
+    (whole(x) + TWO_52).to_bits().wrapping_sub(TWO_52.to_bits())
+}
+
 /// e^x to 3e-16 of it, for x held between -708 and 709: x = n ln 2 + r, the series of e^r, 2^n put into the exponent.
 #[inline(always)]
 pub(crate) fn exp(x: f64) -> f64 {
@@ -65,8 +81,6 @@ pub(crate) fn exp(x: f64) -> f64 {
 pub(crate) fn ln(x: f64) -> f64 {
     const ONE: u64 = 1023 << 52;
     const ROOT_OF_HALF: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
-    /// Whole numbers below 2^52 stand in the low bits of this and them.
-    const TWO_52: f64 = 4_503_599_627_370_496.0;
     let above = x.to_bits().wrapping_add(ONE - ROOT_OF_HALF);
     let n = f64::from_bits(above >> 52 | TWO_52.to_bits()) - (TWO_52 + 1023.0);
     let m = f64::from_bits(x.to_bits().wrapping_sub((above >> 52 << 52).wrapping_sub(ONE)));
@@ -174,6 +188,19 @@ mod tests {
         }
         assert!(exp(-1e9) < 1e-300 && exp(1e9) > 1e300 && exp(f64::NEG_INFINITY) > 0.0);
         assert_eq!((tanh(40.0), tanh(-1e9)), (1.0, -1.0));
+    }
+
+    #[test]
+    fn the_whole_part_is_that_of_a_cast_where_there_is_one() {
+        for i in 0..100_000 {
+            let x = f64::from(i) * 0.37;
+            for x in [x, x.floor(), x.floor() + 0.5, x.ceil().next_down().max(0.0), x * 1e9] {
+                assert_eq!((whole(x), index(x)), (x.floor(), x as u64), "{x}");
+            }
+        }
+        let beyond =
+            [-f64::MIN_POSITIVE, -0.3, -0.5, -7.0, -1e30, 1e16, 1e300, f64::INFINITY, f64::NAN, -f64::NAN];
+        assert!(beyond.iter().all(|&x| index(x) >= 1 << 51), "{beyond:?}");
     }
 
     #[test]

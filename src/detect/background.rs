@@ -1,19 +1,19 @@
 //! Removes the points that belong to the empty scene.
 
 use super::first_sight::of_people;
-use super::sensor_model::{Clip, Learn, Look, SensorModel, to_site, unorganised_point};
+use super::placed::Placer;
+use super::sensor_model::{Clip, Learn, Look, SensorModel, unorganised_point};
 use super::voxel::{VoxelMap, thin};
 use super::{Point, Prior, above_floor};
 use crate::config::{BackgroundMethod, DetectConfig};
 use crate::geometry::DVec3;
-use crate::lidar::{Azimuths, Cloud, Scan};
+use crate::lidar::{Cloud, Scan};
 use crate::{Frame, Health, Site};
 
 /// Most foreground points kept of one frame: 100 people close to the sensors. Bounds the time of a frame.
 const POINTS_MAX: usize = 40_000;
-/// Voxels: hdl_people_tracking's edge and threshold.
+/// Voxels: hdl_people_tracking's edge.
 const VOXEL_M: f64 = 0.2;
-const VOXEL_POINTS_MIN: u8 = 2;
 /// So many empty scans make the voxel map. The adapted code takes one; with our columns, which do not repeat from turn
 /// to turn, one leaves some 9,000 points of the hall a frame to be taken for people.
 const MAP_REVOLUTIONS: u32 = 20;
@@ -45,7 +45,7 @@ pub struct Background {
     keys: Vec<u64>,
     thinned: Vec<Point>,
     /// For the voxels, which take every point of a frame; made with the first.
-    azimuths: Option<Azimuths>,
+    placer: Option<Placer>,
 }
 
 impl Background {
@@ -69,7 +69,7 @@ impl Background {
             map_scans: 0,
             keys: Vec::new(),
             thinned: Vec::new(),
-            azimuths: None,
+            placer: None,
         }
     }
 
@@ -98,7 +98,7 @@ impl Background {
             }
             BackgroundMethod::Voxels => {
                 let mut points = Vec::new();
-                self.points(frame, |_| true, &mut Health::default(), &mut points);
+                self.points(frame, None, &mut Health::default(), &mut points);
                 self.learn_map(&points);
             }
         }
@@ -192,65 +192,47 @@ impl Background {
 
     /// The points of a frame that lie where the map has none.
     fn new_points(&mut self, frame: &Frame, health: &mut Health, points: &mut Vec<Point>) {
-        let is_new = |map: &VoxelMap, p: &Point| map.is_new(p.position_m, VOXEL_POINTS_MIN);
         // Nine of ten points are the hall's: where they need not be thinned first, they are not even written down.
         let map = match self.map.take() {
             Some(map) if self.thin_m == 0.0 => {
-                self.points(frame, |point| is_new(&map, point), health, points);
+                self.points(frame, Some(&map), health, points);
                 map
             }
             map => {
-                self.points(frame, |_| true, health, points);
+                self.points(frame, None, health, points);
                 // Without an empty scan the first cloud is the map, and nothing changes it after, as in the
                 // adapted code: who stands in it is never seen.
                 let map = map.unwrap_or_else(|| VoxelMap::new(VOXEL_M, points));
-                points.retain(|point| is_new(&map, point));
+                points.retain(|point| map.is_new(point.position_m));
                 map
             }
         };
         self.map = Some(map);
     }
 
-    /// The points of a frame that are to be kept, in the site frame, thinned where the config says so.
-    #[inline(always)]
+    /// The points of a frame, of those that lie where a map has none, in the site frame, thinned where the config says so.
     fn points(
         &mut self,
         frame: &Frame,
-        keeps: impl Fn(&Point) -> bool,
+        map: Option<&VoxelMap>,
         health: &mut Health,
         points: &mut Vec<Point>,
     ) {
         points.clear();
-        let azimuths = self.azimuths.get_or_insert_with(Azimuths::of_a_turn);
+        let placer = self.placer.get_or_insert_with(Placer::new);
         for scan in &frame.scans {
             let Some(sensor) = self.sensors.get(scan.sensor) else { continue };
-            let valid = |r: f32, health: &mut Health| {
-                let ok = r >= sensor.range_min_m && r <= sensor.range_max_m;
-                health.points_invalid += u64::from(!ok);
-                ok
-            };
-            let mut keep = |point: Point| {
-                if keeps(&point) {
-                    points.push(point);
-                }
-            };
+            let valid_m = [sensor.range_min_m, sensor.range_max_m];
             match &scan.cloud {
-                Cloud::Organised(image) => {
-                    let ranges_m = image.range_m.chunks(image.beams.len().max(1));
-                    for (c, ranges_m) in (0..image.columns.len()).zip(ranges_m) {
-                        for (b, &range_m) in ranges_m.iter().enumerate() {
-                            if range_m != 0.0 && valid(range_m, health) {
-                                let position_m = image.tabled_point_m(azimuths, c, b, f64::from(range_m));
-                                let time_ns = image.time_ns(c, b);
-                                keep(to_site(&scan.site_from_sensor, scan.sensor, position_m, time_ns));
-                            }
-                        }
-                    }
-                }
+                Cloud::Organised(image) => placer.place(scan, image, valid_m, map, health, points),
                 Cloud::Unorganised(cloud) => {
                     for point in cloud {
-                        if valid(DVec3::from(point.position_m.map(f64::from)).length() as f32, health) {
-                            keep(unorganised_point(scan, point));
+                        let range_m = DVec3::from(point.position_m.map(f64::from)).length() as f32;
+                        let valid = range_m >= valid_m[0] && range_m <= valid_m[1];
+                        health.points_invalid += u64::from(!valid);
+                        let point = unorganised_point(scan, point);
+                        if valid && map.is_none_or(|map| map.is_new(point.position_m)) {
+                            points.push(point);
                         }
                     }
                 }

@@ -10,6 +10,7 @@ mod presence;
 mod cloud_limits;
 mod sensor_model;
 mod voxel;
+mod placed;
 mod background;
 #[doc(hidden)] // What the model of the body axis reads, for its fit.
 pub mod features;

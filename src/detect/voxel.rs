@@ -2,18 +2,30 @@
 //! them, quirks included (facts and values: koide3/hdl_people_tracking at 2d12516).
 
 use super::Point;
+use crate::elementary::{index, whole};
 use crate::geometry::{Aabb, DVec2, DVec3};
+use crate::lidar::{ABREAST, Lanes};
 
 /// More voxels than this are not kept; what lies beyond counts as new.
 const VOXELS_MAX: usize = 1 << 28;
+/// Voxels in a word of the map.
+const BITS: usize = u64::BITS as usize;
 
-/// How many points of the map lie in each voxel of the map's box.
+/// Which voxels of the map's box hold points of the map, a bit each: few enough bytes to stay near the processor.
 #[derive(Debug, Clone)]
 pub struct VoxelMap {
     bounds: Aabb,
     edge_m: f64,
-    size: [usize; 3],
-    counts: Vec<u8>,
+    /// Voxels along x, y and z; whole numbers, like all below.
+    size: DVec3,
+    /// From one voxel to the next along x, y and z.
+    strides: DVec3,
+    voxels: f64,
+    /// One point at least.
+    once: Vec<u64>,
+    /// Two at least, which is hdl_people_tracking's threshold: there nothing is new. Has one voxel more, which stands for what is
+    /// outside.
+    twice: Vec<u64>,
 }
 
 impl VoxelMap {
@@ -24,7 +36,19 @@ impl VoxelMap {
         let mut size = [cells.x as usize, cells.y as usize, cells.z as usize];
         let layer = size[0].saturating_mul(size[1]).max(1);
         size[2] = size[2].min(VOXELS_MAX / layer);
-        let mut map = Self { bounds, edge_m, size, counts: vec![0; size[0] * size[1] * size[2]] };
+        let voxels = if size[2] == 0 { 0 } else { size[0] * size[1] * size[2] };
+        let bits = vec![0; voxels / BITS + 1];
+        // Where one side is 0, nothing is inside the others.
+        let [nx, ny, nz] = size.map(|cells| if voxels == 0 { -1.0 } else { cells as f64 });
+        let mut map = Self {
+            bounds,
+            edge_m,
+            size: DVec3::new(nx, ny, nz),
+            strides: DVec3::new(1.0, nx, nx * ny),
+            voxels: voxels as f64,
+            once: bits.clone(),
+            twice: bits,
+        };
         map.add(points);
         map
     }
@@ -34,28 +58,59 @@ impl VoxelMap {
     pub fn add(&mut self, points: &[Point]) {
         for point in points {
             // A point on the far face falls into the next row, as in the original.
-            let [x, y, z] = self.voxel(point.position_m);
-            let flat = x + self.size[0] as i64 * (y + self.size[1] as i64 * z);
-            if let Some(count) = usize::try_from(flat).ok().and_then(|flat| self.counts.get_mut(flat)) {
-                *count = count.saturating_add(1);
+            let flat = self.in_edges(point.position_m).trunc().dot(self.strides);
+            if !(0.0..self.voxels).contains(&flat) {
+                continue;
             }
+            let flat = flat as usize;
+            let (word, bit) = (flat / BITS, 1 << (flat % BITS));
+            self.twice[word] |= self.once[word] & bit;
+            self.once[word] |= bit;
         }
     }
 
-    /// True when fewer than `points_min` points of the map share the point's voxel, or it lies outside the map.
-    pub fn is_new(&self, position_m: DVec3, points_min: u8) -> bool {
-        let [x, y, z] = self.voxel(position_m);
-        let inside = |i: i64, n: usize| i >= 0 && i < n as i64;
-        if !(inside(x, self.size[0]) && inside(y, self.size[1]) && inside(z, self.size[2])) {
-            return points_min > 0;
-        }
-        self.counts[x as usize + self.size[0] * (y as usize + self.size[1] * z as usize)] < points_min
+    /// True when fewer than two points of the map share the point's voxel, or it lies outside the map.
+    pub fn is_new(&self, position_m: DVec3) -> bool {
+        self.is_free(self.flat(position_m))
     }
 
-    fn voxel(&self, position_m: DVec3) -> [i64; 3] {
-        // Truncated toward zero, so the first voxel below the box counts as inside, as in the original.
-        let v = (position_m - self.bounds.min_m) / self.edge_m;
-        [v.x as i64, v.y as i64, v.z as i64]
+    /// The same of some points, given as their x, y and z: a bit each. All voxels are found before the first is looked up: the one
+    /// is done in vector registers, and of the other many are under way at once.
+    #[inline(always)]
+    pub fn are_new(&self, [x, y, z]: &[Lanes; 3]) -> u32 {
+        let mut flat = [0; ABREAST];
+        for (i, flat) in flat.iter_mut().enumerate() {
+            *flat = self.flat(DVec3::new(x[i], y[i], z[i]));
+        }
+        let mut bits = 0;
+        for (i, &flat) in flat.iter().enumerate() {
+            bits |= u32::from(self.is_free(flat)) << i;
+        }
+        bits
+    }
+
+    #[inline(always)]
+    fn is_free(&self, flat: u64) -> bool {
+        let flat = flat as usize;
+        self.twice[flat / BITS] >> (flat % BITS) & 1 == 0
+    }
+
+    /// The place of a point's voxel among the bits.
+    #[inline(always)]
+    fn flat(&self, position_m: DVec3) -> u64 {
+        let v = self.in_edges(position_m);
+        // No short cut, which would be a branch.
+        let within = |v: f64, n: f64| (v > -1.0) & (v < n);
+        let inside = within(v.x, self.size.x) & within(v.y, self.size.y) & within(v.z, self.size.z);
+        let whole = |v: f64| whole(if v > 0.0 { v } else { 0.0 });
+        let flat = whole(v.x) * self.strides.x + whole(v.y) * self.strides.y + whole(v.z) * self.strides.z;
+        index(if inside { flat } else { self.voxels })
+    }
+
+    /// Truncated toward zero, this is the voxel: the first one below the box counts as inside, as in the original.
+    #[inline(always)]
+    fn in_edges(&self, position_m: DVec3) -> DVec3 {
+        (position_m - self.bounds.min_m) / self.edge_m
     }
 }
 
@@ -118,16 +173,23 @@ mod tests {
         let corners = [point(0.0, 0.0, 0.0), point(1.05, 1.05, 1.05)];
         let twice = [point(0.5, 0.5, 0.5), point(0.51, 0.5, 0.5), point(0.9, 0.5, 0.5)];
         let map = VoxelMap::new(0.2, &[&corners[..], &twice[..]].concat());
-        assert!(!map.is_new(DVec3::new(0.45, 0.45, 0.45), 2));
-        assert!(map.is_new(DVec3::new(0.9, 0.5, 0.5), 2), "one point is not enough");
-        assert!(map.is_new(DVec3::new(3.0, 0.5, 0.5), 2), "outside the map");
+        assert!(!map.is_new(DVec3::new(0.45, 0.45, 0.45)));
+        assert!(map.is_new(DVec3::new(0.9, 0.5, 0.5)), "one point is not enough");
+        assert!(map.is_new(DVec3::new(3.0, 0.5, 0.5)), "outside the map");
     }
 
     #[test]
     fn the_first_voxel_below_the_map_counts_as_inside() {
         let map = VoxelMap::new(0.2, &[point(0.0, 0.0, 0.0), point(0.01, 0.0, 0.0), point(1.0, 1.0, 1.0)]);
-        assert!(!map.is_new(DVec3::new(-0.15, 0.0, 0.0), 2));
-        assert!(map.is_new(DVec3::new(-0.25, 0.0, 0.0), 2));
+        assert!(!map.is_new(DVec3::new(-0.15, 0.0, 0.0)));
+        assert!(map.is_new(DVec3::new(-0.25, 0.0, 0.0)));
+    }
+
+    #[test]
+    fn everything_is_new_where_the_map_has_no_height() {
+        let map = VoxelMap::new(0.2, &[point(0.0, 0.0, 0.0), point(0.0, 0.0, 0.0), point(1.0, 1.0, 0.0)]);
+        assert!(map.is_new(DVec3::ZERO) && map.is_new(DVec3::new(0.5, 0.5, -0.1)));
+        assert!(VoxelMap::new(0.2, &[]).is_new(DVec3::ZERO));
     }
 
     #[test]

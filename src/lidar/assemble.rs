@@ -276,7 +276,12 @@ impl Assembler {
                 }
             });
             // Columns come in order but for packets that overtook one another.
-            let at = image.columns.partition_point(|other| other.time_ns < column.time_ns);
+            let at = match image.columns.last() {
+                Some(last) if last.time_ns >= column.time_ns => {
+                    image.columns.partition_point(|other| other.time_ns < column.time_ns)
+                }
+                _ => image.columns.len(),
+            };
             let apart = |other: &Column| {
                 (other.time_ns - column.time_ns).unsigned_abs() as f64 >= model.column_period_ns / 2.0
             };
@@ -287,14 +292,16 @@ impl Assembler {
             intake.awaited = true;
             image.columns.insert(at, column);
             let cells = c * beams..(c + 1) * beams;
-            let range_m = self.columns.range_m[cells.clone()].iter().map(|&range_m| {
-                let valid = range_m == 0.0 || intake.valid_range_m.contains(&range_m);
-                health.points_invalid += u64::from(!valid);
-                if valid { range_m } else { 0.0 }
-            });
-            image.range_m.splice(at * beams..at * beams, range_m);
-            let reflectivity = self.columns.reflectivity[cells].iter().copied();
-            image.reflectivity.splice(at * beams..at * beams, reflectivity);
+            let range_m = &self.columns.range_m[cells.clone()];
+            let (least_m, most_m) = (*intake.valid_range_m.start(), *intake.valid_range_m.end());
+            let valid = |range_m: f32| range_m == 0.0 || (range_m >= least_m && range_m <= most_m);
+            health.points_invalid += range_m.iter().filter(|&&range_m| !valid(range_m)).count() as u64;
+            let range_m = range_m.iter().map(|&range_m| if valid(range_m) { range_m } else { 0.0 });
+            // To the end, and from there to where they belong: most are there already.
+            image.range_m.extend(range_m);
+            image.range_m[at * beams..].rotate_right(beams);
+            image.reflectivity.extend_from_slice(&self.columns.reflectivity[cells]);
+            image.reflectivity[at * beams..].rotate_right(beams);
         }
         health.packets_late += u64::from(late);
         health.packets_duplicate += u64::from(duplicate);

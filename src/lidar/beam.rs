@@ -57,7 +57,8 @@ impl Beam {
 }
 
 /// From the head's frame to the sensor's.
-fn turned((sin, cos): (f64, f64), v: DVec3) -> DVec3 {
+#[inline(always)]
+pub(super) fn turned((sin, cos): (f64, f64), v: DVec3) -> DVec3 {
     DVec3::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin, v.z)
 }
 

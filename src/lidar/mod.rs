@@ -6,6 +6,7 @@
 
 mod beam;
 mod scan;
+mod abreast;
 mod views;
 mod model;
 mod usable;
@@ -17,6 +18,7 @@ pub mod packet;
 mod clock;
 mod assemble;
 
+pub(crate) use abreast::{ABREAST, Abreast, Lanes};
 pub use assemble::Assembler;
 pub use beam::Beam;
 pub use model::{Model, Turn};

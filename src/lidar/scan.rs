@@ -135,6 +135,12 @@ impl Azimuths {
     pub fn of_a_turn() -> Self {
         Self { sin_cos: (0..TURN_CDEG as u32).map(azimuth_sin_cos).collect() }
     }
+
+    /// None of an azimuth that is not within the turn.
+    #[inline(always)]
+    pub(super) fn get(&self, azimuth_cdeg: u64) -> Option<(f64, f64)> {
+        self.sin_cos.get(azimuth_cdeg as usize).copied()
+    }
 }
 
 fn azimuth_sin_cos(azimuth_cdeg: u32) -> (f64, f64) {
@@ -185,12 +191,16 @@ impl RangeImage {
     #[doc(hidden)] // See `Azimuths`.
     #[inline]
     pub fn tabled_point_m(&self, azimuths: &Azimuths, c: usize, b: usize, range_m: f64) -> DVec3 {
-        let beam = &self.beams[b];
-        let head_sin_cos = match beam.whole_cdeg {
+        self.beams[b].point_m(self.head_sin_cos(azimuths, c, b), range_m)
+    }
+
+    /// Of the head's azimuth when beam `b` of column `c` fires, rounded or not.
+    #[inline]
+    pub(super) fn head_sin_cos(&self, azimuths: &Azimuths, c: usize, b: usize) -> (f64, f64) {
+        match self.beams[b].whole_cdeg {
             true => azimuths.sin_cos[self.azimuth_cdeg(c, b) as usize],
             false => self.exact_sin_cos(c, b),
-        };
-        beam.point_m(head_sin_cos, range_m)
+        }
     }
 
     /// Of the head's azimuth without rounding.
