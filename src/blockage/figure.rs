@@ -163,6 +163,7 @@ impl Figure {
         self.slices.clear();
         self.slices.extend(usual.slices.iter().map(slice));
         self.rods = usual.rods.map(|rod| Rod { radius: 0.0, ..rod });
+        // Should it turn out to be a person, nothing is known of an outline.
         self.of_height_m = 0.0;
         self.look_from_above();
     }

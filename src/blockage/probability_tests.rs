@@ -217,22 +217,34 @@ fn a_ray_meets_what_somebody_carries_beside_him() {
     assert!(p(0.0) < 0.2 && p(0.1) > 0.8, "{} {}", p(0.0), p(0.1));
 }
 
-#[test]
-fn an_umbrella_blocks_the_link_that_passes_over_its_owners_head() {
+/// Nothing in it blocks, and one access point hangs at this place.
+fn bare_hall(ap_m: [f64; 3]) -> Config {
     let mut config = Config::default();
     (config.site.pillars, config.site.furniture) = (Vec::new(), Vec::new());
     config.site.access_points.truncate(1);
-    config.site.access_points[0].position_m = [4.0, 0.0, 3.0];
+    config.site.access_points[0].position_m = ap_m;
+    config
+}
+
+fn stands(id: u64, x: f64, y: f64) -> Track {
+    Track::new(id, DVec2::new(x, y), DVec2::ZERO)
+}
+
+fn cast(config: &Config, tracks: &[Track]) -> Vec<crate::blockage::Blockage> {
+    let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
+    let mut blockages = Vec::new();
+    crate::blockage::Caster::new(&config.blockage, &config.site).cast(tracks, &forecasts, &mut blockages);
+    blockages
+}
+
+#[test]
+fn an_umbrella_blocks_the_link_that_passes_over_its_owners_head() {
+    let config = bare_hall([4.0, 0.0, 3.0]);
     let umbrella = Canopy { center_m: DVec2::ZERO, radius_m: 0.5, low_m: 1.75, top_m: 2.0 };
     let p = |canopy: Option<Canopy>| {
-        let stands = |id: u64, x: f64, y: f64| Track::new(id, DVec2::new(x, y), DVec2::ZERO);
         // The ray is 1.8 m high there, and 0.35 m beside the head.
         let tracks = [Track { canopy, ..stands(0, 1.0, 0.35) }, stands(1, -1.0, 0.0)];
-        let forecasts = tracks.each_ref().map(constant_velocity::forecast);
-        let mut blockages = Vec::new();
-        let mut caster = crate::blockage::Caster::new(&config.blockage, &config.site);
-        caster.cast(&tracks, &forecasts, &mut blockages);
-        blockages[1].p_now
+        cast(&config, &tracks)[1].p_now
     };
     assert!(p(None) < 0.05 && p(Some(umbrella)) > 0.8, "{} {}", p(None), p(Some(umbrella)));
     let high = Canopy { low_m: 2.2, top_m: 2.4, ..umbrella };
@@ -241,20 +253,12 @@ fn an_umbrella_blocks_the_link_that_passes_over_its_owners_head() {
 
 #[test]
 fn a_pram_blocks_others_but_not_its_owner_and_has_no_link() {
-    let mut config = Config::default();
-    (config.site.pillars, config.site.furniture) = (Vec::new(), Vec::new());
-    config.site.access_points.truncate(1);
-    config.site.access_points[0].position_m = [8.0, 0.0, 1.2];
-    let stands = |id: u64, x: f64, y: f64| Track::new(id, DVec2::new(x, y), DVec2::ZERO);
+    let config = bare_hall([8.0, 0.0, 1.2]);
     // Whether the links of somebody aside and of somebody behind the pram are blocked.
     let blocked = |part_of: Option<u64>| {
         let pram = Track { confirmed: false, part_of, height_m: 1.1, ..stands(2, 1.0, 0.0) };
         let tracks = [stands(0, 1.0, 3.0), stands(1, 0.0, 0.0), pram];
-        let forecasts = tracks.each_ref().map(constant_velocity::forecast);
-        let mut blockages = Vec::new();
-        let mut caster = crate::blockage::Caster::new(&config.blockage, &config.site);
-        caster.cast(&tracks, &forecasts, &mut blockages);
-        blockages.iter().map(|link| (link.track, link.p_now > 0.5)).collect::<Vec<_>>()
+        cast(&config, &tracks).iter().map(|link| (link.track, link.p_now > 0.5)).collect::<Vec<_>>()
     };
     assert_eq!(blocked(Some(0)), [(0, false), (1, true)]);
     assert_eq!(blocked(Some(1)), [(0, false), (1, false)], "its owner");

@@ -172,13 +172,14 @@ impl Measurer {
         self.is_taken.resize(points.len(), false);
         clusters.iter().flatten().for_each(|&i| self.is_taken[i as usize] = true);
         let nobodys = points.iter().zip(&self.is_taken).filter(|(_, taken)| !**taken);
-        let moved_m = nobodys.map(|(p, _)| {
+        let above_floor_m = nobodys.map(|(p, _)| (p, super::above_floor(&self.hall, p.position_m)));
+        let high = above_floor_m.filter(|(_, above_floor_m)| above_floor_m.z > OVERHEAD_M);
+        self.overhead_m.clear();
+        self.overhead_m.extend(high.map(|(p, above_floor_m)| {
             let sensor_m = self.sensors_m.get(usize::from(p.sensor)).copied().unwrap_or(p.position_m);
             let away = (p.position_m - sensor_m).truncate().normalize_or_zero();
-            (super::above_floor(&self.hall, p.position_m) + (away * SHIFT_M).extend(0.0), p.sensor)
-        });
-        self.overhead_m.clear();
-        self.overhead_m.extend(moved_m.filter(|(p, _)| p.z > OVERHEAD_M));
+            (above_floor_m + (away * SHIFT_M).extend(0.0), p.sensor)
+        }));
     }
 
     /// How high the floor is where a person's points are in the middle, and the box of the points from there.

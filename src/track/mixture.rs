@@ -220,11 +220,10 @@ impl MixtureTracker {
             match detection {
                 Some(detection) => {
                     person.matched(numbers, detection, &expected.view, visibility, time_ns, step_s);
-                    let near = |place: &&DVec2| {
-                        place.distance_squared(person.filter.position_m()) < ALONE_M * ALONE_M
-                    };
+                    let at_m = person.filter.position_m();
+                    let near = |place: &&DVec2| place.distance_squared(at_m) < ALONE_M * ALONE_M;
                     // The person is one of them.
-                    if numbers.shape && places_m.iter().filter(near).count() < 2 {
+                    if numbers.shape && places_m.iter().filter(near).nth(1).is_none() {
                         person.see_alone(detection, &expected.view);
                     }
                 }

@@ -76,6 +76,19 @@ pub(crate) fn matrix(f: &mut impl Fields, name: &str, value: &mut DMat3) {
     *value = DMat3::from_cols_array(&columns);
 }
 
+/// What may not be there: whether it is, and then its own fields, which stand there in any case.
+pub(crate) fn maybe<F: Fields, T: Default>(
+    f: &mut F,
+    name: &str,
+    value: Option<T>,
+    visit: impl FnOnce(&mut F, &mut T),
+) -> Option<T> {
+    let (mut is_there, mut value) = (value.is_some(), value.unwrap_or_default());
+    f.bool(name, &mut is_there);
+    visit(f, &mut value);
+    is_there.then_some(value)
+}
+
 /// The message's bytes.
 pub fn encode<M: Message>(message: &mut M) -> Vec<u8> {
     let mut encode = Encode(Encoder::default());

@@ -10,7 +10,7 @@ use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb, Pose};
 use umbracast::lidar::{Fan, SECTORS, View};
 use umbracast::track::{Canopy, GaitPhase, Observed, Track};
 
-use crate::fields::{Fields, Message, index, matrix, schema, vec2, vec3};
+use crate::fields::{Fields, Message, index, matrix, maybe, schema, vec2, vec3};
 use crate::messages::Schema;
 
 /// One frame of one front end.
@@ -381,11 +381,10 @@ impl Message for Prior {
         f.bool("confirmed", &mut self.confirmed);
         f.bool("is_furniture", &mut self.is_furniture);
         f.bool("walked", &mut self.walked);
-        let (mut is_known, shape) = (self.shape.is_some(), self.shape.unwrap_or_default());
-        f.bool("shape_is_known", &mut is_known);
-        let mut bands = shape.bands.map(|of| of.numbers());
-        f.f64_array("shape", bands.as_flattened_mut());
-        self.shape = is_known.then(|| Shape { bands: bands.map(Moments::of_numbers) });
+        let bands = self.shape.map(|shape| shape.bands.map(|of| of.numbers()));
+        let bands =
+            maybe(f, "shape_is_known", bands, |f, bands| f.f64_array("shape", bands.as_flattened_mut()));
+        self.shape = bands.map(|bands| Shape { bands: bands.map(Moments::of_numbers) });
     }
 }
 
@@ -431,19 +430,14 @@ impl Message for Track {
         f.f64("width_scale", &mut self.width_scale);
         f.f64("width_scale_sigma", &mut self.width_scale_sigma);
         f.f64_array("outline_m", self.outline_m.as_flattened_mut());
-        let (mut is_covered, mut canopy) =
-            (self.canopy.is_some(), self.canopy.map_or([0.0; 5], |c| c.numbers()));
-        f.bool("is_covered", &mut is_covered);
-        f.f64_array("canopy_m", &mut canopy);
-        self.canopy = is_covered.then(|| Canopy::of_numbers(canopy));
+        let canopy = self.canopy.map(|canopy| canopy.numbers());
+        let canopy = maybe(f, "is_covered", canopy, |f, numbers| f.f64_array("canopy_m", numbers));
+        self.canopy = canopy.map(Canopy::of_numbers);
         f.f64("gait_phase_rad", &mut self.gait.phase_rad);
         f.f64("gait_concentration", &mut self.gait.concentration);
         f.u32("points", &mut self.points);
         f.bool("confirmed", &mut self.confirmed);
-        let (mut is_part, mut part_of) = (self.part_of.is_some(), self.part_of.unwrap_or_default());
-        f.bool("is_part", &mut is_part);
-        f.u64("part_of", &mut part_of);
-        self.part_of = is_part.then_some(part_of);
+        self.part_of = maybe(f, "is_part", self.part_of, |f, id| f.u64("part_of", id));
         vec3(f, "aabb_min_m", &mut self.aabb.min_m);
         vec3(f, "aabb_max_m", &mut self.aabb.max_m);
         vec3(f, "obb_center_m", &mut self.obb.center_m);

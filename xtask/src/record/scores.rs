@@ -36,19 +36,13 @@ pub fn antipode(book: &mut Book) -> Result<()> {
 /// Why the paper's figures are what they are. Tuning scenes, without data.
 pub fn explain(book: &mut Book) -> Result<()> {
     let line = "cargo run --release --quiet -p umbracast-eval --example explain -- 2 record/explain.svg";
-    book.command(line);
-    let said = book.bash(&root(), line)?;
-    book.line(&said);
-    Ok(())
+    super::house::script(book, line, line)
 }
 
 /// What the program learned of ten bodies after ten seconds.
 pub fn bodies(book: &mut Book) -> Result<()> {
     let line = "cargo run --release --quiet -p umbracast-eval --example bodies -- record/bodies.svg";
-    book.command(line);
-    let said = book.bash(&root(), line)?;
-    book.line(&said);
-    Ok(())
+    super::house::script(book, line, line)
 }
 
 /// Each mechanism of the default mode off alone.

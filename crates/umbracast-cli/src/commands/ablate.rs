@@ -95,8 +95,8 @@ fn drawn(args: &Ablate) -> Result<Vec<DataSet>, Error> {
         set("height-6", low, crowd(Preset::Orca03)),
         set("lost-sensor", lost, crowd(Preset::Orca03)),
     ];
-    let carried = [Kind::Bag, Kind::Phone, Kind::Pockets, Kind::Umbrella];
-    for kind in carried.into_iter().chain([Kind::Child, Kind::Wheelchair, Kind::Pram]) {
+    use Kind::{Bag, Child, Phone, Pockets, Pram, Umbrella, Wheelchair};
+    for kind in [Bag, Phone, Pockets, Umbrella, Child, Wheelchair, Pram] {
         sets.push(set(kind.name(), Config::default(), dressed(crowd(Preset::Orca03), kind, None)?));
     }
     Ok(sets)
