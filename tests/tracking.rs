@@ -355,6 +355,23 @@ fn somebody_whom_no_sensor_sees_is_kept_for_three_seconds() {
 }
 
 #[test]
+fn detections_that_come_without_scans_are_believed_and_missed() {
+    let mut tracker = MixtureTracker::new(&Config::default().track, &open_site());
+    let mut tracks = Vec::new();
+    let mut tell = |k: u64, places_m: &[DVec2]| {
+        let views = Views { of_scans: Vec::new(), ..full_turn(k) };
+        let seen: Vec<_> = places_m.iter().map(|&place_m| detection(place_m, views.time_ns)).collect();
+        tracker.update(&views, &seen, &mut tracks);
+        tracks.clone()
+    };
+    let walker_m = |k: u64| DVec2::new(0.12 * k as f64, 0.0);
+    let told: Vec<_> = (0..10).map(|k| tell(k, &[walker_m(k), DVec2::new(3.0, 3.0)])).collect();
+    assert!(told[2..].iter().zip(2..).all(|(tracks, k)| tracks[0].position_m.distance(walker_m(k)) < 0.05));
+    // Who is found no more, while others are, is gone.
+    assert_eq!((10..20).map(|k| tell(k, &[walker_m(k)]).len()).last(), Some(1));
+}
+
+#[test]
 fn frames_repeated_or_late_change_nothing() {
     let config = Config::for_mode(Mode::Default).track;
     let mut tracker = Tracker::new(&config, &open_site());

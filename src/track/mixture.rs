@@ -159,7 +159,7 @@ impl MixtureTracker {
         let last_ns = self.time_ns.replace(time_ns).unwrap_or(time_ns);
         let step_s = seconds(last_ns, time_ns);
         in_order(detections, &mut self.memory.order);
-        self.expect(views, step_s);
+        self.expect(views, !detections.is_empty(), step_s);
         self.associate(time_ns, last_ns, detections);
         self.correct(time_ns, last_ns, detections);
         self.mark_duplicates(step_s);
@@ -169,18 +169,20 @@ impl MixtureTracker {
         self.tell(time_ns, step_s, tracks);
     }
 
-    /// Who can be seen, how well, and with what chance of a detection of one's own.
-    fn expect(&mut self, views: &Views, step_s: f64) {
+    /// Who can be seen, how well, and with what chance of a detection of one's own. Where somebody was `found` without a scan, by
+    /// somebody else's detector, nothing is known of what it sees.
+    fn expect(&mut self, views: &Views, found: bool, step_s: f64) {
         let Self { numbers, visibility, people, memory, .. } = self;
         let Memory { bodies, expected, .. } = memory;
         visibility.look(views);
+        let sight_known = numbers.visibility && !(found && views.of_scans.is_empty());
         bodies.clear();
         let body = |p: &Person| p.body(p.filter.position_after(step_s), &visibility.hall);
         bodies.extend(people.iter().map(body));
         expected.clear();
         expected.extend(bodies.iter().map(|body| {
             let view = visibility.view(body, bodies);
-            let detection_probability = match numbers.visibility {
+            let detection_probability = match sight_known {
                 true => detection_probability(DETECTION_PROBABILITY, &view),
                 false => DETECTION_PROBABILITY,
             };

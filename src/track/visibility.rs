@@ -152,7 +152,7 @@ impl Visibility {
     pub fn view(&mut self, body: &Body, others: &[Body]) -> BodyView {
         let Self { hall, pillars, furniture, eyes, between, .. } = self;
         let mut view = BodyView {
-            beams_known: eyes.iter().all(|eye| eye.fan.is_some()),
+            beams_known: !eyes.is_empty() && eyes.iter().all(|eye| eye.fan.is_some()),
             on_step: hall.has_step_about(body.position_m),
             ..BodyView::default()
         };
