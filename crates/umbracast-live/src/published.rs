@@ -106,6 +106,24 @@ impl Published {
         }
     }
 
+    /// Of memory, in a queue.
+    pub fn bytes(&self) -> usize {
+        let rows = [
+            size_of_val(&*self.detections),
+            size_of_val(&*self.tracks),
+            size_of_val(&*self.links),
+            size_of_val(&*self.losses),
+            size_of_val(&*self.bindings),
+            size_of_val(&*self.reports),
+            size_of_val(&*self.decisions),
+            size_of_val(&*self.events),
+            size_of_val(&*self.advice),
+            size_of_val(&*self.points_cm),
+            self.foreground.as_deref().map_or(0, size_of_val),
+        ];
+        size_of::<Self>() + rows.iter().sum::<usize>()
+    }
+
     /// As recordings and the topics of ROS 2 carry it.
     pub fn results(&self) -> Results<'_> {
         Results {

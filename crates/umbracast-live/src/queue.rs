@@ -1,4 +1,4 @@
-//! A queue between two threads: of bounded length, with a rule for when it is full.
+//! A queue between two threads: bounded in items and in bytes, with a rule for when it is full.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -19,12 +19,16 @@ pub struct Queue<T> {
     state: Mutex<State<T>>,
     filled: Condvar,
     capacity: usize,
+    most_bytes: usize,
+    /// Bytes of an item, the same for as long as it waits.
+    weigh: fn(&T) -> usize,
     when_full: WhenFull,
 }
 
 #[derive(Debug)]
 struct State<T> {
     items: VecDeque<T>,
+    bytes: usize,
     lost: u64,
     closed: bool,
 }
@@ -41,10 +45,15 @@ pub enum Popped<T> {
 }
 
 impl<T> Queue<T> {
-    /// An empty queue for `capacity` items.
+    /// An empty queue for `capacity` items, whatever they weigh: for few, or for such as cannot be large.
     pub fn new(capacity: usize, when_full: WhenFull) -> Self {
-        let state = State { items: VecDeque::with_capacity(capacity), lost: 0, closed: false };
-        Self { state: Mutex::new(state), filled: Condvar::new(), capacity, when_full }
+        Self::of_bytes(capacity, usize::MAX, |_| 0, when_full)
+    }
+
+    /// An empty queue for `capacity` items that have `most_bytes` together, by what `weigh` says of each.
+    pub fn of_bytes(capacity: usize, most_bytes: usize, weigh: fn(&T) -> usize, when_full: WhenFull) -> Self {
+        let state = State { items: VecDeque::with_capacity(capacity), bytes: 0, lost: 0, closed: false };
+        Self { state: Mutex::new(state), filled: Condvar::new(), capacity, most_bytes, weigh, when_full }
     }
 
     /// Adds an item; a full queue gives one up and counts it. What comes after [`Self::close`] is lost, too.
@@ -59,25 +68,36 @@ impl<T> Queue<T> {
             state.lost += 1;
             return false;
         }
-        let is_full = state.items.len() == self.capacity;
-        if is_full {
+        let bytes = (self.weigh)(&item);
+        let mut all_kept = true;
+        while state.items.len() == self.capacity || state.bytes.saturating_add(bytes) > self.most_bytes {
+            all_kept = false;
             state.lost += 1;
-            if self.when_full == WhenFull::DropNewest {
+            // For one that is larger than all may be, nobody else makes room.
+            if self.when_full == WhenFull::DropNewest || bytes > self.most_bytes {
                 return false;
             }
-            state.items.pop_front();
+            self.taken(&mut state);
         }
+        state.bytes += bytes;
         state.items.push_back(item);
         drop(state);
         self.filled.notify_one();
-        !is_full
+        all_kept
+    }
+
+    /// The item that waited longest.
+    fn taken(&self, state: &mut State<T>) -> Option<T> {
+        let item = state.items.pop_front()?;
+        state.bytes -= (self.weigh)(&item);
+        Some(item)
     }
 
     /// Waits for the next item; `None` once the queue is closed and empty.
     pub fn pop(&self) -> Option<T> {
         let mut state = self.lock();
         loop {
-            if let Some(item) = state.items.pop_front() {
+            if let Some(item) = self.taken(&mut state) {
                 return Some(item);
             }
             if state.closed {
@@ -93,7 +113,7 @@ impl<T> Queue<T> {
         if state.items.is_empty() && !state.closed {
             state = self.filled.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0;
         }
-        match state.items.pop_front() {
+        match self.taken(&mut state) {
             Some(item) => Popped::Item(item),
             None if state.closed => Popped::Closed,
             None => Popped::Nothing,
@@ -135,6 +155,29 @@ mod tests {
             let queue = filled(when_full);
             assert_eq!(queue.lost(), 2);
             assert_eq!([queue.pop(), queue.pop(), queue.pop()], [Some(kept[0]), Some(kept[1]), None]);
+        }
+    }
+
+    #[test]
+    fn large_items_fill_a_queue_that_has_room_for_more_of_them() {
+        for (when_full, kept, lost) in
+            [(WhenFull::DropNewest, vec![4, 5, 1], 3), (WhenFull::DropOldest, vec![8, 1, 1], 3)]
+        {
+            let queue = Queue::<usize>::of_bytes(9, 10, |bytes| *bytes, when_full);
+            let taken: Vec<bool> = [4, 5, 8, 11, 1, 1].map(|bytes| queue.offer(bytes)).into();
+            assert_eq!(taken, [true, true, false, false, true, when_full == WhenFull::DropOldest]);
+            assert_eq!(queue.lost(), lost, "{when_full:?}");
+            queue.close();
+            assert_eq!(std::iter::from_fn(|| queue.pop()).collect::<Vec<_>>(), kept, "{when_full:?}");
+        }
+    }
+
+    #[test]
+    fn what_was_taken_makes_room() {
+        let queue = Queue::<usize>::of_bytes(9, 10, |bytes| *bytes, WhenFull::DropNewest);
+        for _ in 0..100 {
+            assert!(queue.offer(6) && queue.offer(4) && !queue.offer(1));
+            assert_eq!((queue.pop(), queue.pop_within(Duration::ZERO)), (Some(6), Popped::Item(4)));
         }
     }
 

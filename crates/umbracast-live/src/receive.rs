@@ -44,6 +44,13 @@ pub struct Arrived {
     pub packet: Packet,
 }
 
+impl Arrived {
+    /// Of memory, in a queue.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + self.packet.payload.len()
+    }
+}
+
 /// Threads that receive until they are told to stop.
 #[derive(Debug)]
 pub struct Receivers {

@@ -18,6 +18,8 @@ use crate::receive::Arrived;
 
 /// Four seconds of two HDL-32E, 1800 packets a second each, and their results: as long as a disk may be busy.
 const WAITING: usize = 16_384;
+/// They have so many bytes at most: as long of four OS0-128.
+const WAITING_BYTES: usize = 256 << 20;
 /// After a write that failed the disk is tried again so much later.
 const RETRY_NS: i64 = 5_000_000_000;
 /// What is younger than this is lost when the program is killed.
@@ -62,6 +64,16 @@ enum Item {
     Result(Arc<Published>),
 }
 
+impl Item {
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Config(config) => size_of_val(&**config),
+            Self::Packet(arrived) => arrived.bytes(),
+            Self::Result(published) => published.bytes(),
+        }
+    }
+}
+
 /// The thread's handle. Whoever records only pushes.
 pub struct Recorder {
     queue: Arc<Queue<Item>>,
@@ -81,7 +93,7 @@ impl Recorder {
     ) -> Result<Self, Error> {
         let folder = &settings.folder;
         fs::create_dir_all(folder).map_err(|e| Error::new(e.to_string()).within(folder.display()))?;
-        let queue = Arc::new(Queue::new(WAITING, WhenFull::DropNewest));
+        let queue = Arc::new(Queue::of_bytes(WAITING, WAITING_BYTES, Item::bytes, WhenFull::DropNewest));
         let mut files = Files::new(settings, config.clone());
         let (items, shared) = (queue.clone(), status.clone());
         let thread = std::thread::spawn(move || {
@@ -124,7 +136,7 @@ impl Recorder {
             let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner);
             status.lost += 1; // Until the thread counts again, the queue's with its own.
             status.failing.get_or_insert_with(|| {
-                format!("expected a disk that keeps up, found {WAITING} packets and results that wait for it")
+                "expected a disk that keeps up, found no room for more that waits for it".to_owned()
             });
         }
     }

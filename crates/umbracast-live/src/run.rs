@@ -22,7 +22,9 @@ use crate::warnings::{Event, Warnings};
 use crate::whole::Whole;
 
 /// Packets that wait for the assembler: a second of four HDL-32E.
-const PACKETS_WAITING: usize = 8192;
+pub const PACKETS_WAITING: usize = 8192;
+/// They have so many bytes at most: two seconds of two OS0-128, whose packets are twenty times as long.
+pub const PACKETS_BYTES: usize = 64 << 20;
 /// Frames that wait for the pipeline: as many as one packet can close at once, when a sensor falls silent. Then the newest
 /// takes the place of the oldest.
 const FRAMES_WAITING: usize = 3;
@@ -152,7 +154,8 @@ impl Live {
         let points = record.as_ref().is_some_and(|record| record.points);
         let start = |record| Recorder::start(record, &config, counters.recorder.clone());
         let recorder = record.map(start).transpose()?.map(Arc::new);
-        let packets = Arc::new(Queue::new(PACKETS_WAITING, WhenFull::DropNewest));
+        let packets = Queue::of_bytes(PACKETS_WAITING, PACKETS_BYTES, Arrived::bytes, WhenFull::DropNewest);
+        let packets = Arc::new(packets);
         let frames = Arc::new(Queue::new(FRAMES_WAITING, WhenFull::DropOldest));
         let receivers = Receivers::start(&doors, clock, &packets)?;
         let assembling = {

@@ -11,6 +11,7 @@ use umbracast_io::nodes::{Foreground, Priors};
 use umbracast_io::point_cloud::PointCloud;
 use umbracast_live::queue::{Queue, WhenFull};
 use umbracast_live::receive::{Arrived, Receivers};
+use umbracast_live::run::{PACKETS_BYTES, PACKETS_WAITING};
 
 use super::{Node, Source, lock};
 use crate::front::{Expected, Front, takes_clouds};
@@ -18,8 +19,6 @@ use crate::hall::{Hall, Urgency};
 use crate::role::Role;
 use crate::{ros2, share};
 
-/// Packets that wait for the front end: a second of four HDL-32E.
-const PACKETS_WAITING: usize = 8192;
 /// Clouds that wait for it: the newest are worth most.
 const CLOUDS_WAITING: usize = 3;
 /// How often those are looked for whom a replay waits for.
@@ -94,7 +93,8 @@ impl Node {
             }));
             return Ok(());
         }
-        let packets = Arc::new(Queue::new(PACKETS_WAITING, WhenFull::DropNewest));
+        let packets = Queue::of_bytes(PACKETS_WAITING, PACKETS_BYTES, Arrived::bytes, WhenFull::DropNewest);
+        let packets = Arc::new(packets);
         let (queue, recorder) = (packets.clone(), self.recorder.clone());
         self.front = Some(std::thread::spawn(move || {
             while let Some(arrived) = queue.pop() {
