@@ -69,12 +69,6 @@ pub fn instructions(book: &mut Book) -> Result<()> {
     Ok(())
 }
 
-/// A day of people before simulated sensors, as fast as it goes.
-pub fn soak(book: &mut Book) -> Result<()> {
-    let soak = "cargo run --release --quiet --manifest-path bench/Cargo.toml --bin soak -- 24";
-    script(book, soak, soak)
-}
-
 /// The same seed twice, on one thread and on two.
 pub fn same_bytes(book: &mut Book) -> Result<()> {
     let of_threads = [("one", "1"), ("two", "2")];

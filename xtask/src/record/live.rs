@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use super::book::{Book, spoken};
 use super::house::script;
-use crate::tools::{Result, argument, files_below};
+use crate::tools::{Result, argument, files_below, root};
 
 /// How long the sensors of [`live`] send.
 const SECONDS: u64 = 600;
@@ -26,6 +26,16 @@ const PAGE: &str = "127.0.0.1:8600";
 pub fn faults(book: &mut Book) -> Result<()> {
     let faults = "cargo run --release --quiet --package umbracast-live --features serve --example faults";
     script(book, faults, faults)
+}
+
+/// A day of people through the stages and some hours of it through the whole program. Fails where the program says that something is
+/// not at the end as it was at the beginning.
+pub fn soak(book: &mut Book) -> Result<()> {
+    let soak = "cargo run --release --quiet --package umbracast-node --example soak";
+    book.command(soak);
+    let said = book.bash(&root(), soak)?;
+    book.line(&said);
+    if said.lines().any(|line| line == "Every condition is kept.") { Ok(()) } else { Err(said) }
 }
 
 /// Ten minutes of simulated sensors over loopback, recorded, the page open: what was lost, how late warnings came, and
