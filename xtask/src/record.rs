@@ -82,7 +82,7 @@ const JOBS: [Job; 55] = [
     job("growth", "how long a step takes with more people and access points", 5, Needs::Nothing, house::growth),
     job("peers", "the same work by other programs", 15, Needs::Asking, house::peers),
     job("instructions", "how many instructions a frame takes", 10, Needs::Program("valgrind"), house::instructions),
-    job("soak", "a day of people, as fast as it goes, and hours live: memory, time, numbers", 45, Needs::Asking, live::soak),
+    job("soak", "a day of people, as fast as it goes, and an hour live: memory, time, numbers", 35, Needs::Asking, live::soak),
     job("living", "furniture put in, people who stand, no empty scan", 15, Needs::Nothing, living::living),
     job("objects", "objects put in after the empty scan: who is invented, for how long", 6, Needs::Nothing, objects::objects),
     job("standing", "people who stand or sit from the first frame on", 25, Needs::Nothing, standing::standing),

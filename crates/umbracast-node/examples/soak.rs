@@ -3,7 +3,7 @@
 //! and in reverse. Ends with an error where something is not at the end as it was at the beginning.
 //!
 //! ```sh
-//! cargo run --release --package umbracast-node --example soak                # all of it: about three quarters of an hour
+//! cargo run --release --package umbracast-node --example soak                # all of it: about half an hour
 //! cargo run --release --package umbracast-node --example soak -- 2 0.5       # two hours of stages, half an hour live
 //! ```
 //!
@@ -12,7 +12,7 @@
 //! noise, bodies and ways repeat; what is laid over them and what follows what does not.
 //!
 //! It has three parts, each a process of its own, so that the memory of one is not that of another. `legs` simulates. `day` has
-//! a day go through assembler and stages as fast as they take it. `live` has some hours go through the whole program: packets
+//! a day go through assembler and stages as fast as they take it. `live` has an hour go through the whole program: packets
 //! over UDP, recorder, page and a client of it, MQTT and a broker. Its clock runs [`live::RATE`] times as fast as the host's,
 //! so it bears what a host would that is so much slower, with queues that hold so much less time.
 
@@ -48,7 +48,7 @@ use verdict::Verdict;
 
 /// Hours of each part.
 const DAY_H: f64 = 24.0;
-const LIVE_H: f64 = 2.5;
+const LIVE_H: f64 = 1.0;
 
 fn main() -> Result<(), Error> {
     let words: Vec<String> = std::env::args().skip(1).collect();

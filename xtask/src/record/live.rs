@@ -28,7 +28,7 @@ pub fn faults(book: &mut Book) -> Result<()> {
     script(book, faults, faults)
 }
 
-/// A day of people through the stages and some hours of it through the whole program. Fails where the program says that something is
+/// A day of people through the stages and an hour of it through the whole program. Fails where the program says that something is
 /// not at the end as it was at the beginning.
 pub fn soak(book: &mut Book) -> Result<()> {
     let soak = "cargo run --release --quiet --package umbracast-node --example soak";
