@@ -17,10 +17,10 @@ pub(crate) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// A bit for each number that is not negative.
+/// A bit for each number that is not negative, of up to a word of them in whole fours.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-pub(crate) fn bits_of(numbers: &[f32; WORD]) -> u32 {
+pub(crate) fn bits_of<const N: usize>(numbers: &[f32; N]) -> u32 {
     use std::arch::x86_64::{_mm_cmpge_ps, _mm_movemask_ps, _mm_setr_ps, _mm_setzero_ps};
     // The instruction that does this is none that the compiler finds.
     let (fours, _) = numbers.as_chunks::<4>();
@@ -31,10 +31,10 @@ pub(crate) fn bits_of(numbers: &[f32; WORD]) -> u32 {
     })
 }
 
-/// A bit for each number that is not negative.
+/// A bit for each number that is not negative, of up to a word of them in whole fours.
 #[cfg(not(target_arch = "x86_64"))]
 #[inline(always)]
-pub(crate) fn bits_of(numbers: &[f32; WORD]) -> u32 {
+pub(crate) fn bits_of<const N: usize>(numbers: &[f32; N]) -> u32 {
     numbers.iter().enumerate().fold(0, |bits, (k, number)| bits | u32::from(*number >= 0.0) << k)
 }
 

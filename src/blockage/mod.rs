@@ -16,6 +16,7 @@ pub mod numbers;
 pub(crate) mod spread;
 mod figure;
 pub(crate) mod trajectories;
+mod glance;
 mod shadows;
 mod rays;
 mod crossing;

@@ -122,7 +122,7 @@ impl Sampler {
             present: 0,
             links_of: 0,
             samples: numbers.samples,
-            shadows: Shadows::default(),
+            shadows: Shadows::with_room(MEETINGS),
             seen_from: None,
             meetings: std::array::from_fn(|_| Vec::with_capacity(MEETINGS)),
             asked: 0,
@@ -161,9 +161,7 @@ impl Sampler {
         self.draws.retain(|&id, _| people.clone().any(|(track, _)| track.id == id));
         // Where there is more to ask than time allows, samples are left out, for all links alike; what is left is a sample of
         // the same distribution, for draws are in no order. A frame has about as much to ask as the one before.
-        let tests = TESTS_MAX.saturating_sub(TESTS_PER_PERSON * self.present);
-        let affordable = (tests / self.asked.max(1)).max(SAMPLES_MIN) / WORD * WORD;
-        self.samples = numbers.samples.min(affordable);
+        self.samples = numbers.samples.min(affordable(self.present, self.asked));
         (self.present, self.asked, self.seen_from, self.kept_links) = (0, 0, None, 0);
         for (track, forecast) in people {
             if self.people.len() == self.present {
@@ -212,8 +210,8 @@ impl Sampler {
             self.shadows.fall(ap_m, ue, people);
             self.seen_from = Some(ap);
         }
-        self.shadows.meet(&self.figure, people, person, &mut self.meetings);
-        self.asked += self.meetings.iter().map(Vec::len).sum::<usize>();
+        self.shadows.turn_to(people, person);
+        self.meetings.iter_mut().for_each(Vec::clear);
         let samples = self.samples;
         let words = samples.div_ceil(WORD);
         self.link.begin(samples);
@@ -232,6 +230,7 @@ impl Sampler {
                 break;
             }
         }
+        self.count_unasked();
         let [own, hall, any] = self.ask_causes(ap, aim, words);
         let chances = Chances { own, hall, any, ..counts.chances(samples as f64) };
         if self.keeps {
@@ -311,19 +310,47 @@ impl Sampler {
     fn take_step(&mut self, aim: Aim, step: usize, words: Range<usize>, counts: &mut Counts) {
         self.link.blocked[words.clone()].fill(0);
         let blocked_now = counts.blocked_now;
-        if !self.meetings[step].is_empty() && self.link.is_open(words.clone(), step, blocked_now) {
-            if !aim.ue.is_on_axis() {
-                self.people[aim.person].walk(&self.figure, &self.draws);
-            }
-            self.rays.aim(aim.ap_m, aim.ue, &self.people[aim.person], step, words.clone());
-            for m in 0..self.meetings[step].len() {
-                self.mark(m, step, words.clone(), blocked_now);
-                if !self.link.is_open(words.clone(), step, blocked_now) {
-                    break;
+        let mut met = 0;
+        while self.link.is_open(words.clone(), step, blocked_now) && self.finds(met, step) {
+            if met == 0 {
+                if !aim.ue.is_on_axis() {
+                    self.people[aim.person].walk(&self.figure, &self.draws);
                 }
+                self.rays.aim(aim.ap_m, aim.ue, &self.people[aim.person], step, words.clone());
             }
+            self.mark(met, step, words.clone(), blocked_now);
+            met += 1;
         }
         self.link.count(step, self.samples, words, counts);
+    }
+
+    /// Whether there is a meeting of that number at a step: those before are known, and it is looked for now if it is not.
+    #[inline(always)]
+    fn finds(&mut self, meeting: usize, step: usize) -> bool {
+        if meeting < self.meetings[step].len() {
+            return true;
+        }
+        if meeting == 0 {
+            self.shadows.line_up(step);
+        }
+        let found = self.shadows.next(&self.figure, &self.people[..self.present], step);
+        self.meetings[step].extend(found);
+        self.asked += usize::from(found.is_some());
+        found.is_some()
+    }
+
+    /// Counts the meetings of a link that nobody had to look for, where the samples of the next frame depend on it: where they are the
+    /// fewest already, more meetings change nothing.
+    #[inline(always)]
+    fn count_unasked(&mut self) {
+        let people = &self.people[..self.present];
+        for step in 0..MOMENTS {
+            while affordable(self.present, self.asked) > SAMPLES_MIN
+                && self.shadows.next(&self.figure, people, step).is_some()
+            {
+                self.asked += 1;
+            }
+        }
     }
 
     /// Notes in which samples a meeting blocks the link, where that matters still.
@@ -365,6 +392,12 @@ pub(crate) fn chances_of<'a>(lost: impl Fn(usize) -> &'a [u32], samples: usize, 
         }
     }
     counts.chances(samples as f64)
+}
+
+/// How many samples there is time for, in whole words: with so many people, and so many meetings of all their links.
+fn affordable(people: usize, meetings: usize) -> usize {
+    let tests = TESTS_MAX.saturating_sub(TESTS_PER_PERSON * people);
+    (tests / meetings.max(1)).max(SAMPLES_MIN) / WORD * WORD
 }
 
 /// What the samples weigh whose bits are set.

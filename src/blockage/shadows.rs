@@ -1,12 +1,13 @@
 //! Finds which people can come between an access point and another person, before any sample is looked at.
 //!
 //! Seen from the access point, each person covers some sectors of a turn within the next second: as a body that hides
-//! others, and as an owner whose link may be hidden. Only pairs that share a sector are compared, first over the
-//! whole second, then step by step. In doubt a pair is kept, so no blockage is lost.
+//! others, and as an owner whose link may be hidden. Only pairs that share a sector are compared: at a first
+//! glance all steps at once, then step by step while somebody asks. In doubt a pair is kept, so no blockage is lost.
 
 use std::f64::consts::{PI, TAU};
 
 use super::figure::{Band, Figure};
+use super::glance::{Look, Way};
 use super::sectors::{Covered, Sectors};
 use super::spread::{Between, Spread};
 use super::trajectories::{Disc, MOMENTS, Trajectories};
@@ -32,11 +33,9 @@ pub(super) struct Meeting {
     pub(super) plan: u32,
     /// and how far from the body's position that reaches.
     pub(super) reach_m: f32,
-    /// How far the middle of the body's samples is from the middle ray.
-    off_m: f32,
 }
 
-/// Shadows of everybody's bodies, seen from one access point.
+/// Shadows of everybody's bodies, seen from one access point, and who of them may stand in the way of one link.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Shadows {
     ap_m: DVec3,
@@ -47,8 +46,15 @@ pub(super) struct Shadows {
     /// Sectors that each person's body covers.
     covered: Vec<Covered>,
     bodies: Sectors<SECTORS>,
+    looks: Vec<Look>,
     /// The last link that a body was compared with.
     compared: Vec<u32>,
+    /// Whose link, and its rays by step.
+    person: usize,
+    bundles: [Bundle; MOMENTS],
+    rises_m: [[f64; 2]; MOMENTS],
+    /// By step: whom a first glance has kept and nobody has looked at more closely, as [`rank`]s.
+    waiting: [Vec<u64>; MOMENTS],
 }
 
 /// The sectors in which something within `disc` is seen.
@@ -67,6 +73,11 @@ fn covered(disc: Disc, ap_m: DVec2) -> Covered {
 }
 
 impl Shadows {
+    /// Of nobody yet, with room for so many who wait at a step.
+    pub(super) fn with_room(waiting: usize) -> Self {
+        Self { waiting: std::array::from_fn(|_| Vec::with_capacity(waiting)), ..Self::default() }
+    }
+
     /// Looks at everybody from an access point.
     pub(super) fn fall(&mut self, ap_m: DVec3, ue: &Ue, people: &[Trajectories]) {
         self.ap_m = ap_m;
@@ -75,82 +86,93 @@ impl Shadows {
         self.covered.clear();
         self.covered.extend(people.iter().map(|p| covered(wider(p.second, p.reach_m), ap_m.truncate())));
         self.bodies.sort(&self.covered);
+        self.looks.clear();
+        self.looks.extend(people.iter().map(|p| Look::of(p, ap_m)));
         self.compared.clear();
         self.compared.resize(people.len(), u32::MAX);
     }
 
-    /// Everybody who may stand in the way of a person's link, by step.
+    /// Turns to a person's link: whoever may stand in its way waits to be looked at more closely.
     #[inline(always)]
-    pub(super) fn meet(
-        &mut self,
-        figure: &Figure,
-        people: &[Trajectories],
-        person: usize,
-        meetings: &mut [Vec<Meeting>; MOMENTS],
-    ) {
-        meetings.iter_mut().for_each(Vec::clear);
+    pub(super) fn turn_to(&mut self, people: &[Trajectories], person: usize) {
+        self.waiting.iter_mut().for_each(Vec::clear);
+        self.person = person;
         let q = &people[person];
-        let rises_m = |floors_m: [f64; 2]| {
+        let mut way = Way::default();
+        for step in 0..MOMENTS {
+            let bundle = Bundle::of_step(self.ap_m, q, step, self.ue_reach_m);
             let off_m = [-self.ue_rises_m, self.ue_rises_m];
-            [0, 1].map(|i| self.ue_height_share * q.heights_m[i] + floors_m[i] + off_m[i] - self.ap_m.z)
-        };
-        let rises_of_second_m = rises_m(q.floors_m);
-        let second = Bundle::of_second(self.ap_m, q, self.ue_reach_m);
-        let of_steps: [_; MOMENTS] = std::array::from_fn(|step| {
-            (Bundle::of_step(self.ap_m, q, step, self.ue_reach_m), rises_m([q.floor_m[step]; 2]))
-        });
+            let floor_m = q.floor_m[step] - self.ap_m.z;
+            let rises_m = [0, 1].map(|i| self.ue_height_share * q.heights_m[i] + floor_m + off_m[i]);
+            bundle.lay(&mut way, step, rises_m[0]);
+            (self.bundles[step], self.rises_m[step]) = (bundle, rises_m);
+        }
         let towards = covered(wider(q.second, self.ue_reach_m), self.ap_m.truncate());
         for &other in towards.each::<SECTORS>().flat_map(|sector| self.bodies.people(sector)) {
-            let p = &people[other as usize];
             if std::mem::replace(&mut self.compared[other as usize], person as u32) == person as u32
                 || other as usize == person
-                || p.part_of == Some(q.track)
+                || people[other as usize].part_of == Some(q.track)
             {
                 continue;
             }
-            // Whom all rays of the second pass above is in nobody's way at any step.
-            let share = second.share(&second.seen(p.second.center_m), p.reach_m, [p.second.radius_m; 4]);
-            if share.and_then(|share| self.band(rises_of_second_m, share, p, p.floors_m)).is_none() {
-                continue;
-            }
-            let own = p.own_figure(figure);
-            // Whoever is aside at a step is so at the next, mostly: the processor guesses that.
-            for (step, (bundle, rises_m)) in of_steps.iter().enumerate() {
-                let (seen, spread) = (bundle.seen(p.mean_m[step]), &p.spread[step]);
-                if bundle.is_aside(&seen, p.reach_m + spread.radius_m) {
-                    continue;
-                }
-                let spreads_m = bundle.spreads_m(spread);
-                let floors_m = [p.floor_m[step]; 2];
-                let Some(share) = bundle.share(&seen, p.reach_m, spreads_m) else { continue };
-                let Some(band) = self.band(*rises_m, share, p, floors_m) else { continue };
-                // What is within those heights does not reach as far, so they are fewer still.
-                let reach_m = p.reach_of_m[own.plan_of(band)];
-                let Some(share) = bundle.share(&seen, reach_m, spreads_m) else { continue };
-                let Some(band) = self.band(*rises_m, share, p, floors_m) else { continue };
-                let off_m = seen.off_m.abs() as f32;
-                let (plan, reach_m) = (own.plan_of(band) as u32, (reach_m + ROOM) as f32);
-                let holds = own.holds(band);
-                meetings[step].push(Meeting { other, step: step as u32, band, holds, plan, reach_m, off_m });
+            let near = way.near(&self.looks[other as usize]);
+            let mut steps = near.steps;
+            while steps != 0 {
+                let step = steps.trailing_zeros() as usize % MOMENTS.next_power_of_two();
+                steps &= steps - 1;
+                self.waiting[step].push(rank(near.off_m[step], other));
             }
         }
-        // Who stands nearest to the line blocks most, and what is blocked is not asked again.
-        meetings.iter_mut().for_each(|of_step| of_step.sort_unstable_by_key(Meeting::rank));
+    }
+
+    /// Lets those who wait at a step come forward in order: who stands nearest to the line blocks most, and what is blocked is not
+    /// asked again.
+    #[inline(always)]
+    pub(super) fn line_up(&mut self, step: usize) {
+        self.waiting[step].sort_unstable_by(|a, b| b.cmp(a));
+    }
+
+    /// The next of those who wait at a step and may stand in the way indeed.
+    #[inline(always)]
+    pub(super) fn next(&mut self, figure: &Figure, people: &[Trajectories], step: usize) -> Option<Meeting> {
+        while let Some(rank) = self.waiting[step].pop() {
+            let meeting = self.meeting(figure, people, rank as u32, step);
+            if meeting.is_some() {
+                return meeting;
+            }
+        }
+        None
+    }
+
+    #[inline(always)]
+    fn meeting(&self, figure: &Figure, people: &[Trajectories], other: u32, step: usize) -> Option<Meeting> {
+        let (p, bundle, rises_m) = (&people[other as usize], &self.bundles[step], self.rises_m[step]);
+        let own = p.own_figure(figure);
+        let seen = bundle.seen(p.mean_m[step]);
+        let spreads_m = bundle.spreads_m(&p.spread[step]);
+        let floor_m = p.floor_m[step];
+        let share = bundle.share(&seen, p.reach_m, spreads_m)?;
+        let band = self.band(rises_m, share, p, floor_m)?;
+        // What is within those heights does not reach as far, so they are fewer still.
+        let reach_m = p.reach_of_m[own.plan_of(band)];
+        let share = bundle.share(&seen, reach_m, spreads_m)?;
+        let band = self.band(rises_m, share, p, floor_m)?;
+        let (plan, reach_m) = (own.plan_of(band) as u32, (reach_m + ROOM) as f32);
+        Some(Meeting { other, step: step as u32, band, holds: own.holds(band), plan, reach_m })
     }
 
     /// The heights at which rays may meet the body of `p` between two shares of their length; `None` where they pass above
-    /// it. `rises_m` are the least and the most of the rays over their whole length, `floors_m` the same of the floor that
-    /// the body stands on.
+    /// it. `rises_m` are the least and the most of the rays over their whole length; the body stands on `floor_m`.
     #[inline(always)]
     fn band(
         &self,
         [least_m, most_m]: [f64; 2],
         (near, far): (f64, f64),
         p: &Trajectories,
-        floors_m: [f64; 2],
+        floor_m: f64,
     ) -> Option<Band> {
-        let low_m = self.ap_m.z + least_m * if least_m < 0.0 { far } else { near } - floors_m[1];
-        let high_m = self.ap_m.z + most_m * if most_m > 0.0 { far } else { near } - floors_m[0];
+        let low_m = self.ap_m.z + least_m * if least_m < 0.0 { far } else { near } - floor_m;
+        let high_m = self.ap_m.z + most_m * if most_m > 0.0 { far } else { near } - floor_m;
         let [per_short, per_tall] = p.per_height;
         let low = low_m * if low_m > 0.0 { per_tall } else { per_short } - ROOM;
         let high = high_m * if high_m > 0.0 { per_short } else { per_tall } + ROOM;
@@ -168,19 +190,19 @@ impl Meeting {
             holds: false,
             plan: 0,
             reach_m: 0.0,
-            off_m: 0.0,
         }
-    }
-
-    /// Nearest to the middle ray first, then in order of people: distances are not negative, so their bits are in order.
-    #[inline(always)]
-    fn rank(&self) -> u64 {
-        u64::from(self.off_m.to_bits()) << 32 | u64::from(self.other)
     }
 }
 
+/// Nearest to the middle ray first, then in order of people: distances are not negative, so their bits are in order.
+#[inline(always)]
+fn rank(off_m: f32, other: u32) -> u64 {
+    u64::from(off_m.to_bits()) << 32 | u64::from(other)
+}
+
 /// All rays from an access point to the samples of a person, in plan view.
-struct Bundle {
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Bundle {
     start_m: DVec2,
     /// The unit vector along their middle, and how long that is.
     along: DVec2,
@@ -200,10 +222,6 @@ struct Seen {
 }
 
 impl Bundle {
-    fn of_second(ap_m: DVec3, q: &Trajectories, ue_reach_m: f64) -> Self {
-        Self::new(ap_m, q.second.center_m, |_| [q.second.radius_m + ue_reach_m; 2])
-    }
-
     #[inline(always)]
     fn of_step(ap_m: DVec3, q: &Trajectories, step: usize, ue_reach_m: f64) -> Self {
         Self::new(ap_m, q.mean_m[step], |side| q.spread[step].both_ways_m(side).map(|m| m + ue_reach_m))
@@ -233,11 +251,12 @@ impl Bundle {
         [fore, back, left, right]
     }
 
-    /// True where no ray can come as near as this.
+    /// The rays for a first glance, of which the first rises least.
     #[inline(always)]
-    fn is_aside(&self, seen: &Seen, reach_m: f64) -> bool {
-        let [_, _, left, right] = self.ends_m;
-        seen.off_m.abs() > reach_m + ROOM + left.max(right)
+    fn lay(&self, way: &mut Way, step: usize, rise_m: f64) {
+        let [fore, back, left, right] = self.ends_m;
+        let lengths_m = [self.length_m - back, self.length_m + fore];
+        way.set(step, self.along.to_array(), lengths_m, [left, right], rise_m);
     }
 
     /// Between which shares of their length rays may meet what reaches so far round samples that spread so far to each side;

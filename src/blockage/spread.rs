@@ -18,7 +18,7 @@ const ROUNDED_M: f64 = 1e-6;
 const COS_SIXTEENTH: f64 = 0.923_879_532_511_286_7;
 
 /// A unit vector put together from the two of the eight directions beside it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Between {
     straight: usize,
     diagonal: usize,
