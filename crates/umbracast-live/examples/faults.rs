@@ -33,6 +33,8 @@ mod promise;
 mod refused;
 #[path = "faults/rows.rs"]
 mod rows;
+#[path = "faults/stream.rs"]
+mod stream;
 
 use clients::Clients;
 use disk::{Disk, Folder};

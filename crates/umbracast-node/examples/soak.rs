@@ -39,6 +39,8 @@ mod page;
 mod play;
 #[path = "soak/recorded.rs"]
 mod recorded;
+#[path = "../../umbracast-live/examples/faults/stream.rs"]
+mod stream;
 #[path = "soak/tally.rs"]
 mod tally;
 #[path = "soak/verdict.rs"]

@@ -13,6 +13,7 @@ use umbracast::Error;
 use umbracast_live::HostClock;
 
 use super::hall::FAILS_NS;
+use super::stream::{Messages, upgrade};
 
 /// Clients of one kind at once; a process may have some thousand files open.
 const SLOW: usize = 48;
@@ -83,45 +84,19 @@ pub fn look(
         let failed = |e: std::io::Error| Error::new(e.to_string()).within("who looks at the page");
         let mut stream = ask(at, LOOPBACK, &upgrade("/api/live")).map_err(failed)?;
         stream.set_read_timeout(Some(Duration::from_millis(100))).map_err(failed)?;
-        let (mut bytes, mut part) = (Vec::new(), vec![0; 1 << 16]);
-        let (mut is_open, mut times_ns) = (false, Vec::new());
+        let (mut messages, mut part, mut times_ns) = (Messages::default(), vec![0; 1 << 16], Vec::new());
         while !ended.load(Ordering::Relaxed) {
             match stream.read(&mut part) {
                 Ok(0) => return Err(Error::new("the page was closed to who looks at it as one should")),
-                Ok(read) => bytes.extend_from_slice(&part[..read]),
+                Ok(read) => messages.take(&part[..read], |_| times_ns.push(clock.now_ns() - begun_ns)),
                 Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
                 Err(e) => return Err(failed(e)),
-            }
-            if !is_open && let Some(end) = bytes.windows(4).position(|four| four == b"\r\n\r\n") {
-                bytes.drain(..end + 4);
-                is_open = true;
-            }
-            while is_open && let Some(length) = message_bytes(&bytes) {
-                bytes.drain(..length);
-                times_ns.push(clock.now_ns() - begun_ns);
             }
         }
         times_ns.retain(|time_ns| FAILS_NS.contains(time_ns));
         let gap_ns = times_ns.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(i64::MAX);
         Ok(Page { frames: times_ns.len(), gap_ns, others: 0 })
     })
-}
-
-/// Length of the WebSocket message that the bytes begin with, once it is there: a server's are not masked.
-fn message_bytes(bytes: &[u8]) -> Option<usize> {
-    let (head, length) = match *bytes.get(1)? {
-        126 => (4, usize::from(u16::from_be_bytes(bytes.get(2..4)?.try_into().ok()?))),
-        127 => (10, u64::from_be_bytes(bytes.get(2..10)?.try_into().ok()?) as usize),
-        short => (2, usize::from(short)),
-    };
-    (bytes.len() >= head + length).then_some(head + length)
-}
-
-fn upgrade(path: &str) -> String {
-    format!(
-        "GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
-         Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-    )
 }
 
 /// A connection from this address, on which something was said.

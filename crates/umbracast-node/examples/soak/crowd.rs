@@ -10,10 +10,10 @@ use umbracast_sim::crowd::{Crowd, Trajectory};
 use umbracast_sim::random::stream;
 
 use super::halls::{Hall, SEATS_DOOR_M};
+use super::play::S_NS;
 
 const STEP_S: f32 = 0.01;
 const STEP_NS: i64 = 10_000_000;
-const S_NS: i64 = 1_000_000_000;
 /// So many walk at once, beside those who sit.
 const WALKING: usize = 22;
 /// Somebody comes this often where somebody is missing, but nobody after the second time.

@@ -7,10 +7,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use super::stream::{Messages, upgrade};
+
 const WAKE: Duration = Duration::from_millis(50);
 /// What the page asks of the stream, and what a program that watches asks.
-const STREAM: &str = "GET /api/live HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
-                      Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+const STREAM: &str = "/api/live";
 const COUNTERS: &str = "GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n";
 /// Frames between two looks at the counters.
 const LOOKS_EVERY: u64 = 100;
@@ -24,6 +25,18 @@ pub struct Saw {
     /// Looks at the counters, and those that were answered.
     pub looks: AtomicU64,
     pub answers: AtomicU64,
+}
+
+impl Saw {
+    /// Counts a message of the stream, and asks for the counters after so many.
+    fn message(&self, bytes: usize, at: SocketAddr) {
+        self.bytes.fetch_add(bytes as u64, Ordering::Relaxed);
+        if self.frames.fetch_add(1, Ordering::Relaxed).is_multiple_of(LOOKS_EVERY) {
+            self.looks.fetch_add(1, Ordering::Relaxed);
+            let is_answered = counters(at).is_ok_and(|is_there| is_there);
+            self.answers.fetch_add(u64::from(is_answered), Ordering::Relaxed);
+        }
+    }
 }
 
 /// Its thread.
@@ -58,41 +71,18 @@ impl Client {
 fn look(at: SocketAddr, saw: &Saw, stop: &AtomicBool) -> std::io::Result<()> {
     let mut stream = TcpStream::connect(at)?;
     saw.connections.fetch_add(1, Ordering::Relaxed);
-    stream.write_all(STREAM.as_bytes())?;
+    stream.write_all(upgrade(STREAM).as_bytes())?;
     stream.set_read_timeout(Some(WAKE))?;
-    let (mut bytes, mut part, mut is_open) = (Vec::new(), vec![0; 1 << 16], false);
+    let (mut messages, mut part) = (Messages::default(), vec![0; 1 << 16]);
     while !stop.load(Ordering::Relaxed) {
         match stream.read(&mut part) {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
-            Ok(read) => bytes.extend_from_slice(&part[..read]),
+            Ok(read) => messages.take(&part[..read], |bytes| saw.message(bytes, at)),
             Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
             Err(e) => return Err(e),
         }
-        if !is_open && let Some(end) = bytes.windows(4).position(|four| four == b"\r\n\r\n") {
-            bytes.drain(..end + 4);
-            is_open = true;
-        }
-        while is_open && let Some(length) = message_bytes(&bytes) {
-            bytes.drain(..length);
-            saw.bytes.fetch_add(length as u64, Ordering::Relaxed);
-            if saw.frames.fetch_add(1, Ordering::Relaxed).is_multiple_of(LOOKS_EVERY) {
-                saw.looks.fetch_add(1, Ordering::Relaxed);
-                saw.answers
-                    .fetch_add(u64::from(counters(at).is_ok_and(|is_there| is_there)), Ordering::Relaxed);
-            }
-        }
     }
     Ok(())
-}
-
-/// Length of the WebSocket message that the bytes begin with, once it is there: a server's are not masked.
-fn message_bytes(bytes: &[u8]) -> Option<usize> {
-    let (head, length) = match *bytes.get(1)? {
-        126 => (4, usize::from(u16::from_be_bytes(bytes.get(2..4)?.try_into().ok()?))),
-        127 => (10, u64::from_be_bytes(bytes.get(2..10)?.try_into().ok()?) as usize),
-        short => (2, usize::from(short)),
-    };
-    (bytes.len() >= head + length).then_some(head + length)
 }
 
 fn counters(at: SocketAddr) -> std::io::Result<bool> {
