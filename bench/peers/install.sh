@@ -23,6 +23,23 @@ debian_packages() {
     "${as_root[@]}" apt-get install -y --no-install-recommends "${packages[@]}" || without "packages of Debian: ${packages[*]}"
 }
 
+# Sionna RT compiles its kernels with Debian's LLVM, the newest, for version 15 cannot compile all of them.
+llvm() {
+    local newest as_root=()
+    newest="$(apt-cache search --names-only '^libllvm[0-9]+$' | cut -d' ' -f1 | sort -V | tail -n 1)" || newest=""
+    if [ -z "$newest" ]; then
+        without "an LLVM library for sionna-rt"
+        return
+    fi
+    if dpkg -s "$newest" >/dev/null 2>&1; then
+        return
+    fi
+    if [ "$(id -u)" -ne 0 ]; then
+        as_root=(sudo)
+    fi
+    "${as_root[@]}" apt-get install -y --no-install-recommends "$newest" || without "$newest for sionna-rt"
+}
+
 # NAME.cpp with these flags becomes a program; templates are built here, for this machine, and not taken from a library that
 # was built for every machine.
 compile() {
@@ -56,6 +73,7 @@ python_peers() {
 
 mkdir -p "$built"
 debian_packages
+llvm
 compiled_peers
 python_peers
 echo "all is there but: ${missing[*]:-nothing}"

@@ -66,7 +66,14 @@ ROWS = [
             ("rosbags + velodyne-decoder", ["{python}", "{here}/reading_velodyne.py", "{folder}"]),
         ],
     ),
-    ("loss", [("NumPy + SciPy", ["{python}", "{here}/loss_scipy.py", "{folder}"])]),
+    (
+        "loss",
+        [
+            ("NumPy + SciPy", ["{python}", "{here}/loss_scipy.py", "{folder}"]),
+            ("Sionna RT", ["{python}", "{here}/loss_sionna.py", "{folder}"]),
+        ],
+    ),
+    ("paths", [("Sionna RT", ["{python}", "{here}/paths_sionna.py", "{folder}"])]),
 ]
 
 # The ratios that were aimed at when these rows were chosen: by row, else by row and peer, or by row and case for its
@@ -88,6 +95,7 @@ WANTED = {
     ("orca", "10000 people"): 2,
     "reading": 20,
     "loss": 100,
+    "paths": 10,
 }
 
 
@@ -95,7 +103,7 @@ def machine():
     """The processor, and the versions of what is compared."""
     with open("/proc/cpuinfo") as about:
         model = next((line.split(":")[1].strip() for line in about if line.startswith("model name")), "unknown")
-    debian = ["dpkg-query", "--show", "--showformat", "${Package} ${Version}, ", "libembree-dev", "libpcl-dev"]
+    debian = ["dpkg-query", "--show", "--showformat", "${Package} ${Version}, ", "libembree-dev", "libpcl-dev", "libllvm19"]
     packages = subprocess.run(debian, capture_output=True, text=True).stdout
     lines = (HERE / "requirements.txt").read_text().splitlines()
     return f"{model}; {packages}{', '.join(line for line in lines if not line.startswith('#'))}"

@@ -2,9 +2,8 @@
 //! sides of a body, and round its sides and over its top.
 //!
 //! Ours is the public form of two models for many bodies, which is that of their formulas to 1e-4 dB; the losses of a frame come
-//! from a table that is rougher and faster, and that the library keeps to itself. The peer is the same formula on arrays. Sionna RT is none: it
-//! finds the paths among meshes that reflect and diffract, by rays of the whole scene, and does not tell what one body costs
-//! one link as a screen.
+//! from a table that is rougher and faster, and that the library keeps to itself. One peer is the same formula on arrays. The
+//! other, Sionna RT, works on scenes and not on pairs, and has cases of its own (`screens.rs`).
 
 use std::path::Path;
 
@@ -12,20 +11,21 @@ use umbracast::geometry::{DVec2, DVec3};
 use umbracast::radio::{KnifeEdges, Passage};
 
 use crate::exchange::{Answer, times, uniform, write_f64};
+use crate::screens;
 
 const PAIRS: usize = 1_000_000;
 const TRIES: usize = 5;
 /// Of 28 GHz.
-const WAVELENGTH_M: f64 = 0.299_792_458 / 28.0;
+pub const WAVELENGTH_M: f64 = 0.299_792_458 / 28.0;
 /// A trunk with its arms, and how high a person is.
-const WIDTH_M: f64 = 0.56;
-const TOP_M: f64 = 1.72;
+pub const WIDTH_M: f64 = 0.56;
+pub const TOP_M: f64 = 1.72;
 /// The hall is so wide and the access points hang so high; devices are held between these heights.
 const HALL_M: f64 = 30.0;
-const AP_M: f64 = 3.0;
-const DEVICE_M: [f64; 2] = [0.9, 1.5];
+pub const AP_M: f64 = 3.0;
+pub const DEVICE_M: [f64; 2] = [0.9, 1.5];
 /// Bodies stand so far beside the path, metres, and no nearer to its ends than this share of it.
-const BESIDE_M: f64 = 1.0;
+pub const BESIDE_M: f64 = 1.0;
 const END: f64 = 0.05;
 
 struct Pair {
@@ -58,6 +58,7 @@ pub fn row(folder: &Path) -> Answer {
     let mut answer = Answer::default();
     case(&mut answer, folder, "two edges", &pairs, None);
     case(&mut answer, folder, "three edges", &pairs, Some(TOP_M));
+    screens::cases(&mut answer, folder);
     answer
 }
 

@@ -14,6 +14,8 @@ mod tracking;
 mod orca;
 mod reading;
 mod loss;
+mod screens;
+mod paths;
 
 use std::path::Path;
 
@@ -23,7 +25,7 @@ use exchange::Answer;
 type Row = fn(&Path) -> Answer;
 
 /// Every row by name, in the order of the table, and the peers that are written in Rust as `ROW-PEER`.
-const ROWS: [(&str, Row); 14] = [
+const ROWS: [(&str, Row); 15] = [
     ("simulate", simulate::row),
     ("links", links::row),
     ("background", background::organised),
@@ -38,6 +40,7 @@ const ROWS: [(&str, Row); 14] = [
     ("orca-dodgy", orca::dodgy),
     ("reading", reading::row),
     ("loss", loss::row),
+    ("paths", paths::row),
 ];
 
 fn main() {
