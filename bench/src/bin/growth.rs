@@ -1,30 +1,60 @@
-//! How long a step of the default mode takes as people and access points grow: `cargo run --release --manifest-path
-//! bench/Cargo.toml --bin growth [PEOPLE ACCESS_POINTS | FIGURE.svg]`. On one core. Each frame is run three times from the same
+//! How long a step of the default mode takes as people, sensors and access points grow: `cargo run --release --manifest-path
+//! bench/Cargo.toml --bin growth [PEOPLE SENSORS ACCESS_POINTS | FIGURE.svg]`. On one core. Each frame is run three times from the same
 //! memory. The table gives the fastest of the three, which other programs disturb least, and the middle one beside.
 
 use std::time::Duration;
 
 use umbracast::geometry::DVec2;
 use umbracast::lidar::Frame;
-use umbracast::site::AccessPoint;
+use umbracast::site::{AccessPoint, Site};
 use umbracast::{Config, Health, Pipeline};
 use umbracast_bench::simulated::{Recording, crossing, walking};
 use umbracast_bench::{Stages, timed};
 use umbracast_eval::report::plot::{Mark, Panel, Series, draw};
 use umbracast_sim::crowd::{Crowd, Trajectory};
 
-/// People with two access points, and access points with so many people.
-const PEOPLE: [usize; 5] = [10, 20, 40, 100, 300];
-const ACCESS_POINTS: [usize; 5] = [1, 2, 4, 16, 64];
-/// With so many people every number of access points is tried.
+/// How many people, sensors and access points each row has. Rows with the same people and sensors come one after the other.
+const CASES: [[usize; 3]; 22] = [
+    [10, 2, 1],
+    [10, 2, 2],
+    [10, 2, 4],
+    [10, 2, 16],
+    [10, 2, 64],
+    [20, 2, 2],
+    [40, 2, 2],
+    [100, 2, 1],
+    [100, 2, 2],
+    [100, 2, 4],
+    [100, 2, 16],
+    [100, 2, 64],
+    [300, 2, 2],
+    [100, 1, 2],
+    [100, 4, 2],
+    [100, 4, 8],
+    [100, 8, 2],
+    [100, 16, 2],
+    [300, 16, 2],
+    [1000, 16, 2],
+    // A stand of a stadium.
+    [1000, 16, 32],
+    [3000, 16, 2],
+];
+/// With so many people and two sensors the figure shows how access points count.
 const LINKS_GROW_WITH: [usize; 2] = [10, 100];
 /// Until everybody is followed.
 const BEFORE: usize = 30;
 /// A circle is crossed within; people meet in the middle after 12 s, sooner where they are many.
 const FRAMES: usize = 130;
-/// So many no longer cross a circle: they walk in lanes.
+const RADIUS_M: f64 = 12.5;
+/// So many no longer cross a circle: they walk in lanes, in a hall that is as long as it takes.
 const LANES_FROM: usize = 200;
 const LANES_FRAMES: usize = 90;
+/// So many are simulated for a shorter time.
+const STAND_FROM: usize = 1000;
+const STAND_FRAMES: usize = 50;
+/// Lanes lie side by side along y; in each, people follow each other along x.
+const LANE_M: f64 = 0.9;
+const GAP_M: f64 = 3.0;
 const TRIES: usize = 3;
 
 fn main() {
@@ -33,21 +63,17 @@ fn main() {
         "a frame is run {TRIES} times; ms, median of the frames and 99 %, of the fastest try and of the middle one"
     );
     println!(
-        "people  access points  followed  links  fastest    99 %   middle    99 %   fore  clust  detec  track  forec   cast  fewer"
+        "people  sensors  access points  followed  links  fastest    99 %   middle    99 %   fore  clust  detec  track  forec   cast  fewer"
     );
-    if let [people, access_points] = &words[..] {
-        let [people, access_points] = [people, access_points].map(|word| word.parse().expect("a number"));
-        measure(&recording(people), people, access_points);
+    if let [people, sensors, access_points] = &words[..] {
+        let case = [people, sensors, access_points].map(|word| word.parse().expect("a number"));
+        measure(&recording(case[0], case[1]), case);
         return;
     }
     let mut rows = Vec::new();
-    for people in PEOPLE {
-        let recording = recording(people);
-        for access_points in ACCESS_POINTS {
-            if access_points == 2 || LINKS_GROW_WITH.contains(&people) {
-                rows.push(measure(&recording, people, access_points));
-            }
-        }
+    for of_hall in CASES.chunk_by(|a, b| a[..2] == b[..2]) {
+        let recording = recording(of_hall[0][0], of_hall[0][1]);
+        rows.extend(of_hall.iter().map(|case| measure(&recording, *case)));
     }
     if let [figure] = &words[..] {
         std::fs::write(figure, drawn(&rows)).expect("the figure's place can be written");
@@ -57,24 +83,45 @@ fn main() {
 /// A line of the table, of the fastest tries.
 struct Row {
     people: usize,
+    sensors: usize,
     access_points: usize,
     median_ms: f64,
     p99_ms: f64,
 }
 
-/// Over people with two access points, and over access points with each number of people.
+/// Over people with two access points, in the hall with two sensors and in those with sixteen, over sensors, and over access points
+/// with each number of people.
 fn drawn(rows: &[Row]) -> String {
     const COLORS: [&str; 2] = ["#1b6ca8", "#b74a2f"];
     let line = |name: String, color, mark, points| Series { name, color, mark, points, band: Vec::new() };
     let of = |row: &Row, x: f64, p99: bool| (x, if p99 { row.p99_ms } else { row.median_ms });
     let two = || rows.iter().filter(|row| row.access_points == 2);
-    let over_people = |p99: bool| two().map(|row| of(row, row.people as f64, p99)).collect();
-    let people = vec![
-        line("median".into(), COLORS[0], Mark::Line(2.0), over_people(false)),
-        line("99 %".into(), COLORS[0], Mark::Dashed(2.0), over_people(true)),
+    let over_people = |sensors: usize, p99: bool| {
+        two().filter(|row| row.sensors == sensors).map(|row| of(row, row.people as f64, p99)).collect()
+    };
+    let people = [2, 16]
+        .into_iter()
+        .zip(COLORS)
+        .flat_map(|(sensors, color)| {
+            let name = |what: &str| format!("{sensors} sensors, {what}");
+            [
+                line(name("median"), color, Mark::Line(2.0), over_people(sensors, false)),
+                line(name("99 %"), color, Mark::Dashed(2.0), over_people(sensors, true)),
+            ]
+        })
+        .collect();
+    let over_sensors = |p99: bool| {
+        let mut points: Vec<(f64, f64)> =
+            two().filter(|row| row.people == 100).map(|row| of(row, row.sensors as f64, p99)).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points
+    };
+    let sensors = vec![
+        line("median".into(), COLORS[0], Mark::Line(2.0), over_sensors(false)),
+        line("99 %".into(), COLORS[0], Mark::Dashed(2.0), over_sensors(true)),
     ];
     let with = |(people, color): (usize, &'static str)| {
-        let points = rows.iter().filter(|row| row.people == people);
+        let points = rows.iter().filter(|row| row.people == people && row.sensors == 2);
         let points = points.map(|row| of(row, row.access_points as f64, false)).collect();
         line(format!("{people} people, median"), color, Mark::Line(2.0), points)
     };
@@ -93,38 +140,42 @@ fn drawn(rows: &[Row]) -> String {
     };
     let panels = [
         panel("a step, ms, best of three tries, two access points", "people", people),
-        panel("a step, ms, best of three tries", "access points", access_points),
+        panel("a step, ms, best of three tries, 100 people, two access points", "sensors", sensors),
+        panel("a step, ms, best of three tries, two sensors", "access points", access_points),
     ];
     let drawn = |name, panel| draw(name, panel, (520.0, 320.0)).expect("a figure").svg;
-    joined(&[drawn("growth-people", &panels[0]), drawn("growth-links", &panels[1])])
+    joined(&[
+        drawn("growth-people", &panels[0]),
+        drawn("growth-sensors", &panels[1]),
+        drawn("growth-links", &panels[2]),
+    ])
 }
 
 /// One picture above the other.
-fn joined(pictures: &[String; 2]) -> String {
+fn joined(pictures: &[String; 3]) -> String {
     let placed = pictures.iter().enumerate().map(|(i, svg)| {
         svg.replacen("<svg", &format!("<svg y=\"{}\" width=\"520\" height=\"320\"", 320 * i), 1)
     });
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 520 640\">\n{}\n</svg>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 520 960\">\n{}\n</svg>\n",
         placed.collect::<Vec<_>>().join("\n")
     )
 }
 
-fn recording(people: usize) -> Recording {
-    let site = Config::default().site;
-    let made = match people < LANES_FROM {
-        true => crossing(&site, people, 12.5, FRAMES),
-        false => walking(&site, lanes(people), LANES_FRAMES),
+fn recording(people: usize, sensors: usize) -> Recording {
+    let site = site(people, sensors);
+    let made = match people {
+        0..LANES_FROM => crossing(&site, people, RADIUS_M, FRAMES),
+        LANES_FROM..STAND_FROM => walking(&site, lanes(people, LANES_FRAMES), LANES_FRAMES),
+        _ => walking(&site, lanes(people, STAND_FRAMES), STAND_FRAMES),
     };
-    made.expect("the default site is simulated")
+    made.expect("the site is simulated")
 }
 
 /// People in lanes along x, 0.9 m apart, every other lane the other way, 3 m from each to the next.
-fn lanes(people: usize) -> Crowd {
-    const LANE_M: f64 = 0.9;
-    const GAP_M: f64 = 3.0;
-    let lanes = (people as f64 * GAP_M / 30.0).ceil();
-    let steps = 10 * LANES_FRAMES;
+fn lanes(people: usize, frames: usize) -> Crowd {
+    let lanes = lanes_of(people);
+    let steps = 10 * frames;
     let way = |person: usize| {
         let (lane, place) = (person % lanes as usize, person / lanes as usize);
         let ahead = if lane % 2 == 0 { 1.0 } else { -1.0 };
@@ -150,16 +201,65 @@ fn lanes(people: usize) -> Crowd {
     };
     Crowd {
         trajectories: (0..people).map(trajectory).collect(),
-        duration_ns: LANES_FRAMES as i64 * umbracast::STEP_NS,
+        duration_ns: frames as i64 * umbracast::STEP_NS,
     }
 }
 
-/// The two of the default site, then more evenly on a circle of 14 m, 2.5 m high.
-fn config(access_points: usize) -> Config {
-    let mut config = Config::default();
+fn lanes_of(people: usize) -> f64 {
+    (people as f64 * GAP_M / 30.0).ceil()
+}
+
+/// The default site with its first sensors, with four or more evenly about the circle that is crossed. Where people walk in lanes and
+/// more than two sensors look, they hang in pairs along the lanes' ends, in a hall of its own with nothing but people in it.
+fn site(people: usize, sensors: usize) -> Site {
+    let mut site = Config::default().site;
+    let of = |i: usize, position_m: [f64; 3], yaw_deg: f64| {
+        let mut sensor = Config::default().site.sensors[0].clone();
+        sensor.name = format!("lidar_{i}");
+        sensor.position_m = position_m;
+        sensor.rotation_deg.yaw = yaw_deg;
+        sensor
+    };
+    if sensors <= site.sensors.len() {
+        site.sensors.truncate(sensors);
+    } else if people < LANES_FROM {
+        let about = |i: usize| {
+            let turn = std::f64::consts::TAU * i as f64 / sensors as f64;
+            let at = DVec2::from_angle(turn) * 16.0;
+            of(i, [at.x, at.y, 9.0], turn.to_degrees() + 180.0)
+        };
+        site.sensors = (0..sensors).map(about).collect();
+    } else {
+        let width_m = width_m(people);
+        (site.hall.length_m, site.hall.width_m) = (34.0, width_m + 4.0);
+        (site.pillars, site.furniture) = (Vec::new(), Vec::new());
+        let along = |i: usize| {
+            let y = width_m * ((i / 2) as f64 + 0.5) / (sensors / 2) as f64 - 0.5 * width_m;
+            let (x, yaw_deg) = if i.is_multiple_of(2) { (16.0, 180.0) } else { (-16.0, 0.0) };
+            of(i, [x, y, 9.0], yaw_deg)
+        };
+        site.sensors = (0..sensors).map(along).collect();
+    }
+    site
+}
+
+fn width_m(people: usize) -> f64 {
+    lanes_of(people) * LANE_M
+}
+
+/// The two of the default site, then more evenly on a circle of 14 m, 2.5 m high; along the hall where it is longer.
+fn config([people, sensors, access_points]: [usize; 3]) -> Config {
+    let mut config = Config { site: site(people, sensors), ..Config::default() };
     let own = config.site.access_points.clone();
+    let is_long = people >= LANES_FROM && sensors > 2;
     let more = |i: usize| {
-        let at = DVec2::from_angle(2.4 * i as f64) * 14.0;
+        let at = match is_long {
+            true => {
+                let along = (i as f64 + 0.5) / access_points as f64 - 0.5;
+                DVec2::new(if i.is_multiple_of(2) { 14.0 } else { -14.0 }, along * width_m(people))
+            }
+            false => DVec2::from_angle(2.4 * i as f64) * 14.0,
+        };
         AccessPoint { name: format!("more-{i}"), position_m: [at.x, at.y, 2.5], radio: None }
     };
     config.site.access_points =
@@ -167,8 +267,9 @@ fn config(access_points: usize) -> Config {
     config
 }
 
-fn measure(recording: &Recording, people: usize, access_points: usize) -> Row {
-    let config = config(access_points);
+fn measure(recording: &Recording, case: [usize; 3]) -> Row {
+    let [people, sensors, access_points] = case;
+    let config = config(case);
     let mut stages = Stages::new(&config, &recording.empty).expect("the defaults work");
     let mut pipeline = Pipeline::new(&config, None).expect("the defaults work");
     recording.empty.iter().for_each(|frame| pipeline.learn_empty(frame));
@@ -207,7 +308,7 @@ fn measure(recording: &Recording, people: usize, access_points: usize) -> Row {
         values.sort();
         values[values.len() / 2]
     };
-    print!("{people:6} {access_points:14} {:9} {:6} ", middle(&mut followed), middle(&mut links));
+    print!("{people:6} {sensors:8} {access_points:14} {:9} {:6} ", middle(&mut followed), middle(&mut links));
     let [median_ms, p99_ms] = [0.5, 0.99].map(|share| ms(&mut fastest, share));
     let [middle_ms, middle_p99_ms] = [0.5, 0.99].map(|share| ms(&mut middle_one, share));
     print!("{median_ms:8.2} {p99_ms:7.2} {middle_ms:8.2} {middle_p99_ms:7.2} ");
@@ -215,7 +316,7 @@ fn measure(recording: &Recording, people: usize, access_points: usize) -> Row {
         print!(" {:6.2}", ms(part, 0.5));
     }
     println!(" {fewer:6}");
-    Row { people, access_points, median_ms, p99_ms }
+    Row { people, sensors, access_points, median_ms, p99_ms }
 }
 
 fn by_stage(stages: &mut Stages, frame: &Frame) -> [Duration; 6] {
