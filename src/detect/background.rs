@@ -2,6 +2,7 @@
 
 use super::first_sight::of_people;
 use super::placed::Placer;
+use super::presence::Presence;
 use super::sensor_model::{Clip, Learn, Look, SensorModel, unorganised_point};
 use super::voxel::{VoxelMap, thin};
 use super::{Point, Prior, above_floor};
@@ -39,6 +40,7 @@ pub struct Background {
     thin_m: f64,
     sensors: Vec<SensorModel>,
     clip: Clip,
+    presence: Presence,
     map: Option<VoxelMap>,
     /// Scans that made the map.
     map_scans: u32,
@@ -65,6 +67,7 @@ impl Background {
             thin_m: config.thin_m,
             sensors: site.sensors.iter().map(SensorModel::new).collect(),
             clip: Clip { hall: site.hall.clone(), highest_m: config.highest_m },
+            presence: Presence::default(),
             map: None,
             map_scans: 0,
             keys: Vec::new(),
@@ -128,11 +131,14 @@ impl Background {
         points.clear();
         match self.method {
             BackgroundMethod::RangeImage => {
+                let mut presence = std::mem::take(&mut self.presence);
+                presence.renew(priors);
                 for scan in &frame.scans {
                     let known = self.sensors.get(scan.sensor).is_some_and(SensorModel::is_known);
-                    let learn = if known { Learn::Furniture(priors) } else { Learn::OnTheWay(priors) };
+                    let learn = if known { Learn::Furniture(&presence) } else { Learn::OnTheWay(&presence) };
                     self.scan(frame.time_ns, scan, learn, health, points);
                 }
+                self.presence = presence;
                 self.forget_people(frame);
             }
             BackgroundMethod::Voxels => {

@@ -1,10 +1,10 @@
 //! One sensor's view of the empty scene, pixel by pixel, and the returns that are nearer.
 
+use super::Point;
 use super::cloud_limits::{CloudLimits, Elevations, azimuth_of_cdeg, range_of_m};
 use super::first_sight::Return;
-use super::presence::{is_furnitures, is_somebodys, near, people};
+use super::presence::{Expected, Presence};
 use super::range_model::{Near, RangeModel, Verdict};
-use super::{Point, Prior};
 use crate::Health;
 use crate::elementary::wide;
 use crate::geometry::{DVec3, Pose};
@@ -70,9 +70,9 @@ pub(super) enum Learn<'a> {
     /// Everything but where somebody is expected. Then returns nearer than the sensor's range are learned too, though
     /// never new: behind somebody beside the sensor the scene is unknown, not empty, and what appears there later is no
     /// person.
-    OnTheWay(&'a [Prior]),
+    OnTheWay(&'a Presence),
     /// The empty scene is known: only what was put there since.
-    Furniture(&'a [Prior]),
+    Furniture(&'a Presence),
 }
 
 impl Learn<'_> {
@@ -91,12 +91,12 @@ impl Learn<'_> {
         match (self, at_m) {
             // What is not new there may be of somebody too: a body's edge beside a pixel whose background is nearer. If it
             // were learned, the body would be learned from its edge inwards.
-            (Self::OnTheWay(priors), Some(at_m)) if is_somebodys(priors, at_m) => Verdict::Somebodys,
+            (Self::OnTheWay(expected), Some(at_m)) if expected.is_somebodys(at_m) => Verdict::Somebodys,
             (Self::Empty | Self::OnTheWay(_), _) => Verdict::Learned,
-            (Self::Furniture(priors), Some(at_m))
+            (Self::Furniture(expected), Some(at_m))
                 if new
-                    && (stays(&|| near(priors, at_m))
-                        || is_furnitures(priors, at_m) && !is_somebodys(priors, at_m)) =>
+                    && (stays(&|| expected.near(at_m))
+                        || expected.is_furnitures(at_m) && !expected.is_somebodys(at_m)) =>
             {
                 Verdict::Furnitures
             }
@@ -106,16 +106,16 @@ impl Learn<'_> {
 
     /// Ranges at which somebody may be whom this does not learn: most returns are of the hall behind all of them.
     fn ranges_near_people(self, site_from_sensor: &Pose, clip: &Clip) -> Vec<Range<f32>> {
-        let Self::OnTheWay(priors) = self else { return Vec::new() };
+        let Self::OnTheWay(expected) = self else { return Vec::new() };
         let sensor_m = site_from_sensor.point(DVec3::ZERO);
-        let range = |(prior, reach_m): (&Prior, f64)| {
-            let away_m = prior.position_m.distance(sensor_m.truncate());
-            let above_floor_m = sensor_m.z - clip.hall.floor_m(prior.position_m);
+        let range = |&Expected { position_m, reach_m, .. }: &Expected| {
+            let away_m = position_m.distance(sensor_m.truncate());
+            let above_floor_m = sensor_m.z - clip.hall.floor_m(position_m);
             let off_m = above_floor_m.abs().max((above_floor_m - clip.highest_m).abs());
             // Half a metre more, for the floor under him may be a ramp's.
             (away_m - reach_m) as f32..(away_m + reach_m).hypot(off_m + 0.5) as f32
         };
-        people(priors).map(range).collect()
+        expected.people().map(range).collect()
     }
 }
 
@@ -412,8 +412,8 @@ impl SensorModel {
 
     /// Whether a cloud teaches nothing: the scene is known, and nothing was put there or is looked for.
     fn sees_new_only(&self, learn: Learn) -> bool {
-        let Learn::Furniture(priors) = learn else { return false };
-        !self.cloud_ranges.has_furniture() && !priors.iter().any(|prior| prior.is_furniture)
+        let Learn::Furniture(expected) = learn else { return false };
+        !self.cloud_ranges.has_furniture() && !expected.has_furniture()
     }
 
     /// The same as [`SensorModel::sort_returns`] of those alone that are new. Returns how many were out of range; `None`
