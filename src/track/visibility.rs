@@ -35,6 +35,13 @@ pub struct Body {
     pub height_m: f64,
 }
 
+impl Body {
+    /// How far above the floor a slice begins.
+    fn up_m(&self, slice: usize) -> f64 {
+        self.height_m * (slice as f64 / SLICES as f64)
+    }
+}
+
 /// Sensors of the last frame, and what stands still between them and people.
 #[derive(Debug, Clone)]
 pub struct Visibility {
@@ -157,6 +164,10 @@ impl Visibility {
             ..BodyView::default()
         };
         for eye in eyes {
+            let sides = eye.sides(body);
+            if !eye.meets(&sides) {
+                continue;
+            }
             let from = eye.origin_m.truncate();
             let along = body.position_m - from;
             // Most stand far beside the line that the segment is a part of.
@@ -173,7 +184,7 @@ impl Visibility {
             between.furniture.clear();
             let around = |f: &&Obb| near(f.center_m.truncate(), f.half_m.length());
             between.furniture.extend(furniture.iter().filter(around));
-            eye.view(body, between, &mut view);
+            eye.view(body, &sides, between, &mut view);
         }
         view
     }
@@ -203,17 +214,23 @@ impl Eye {
         }
     }
 
-    /// Adds what a body gives to this sensor.
-    fn view(&self, body: &Body, between: &mut Between, view: &mut BodyView) {
+    /// Both sides of a body, as this sensor sees them.
+    fn sides(&self, body: &Body) -> [Side; 2] {
         let across = (body.position_m - self.origin_m.truncate()).perp().normalize_or_zero();
-        let feet_m = [-0.5, 0.5].map(|side| body.position_m + across * (side * BODY_RADIUS_M));
-        let z_m = |edge: usize| body.height_m * (edge as f64 / SLICES as f64);
-        let above = |foot_m: DVec2, up_m: f64| foot_m.extend(body.floor_m + up_m);
-        let sides = feet_m.map(|foot_m| Side::of(self, above(foot_m, 0.0), z_m));
-        between.cross(self.origin_m.truncate(), feet_m);
+        [-0.5, 0.5].map(|side| Side::of(self, body, body.position_m + across * (side * BODY_RADIUS_M)))
+    }
+
+    /// Whether any beam passes where the body is: most sensors of a large hall look elsewhere.
+    fn meets(&self, sides: &[Side; 2]) -> bool {
+        sides.iter().any(|side| side.edges.windows(2).any(|of| self.beams_between(&of[0], &of[1]) != 0.0))
+    }
+
+    /// Adds what a body gives to this sensor.
+    fn view(&self, body: &Body, sides: &[Side; 2], between: &mut Between, view: &mut BodyView) {
+        between.cross(self.origin_m.truncate(), sides.each_ref().map(|side| side.foot_m));
         for slice in 0..SLICES {
-            let (low_m, high_m) = (z_m(slice), z_m(slice + 1));
-            for (i, (foot_m, side)) in feet_m.iter().zip(&sides).enumerate() {
+            let (low_m, high_m) = (body.up_m(slice), body.up_m(slice + 1));
+            for (i, side) in sides.iter().enumerate() {
                 let beams = self.beams_between(&side.edges[slice], &side.edges[slice + 1]);
                 if beams == 0.0 {
                     continue;
@@ -223,7 +240,8 @@ impl Eye {
                 if slice < LEGS_SLICES {
                     view.returns_of_legs_alone += returns;
                 }
-                if between.hide(i, self.origin_m, above(*foot_m, 0.5 * (low_m + high_m))) {
+                let middle_m = side.foot_m.extend(body.floor_m + 0.5 * (low_m + high_m));
+                if between.hide(i, self.origin_m, middle_m) {
                     continue;
                 }
                 view.top_m = view.top_m.max(high_m);
@@ -252,6 +270,8 @@ impl Eye {
 
 /// A body's side, from the feet up, as a sensor sees it.
 struct Side {
+    /// From above.
+    foot_m: DVec2,
     edges: [Edge; SLICES + 1],
     /// Columns in the direction of its middle; none where they are not known.
     columns_per_rad: Option<f64>,
@@ -268,11 +288,11 @@ struct Edge {
 }
 
 impl Side {
-    /// Of the vertical line above `foot_m`, with edges at heights `z_m`.
-    fn of(eye: &Eye, foot_m: DVec3, z_m: impl Fn(usize) -> f64) -> Self {
+    /// Of the vertical line above `foot_m`, with edges at the body's slices.
+    fn of(eye: &Eye, body: &Body, foot_m: DVec2) -> Self {
         let up = eye.sensor_from_site.direction(DVec3::Z);
-        let foot_m = eye.sensor_from_site.point(foot_m);
-        let at_m = |edge: usize| foot_m + up * z_m(edge);
+        let from_eye_m = eye.sensor_from_site.point(foot_m.extend(body.floor_m));
+        let at_m = |edge: usize| from_eye_m + up * body.up_m(edge);
         let edges = std::array::from_fn(|edge| {
             let at_m = at_m(edge);
             let away_m2 = at_m.x * at_m.x + at_m.y * at_m.y;
@@ -284,7 +304,7 @@ impl Side {
             let middle_m = at_m(SLICES / 2);
             f64::from(fan.columns[sector((-middle_m.y).atan2(middle_m.x))]) * SECTORS as f64 / TAU
         });
-        Self { edges, columns_per_rad }
+        Self { foot_m, edges, columns_per_rad }
     }
 
     /// Columns that meet the body at an edge.

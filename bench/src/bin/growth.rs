@@ -51,7 +51,7 @@ const LANES_FROM: usize = 200;
 const LANES_FRAMES: usize = 90;
 /// So many are simulated for a shorter time.
 const STAND_FROM: usize = 1000;
-const STAND_FRAMES: usize = 50;
+const STAND_FRAMES: usize = 40;
 /// Lanes lie side by side along y; in each, people follow each other along x.
 const LANE_M: f64 = 0.9;
 const GAP_M: f64 = 3.0;
