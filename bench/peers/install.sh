@@ -12,32 +12,32 @@ without() {
     missing+=("$1")
 }
 
-debian_packages() {
-    local packages=(g++ pkg-config libembree-dev libpcl-dev python3-venv) as_root=()
-    if dpkg -s "${packages[@]}" >/dev/null 2>&1; then
+as_root() {
+    if [ "$(id -u)" -eq 0 ]; then
+        "$@"
+    else
+        sudo "$@"
+    fi
+}
+
+debian() {
+    if dpkg -s "$@" >/dev/null 2>&1; then
         return
     fi
-    if [ "$(id -u)" -ne 0 ]; then
-        as_root=(sudo)
-    fi
-    "${as_root[@]}" apt-get install -y --no-install-recommends "${packages[@]}" || without "packages of Debian: ${packages[*]}"
+    # A new machine knows no packages, or old ones.
+    as_root apt-get update -q || true
+    as_root apt-get install -y --no-install-recommends "$@" || without "packages of Debian: $*"
 }
 
 # Sionna RT compiles its kernels with Debian's LLVM, the newest, for version 15 cannot compile all of them.
 llvm() {
-    local newest as_root=()
+    local newest
     newest="$(apt-cache search --names-only '^libllvm[0-9]+$' | cut -d' ' -f1 | sort -V | tail -n 1)" || newest=""
-    if [ -z "$newest" ]; then
+    if [ -n "$newest" ]; then
+        debian "$newest"
+    else
         without "an LLVM library for sionna-rt"
-        return
     fi
-    if dpkg -s "$newest" >/dev/null 2>&1; then
-        return
-    fi
-    if [ "$(id -u)" -ne 0 ]; then
-        as_root=(sudo)
-    fi
-    "${as_root[@]}" apt-get install -y --no-install-recommends "$newest" || without "$newest for sionna-rt"
 }
 
 # NAME.cpp with these flags becomes a program; templates are built here, for this machine, and not taken from a library that
@@ -72,7 +72,7 @@ python_peers() {
 }
 
 mkdir -p "$built"
-debian_packages
+debian g++ pkg-config libembree-dev libpcl-dev python3-venv
 llvm
 compiled_peers
 python_peers
