@@ -164,7 +164,9 @@ impl RangeImage {
         let azimuth = column.azimuth_cdeg + column.azimuth_rate_cdeg_per_ns * self.beams[b].turned_ns as f32;
         // Rounds half away from zero as `round` does, which is a call where it is no instruction.
         let azimuth = f64::from(azimuth);
-        ((azimuth + 0.5_f64.copysign(azimuth)) as i64).rem_euclid(TURN_CDEG) as u32
+        let whole = (azimuth + 0.5_f64.copysign(azimuth)) as i64;
+        // Nearly all are within the turn already.
+        (if (0..TURN_CDEG).contains(&whole) { whole } else { whole.rem_euclid(TURN_CDEG) }) as u32
     }
 
     /// The point of beam `b` in column `c` at `range_m`, in the sensor's frame: where the manufacturer's decoder puts

@@ -4,9 +4,10 @@ use std::f64::consts::TAU;
 
 use umbracast::Site;
 use umbracast::geometry::{DVec2, DVec3, Pose};
-use umbracast::lidar::{Model, RangeImage, Turn};
+use umbracast::lidar::{Beam, RangeImage, Turn};
 use umbracast::site::{Floor, Hall};
 
+use super::head::Head;
 use super::panes::{Meets, Mirrored, Panes};
 
 /// Azimuths that a packet tells apart unless a sensor's columns repeat: hundredths of a degree.
@@ -24,11 +25,15 @@ const PANE: u8 = 10;
 /// So far to either side of an edge the floor has the height that it has beside it.
 const BESIDE_M: f64 = 1e-6;
 
-/// Ranges and reflectivities of all beams at all azimuths of the head, at `beam * azimuths + azimuth`: a frame reads
-/// one beam after the other in even strides.
+/// Ranges and reflectivities of all beams at all azimuths of the head, row after row. A row holds each beam at the azimuth to
+/// which the head has turned on when that beam fires, so that a column of a frame lies in one row or in two beside each other:
+/// it is read from a few lines of the cache.
 #[derive(Debug)]
 pub struct HallImage {
     turn: Option<Turn>,
+    azimuths: u32,
+    /// How far each beam's azimuth is past that of its row; less than there are azimuths.
+    turned: Vec<u32>,
     range_m: Vec<f32>,
     /// Percent.
     reflectivity: Vec<u8>,
@@ -38,17 +43,24 @@ pub struct HallImage {
 
 impl HallImage {
     /// Traces the hall from a sensor that hangs within it.
-    pub fn trace(site: &Site, model: &Model, site_from_sensor: &Pose) -> Self {
+    pub fn trace(site: &Site, head: &Head, site_from_sensor: &Pose) -> Self {
         let (hall, panes) = (Solids::new(site), Panes::new(&site.simulation.panes));
+        let model = &head.model;
         let (count, first_cdeg) = model.turn.map_or((TURN_CDEG, 0.0), |turn| (turn.columns, turn.first_cdeg));
         let rays = model.beams.len() * count as usize;
         let (mut ranges_m, mut reflectivities) = (Vec::with_capacity(rays), Vec::with_capacity(rays));
         let mut mirrored = Vec::with_capacity(if panes.is_empty() { 0 } else { rays });
         let azimuth_rad = |i| first_cdeg * (TAU / 36_000.0) + f64::from(i) * (TAU / f64::from(count));
         let azimuths: Vec<(f64, f64)> = (0..count).map(|i| azimuth_rad(i).sin_cos()).collect();
-        for beam in model.beams.iter() {
-            for &azimuth in &azimuths {
-                let (origin_m, direction) = beam.ray(azimuth);
+        // All beams of a column that repeats have one azimuth.
+        let turned = |beam: &Beam| match model.turn {
+            None => (head.rate_cdeg_per_ns * f64::from(beam.turned_ns)).round() as u32 % count,
+            Some(_) => 0,
+        };
+        let turned: Vec<u32> = model.beams.iter().map(turned).collect();
+        for row in 0..count {
+            for (beam, turned) in model.beams.iter().zip(&turned) {
+                let (origin_m, direction) = beam.ray(azimuths[((row + turned) % count) as usize]);
                 let ray = (site_from_sensor.point(origin_m), site_from_sensor.direction(direction));
                 let (range_m, reflectivity) = if panes.is_empty() {
                     hall.cast(ray.0, ray.1)
@@ -61,22 +73,60 @@ impl HallImage {
                 reflectivities.push(reflectivity);
             }
         }
-        Self { turn: model.turn, range_m: ranges_m, reflectivity: reflectivities, mirrored }
+        Self {
+            turn: model.turn,
+            azimuths: count,
+            turned,
+            range_m: ranges_m,
+            reflectivity: reflectivities,
+            mirrored,
+        }
     }
 
-    /// Range and reflectivity of what beam `b` of column `c` meets, and the pane that shows it.
-    pub fn at(&self, image: &RangeImage, c: usize, b: usize) -> (f32, u8, Mirrored) {
-        let (azimuth, count) = match self.turn {
-            None => (image.azimuth_cdeg(c, b), TURN_CDEG),
-            Some(turn) => {
-                let passed = (f64::from(image.columns[c].azimuth_cdeg) - turn.first_cdeg) / 36_000.0;
-                let number = (passed * f64::from(turn.columns)).round() as i64;
-                (number.rem_euclid(i64::from(turn.columns)) as u32, turn.columns)
+    /// Writes what each pixel of the image meets, and the panes that show it unless the hall has none.
+    pub fn show(&self, image: &mut RangeImage, mirrored: &mut [Mirrored]) {
+        let beams = image.beams.len();
+        let mut rows = Vec::with_capacity(image.columns.len());
+        rows.extend((0..image.columns.len()).map(|c| self.row(image, c)));
+        // Whole rows first: the processor waits for many of them at a time.
+        for (c, &row) in rows.iter().enumerate() {
+            let (from, to) = (row * beams..(row + 1) * beams, c * beams..(c + 1) * beams);
+            image.range_m[to.clone()].copy_from_slice(&self.range_m[from.clone()]);
+            image.reflectivity[to.clone()].copy_from_slice(&self.reflectivity[from.clone()]);
+            if self.has_panes() {
+                mirrored[to].copy_from_slice(&self.mirrored[from]);
             }
+        }
+        if self.turn.is_some() {
+            return;
+        }
+        // Then the beams that rounding moves to the row beside.
+        for (c, &row) in rows.iter().enumerate() {
+            for (b, &turned) in self.turned.iter().enumerate() {
+                let azimuth = image.azimuth_cdeg(c, b);
+                let own =
+                    (if azimuth < turned { azimuth + self.azimuths } else { azimuth } - turned) as usize;
+                if own != row {
+                    let (from, to) = (own * beams + b, c * beams + b);
+                    image.range_m[to] = self.range_m[from];
+                    image.reflectivity[to] = self.reflectivity[from];
+                    if self.has_panes() {
+                        mirrored[to] = self.mirrored[from];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Where most beams of a column look: all of them where columns repeat.
+    fn row(&self, image: &RangeImage, c: usize) -> usize {
+        let Some(turn) = self.turn else {
+            let azimuth = image.azimuth_cdeg(c, 0);
+            return ((azimuth + self.azimuths - self.turned[0]) % self.azimuths) as usize;
         };
-        let pixel = b * count as usize + azimuth as usize;
-        let mirrored = self.mirrored.get(pixel).copied().unwrap_or(Mirrored::NONE);
-        (self.range_m[pixel], self.reflectivity[pixel], mirrored)
+        let passed = (f64::from(image.columns[c].azimuth_cdeg) - turn.first_cdeg) / 36_000.0;
+        let number = (passed * f64::from(turn.columns)).round() as i64;
+        number.rem_euclid(i64::from(turn.columns)) as usize
     }
 
     /// Whether any pixel may show a reflection.

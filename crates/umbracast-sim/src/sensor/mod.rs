@@ -233,7 +233,7 @@ impl Outlook {
             painter
         };
         Self {
-            hall: Arc::new(HallImage::trace(site, &head.model, site_from_sensor)),
+            hall: Arc::new(HallImage::trace(site, head, site_from_sensor)),
             reflected: Panes::new(&site.simulation.panes).reflections().map(reflected).collect(),
             painter,
         }

@@ -42,16 +42,7 @@ impl View {
         let rays = columns.len() * beams.len();
         let mut image = RangeImage { beams, columns, range_m: vec![0.0; rays], reflectivity: vec![0; rays] };
         let mut mirrored = vec![Mirrored::NONE; if hall.has_panes() { rays } else { 0 }];
-        for b in 0..image.beams.len() {
-            for c in 0..image.columns.len() {
-                let pixel = c * image.beams.len() + b;
-                let (range_m, reflectivity, pane) = hall.at(&image, c, b);
-                (image.range_m[pixel], image.reflectivity[pixel]) = (range_m, reflectivity);
-                if let Some(mirrored) = mirrored.get_mut(pixel) {
-                    *mirrored = pane;
-                }
-            }
-        }
+        hall.show(&mut image, &mut mirrored);
         Self {
             hall_m: image.range_m.clone(),
             image,
