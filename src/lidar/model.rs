@@ -107,8 +107,9 @@ pub(super) enum Refused {
 
 /// Whole units of a range, 0 for what is negative, not a number or more than `most`.
 pub(super) fn units_of(range_m: f32, unit_m: f32, most: u32) -> u32 {
-    // The cast takes what is negative or not a number to 0.
-    let units = (range_m / unit_m).round() as u32;
+    // The cast takes what is negative or not a number to 0. Of what is not, the sum with a half is exact and its whole part what
+    // `round` gives, which is a call where it is no instruction.
+    let units = (f64::from(range_m / unit_m) + 0.5) as u32;
     if units > most { 0 } else { units }
 }
 

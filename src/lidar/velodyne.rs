@@ -146,22 +146,23 @@ impl Format for Velodyne {
     }
 
     fn encode(&self, model: &Model, columns: &[Column], range_m: &[f32], reflectivity: &[u8]) -> Vec<u8> {
-        let beams = model.beams.len();
-        let mut payload = Vec::with_capacity(PAYLOAD_BYTES);
-        for b in 0..BLOCKS {
-            let first = b * self.columns_per_block;
-            payload.extend_from_slice(&FLAG);
-            payload.extend_from_slice(&whole_azimuth_cdeg(model, columns, first).to_le_bytes());
-            for i in first * beams..(first + self.columns_per_block) * beams {
-                let range_m = range_m.get(i).copied().unwrap_or(0.0);
+        // Columns that are missing have no returns, which is 0.
+        let mut payload = vec![0; PAYLOAD_BYTES];
+        let (blocks, tail) = payload.split_at_mut(BLOCKS * BLOCK_BYTES);
+        let mut pixels = range_m.iter().zip(reflectivity);
+        for (b, block) in blocks.chunks_exact_mut(BLOCK_BYTES).enumerate() {
+            block[..2].copy_from_slice(&FLAG);
+            let azimuth_cdeg = whole_azimuth_cdeg(model, columns, b * self.columns_per_block);
+            block[2..4].copy_from_slice(&azimuth_cdeg.to_le_bytes());
+            for (bytes, (&range_m, &reflectivity)) in block[4..].chunks_exact_mut(3).zip(&mut pixels) {
                 let distance = units_of(range_m, RANGE_UNIT_M, u32::from(u16::MAX)) as u16;
-                payload.extend_from_slice(&distance.to_le_bytes());
-                payload.push(reflectivity.get(i).copied().unwrap_or(0));
+                let [low, high] = distance.to_le_bytes();
+                bytes.copy_from_slice(&[low, high, reflectivity]);
             }
         }
         let within_hour_us = columns[0].time_ns.rem_euclid(HOUR_NS) / 1000;
-        payload.extend_from_slice(&(within_hour_us as u32).to_le_bytes());
-        payload.extend_from_slice(&[STRONGEST, self.product_id]);
+        tail[..4].copy_from_slice(&(within_hour_us as u32).to_le_bytes());
+        tail[4..].copy_from_slice(&[STRONGEST, self.product_id]);
         payload
     }
 }
