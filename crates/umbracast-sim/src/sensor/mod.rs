@@ -185,6 +185,8 @@ impl Simulated {
         let beams = view.image.beams.len();
         let per_packet = self.head.packet_columns();
         let mut packets = Vec::new();
+        // Of the packet before.
+        let mut powered = (u64::MAX, false);
         for c in 0..view.image.columns.len() {
             let column = view.first_column + c as u64;
             let (number, within) = (column / per_packet, (column % per_packet) as usize);
@@ -192,7 +194,10 @@ impl Simulated {
             let (from, to) = (c * beams..(c + 1) * beams, within * beams..(within + 1) * beams);
             self.open.range_m[to.clone()].copy_from_slice(&view.image.range_m[from.clone()]);
             self.open.reflectivity[to].copy_from_slice(&view.image.reflectivity[from.clone()]);
-            if self.is_powered(number) {
+            if powered.0 != number {
+                powered = (number, self.is_powered(number));
+            }
+            if powered.1 {
                 let seen = view.owner[from.clone()].iter().zip(&view.image.range_m[from]);
                 for (&owner, _) in seen.filter(|&(&owner, &range_m)| owner != NOBODY && range_m > 0.0) {
                     returns[owner as usize] += 1;

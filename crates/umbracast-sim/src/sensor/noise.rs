@@ -89,14 +89,20 @@ impl Noise {
         let mut dark =
             self.dark_cloth.map(|dark| Wearers { share: dark.people, seed: self.seed, wears: Vec::new() });
         let per_column_rad = view.step_rad() as f32;
-        let scale = |(pixel, &range_m): (usize, &f32)| {
-            let slope = view.slope_m(pixel) / (range_m * per_column_rad);
+        let mut scales = view.slopes_m();
+        // Without a branch, for vector registers.
+        for (scale, &range_m) in scales.iter_mut().zip(&view.image.range_m) {
+            let slope = *scale / (range_m * per_column_rad);
             let per_cosine = (1.0 + slope * slope).sqrt();
-            let worn = dark.as_mut().is_some_and(|dark| dark.has(view.owner[pixel]));
-            let less = (1.0 + (range_m / TWICE_AT_M).powi(2)) * per_cosine * if worn { DARK } else { 1.0 };
-            less.sqrt().min(MOST)
-        };
-        view.image.range_m.iter().enumerate().map(scale).collect()
+            *scale = (1.0 + (range_m / TWICE_AT_M).powi(2)) * per_cosine;
+        }
+        if let Some(dark) = &mut dark {
+            for (scale, &owner) in scales.iter_mut().zip(&view.owner) {
+                *scale *= if dark.has(owner) { DARK } else { 1.0 };
+            }
+        }
+        scales.iter_mut().for_each(|less| *less = less.sqrt().min(MOST));
+        scales
     }
 
     /// Loses a share of what comes back of those who wear dark cloth: the same people for every sensor.

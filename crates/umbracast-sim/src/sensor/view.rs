@@ -78,6 +78,24 @@ impl View {
         if is_same && step_m < EDGE_M { step_m } else { 0.0 }
     }
 
+    /// [`Self::slope_m`] of every pixel.
+    pub fn slopes_m(&self) -> Vec<f32> {
+        let next = self.hall_m.get(self.image.beams.len()..).unwrap_or_default();
+        let mut slopes_m = Vec::with_capacity(self.hall_m.len());
+        // As if nobody stood before the hall, without a branch, for vector registers.
+        slopes_m.extend(self.hall_m.iter().zip(next).map(|(here_m, next_m)| {
+            let step_m = (next_m - here_m).abs();
+            if step_m < EDGE_M { step_m } else { 0.0 }
+        }));
+        for (pixel, slope_m) in slopes_m.iter_mut().enumerate() {
+            if self.owner[pixel] != NOBODY {
+                *slope_m = self.slope_m(pixel);
+            }
+        }
+        slopes_m.extend((slopes_m.len()..self.hall_m.len()).map(|pixel| self.slope_m(pixel)));
+        slopes_m
+    }
+
     /// From one column to the next.
     pub fn step_rad(&self) -> f64 {
         (0.01 * self.step_cdeg).to_radians()
