@@ -10,6 +10,7 @@ mod panes;
 mod hall;
 mod view;
 mod raster;
+mod gaps;
 mod edges;
 mod noise;
 mod survey;

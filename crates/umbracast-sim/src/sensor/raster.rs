@@ -6,6 +6,7 @@ use std::ops::{Range, RangeInclusive};
 use umbracast::geometry::{DVec2, DVec3, Pose};
 use umbracast::lidar::{Azimuths, Beam};
 
+use super::gaps::Gaps;
 use super::head::Head;
 use super::view::View;
 use crate::body::Walker;
@@ -35,6 +36,9 @@ pub struct Painter {
     start_m: Vec<DVec3>,
     end_m: Vec<DVec3>,
     bounds: Vec<Bounds>,
+    gaps: Gaps,
+    /// Triangles of a pass that may meet a beam.
+    crossing: Vec<u32>,
     azimuths: Azimuths,
 }
 
@@ -60,13 +64,13 @@ struct Pass {
 
 /// Where a vertex or a triangle is during a pass: least and greatest values.
 #[derive(Debug, Clone, Copy)]
-struct Bounds {
+pub(super) struct Bounds {
     /// Distance along the middle azimuth.
     ahead_m: (f64, f64),
     /// Tangent of the azimuth from the middle; holds where all of `ahead_m` is positive.
-    tangent: (f64, f64),
+    pub(super) tangent: (f64, f64),
     /// Rise over horizontal distance, from where any beam passes the axis.
-    slope: (f64, f64),
+    pub(super) slope: (f64, f64),
 }
 
 impl Painter {
@@ -90,6 +94,8 @@ impl Painter {
             aside_m: past_axis().map(|(_, aside_m)| aside_m).fold(0.0, f64::max),
             column_sweep_cdeg: (turned().fold(0.0, f64::min), turned().fold(0.0, f64::max)),
             steps: Steps::new(&beams),
+            gaps: Gaps::new(beams.iter().map(|b| b.slope)),
+            crossing: Vec::new(),
             beams,
             start_m: Vec::new(),
             end_m: Vec::new(),
@@ -175,47 +181,66 @@ impl Painter {
     }
 
     fn pass(&mut self, pass: &Pass, triangles: &[[u32; 3]], person: u32, view: &mut View) {
-        self.bound(pass.middle_cdeg);
-        for triangle in triangles {
-            let corners = triangle.map(|i| i as usize);
-            let bounds = corners.map(|i| self.bounds[i]).into_iter().reduce(Bounds::around);
-            let Some(bounds) = bounds.filter(|b| b.ahead_m.1 > 0.0) else { continue };
-            let width = bounds.tangent.1 - bounds.tangent.0;
-            let narrow = bounds.ahead_m.0 > 4.0 * self.aside_m && width < 1.0;
-            // By what a beam that does not pass through the axis seems turned and stretched, at most.
-            let aside = if narrow { self.aside_m / bounds.ahead_m.0 } else { 0.0 };
-            let (low, high) = match narrow {
-                true => stretched(bounds.slope, width * width + 4.0 * aside * aside),
-                false => self.slopes_near_axis(corners),
-            };
-            // Most triangles lie between two beams.
-            let first = self.steps.first_from(low, &self.beams);
-            if first == self.beams.len() || self.beams[first].slope > high {
-                continue;
+        let nearest_m = self.bound(pass.middle_cdeg);
+        if nearest_m > 4.0 * self.aside_m {
+            let aside = self.aside_m / nearest_m;
+            let mut crossing = std::mem::take(&mut self.crossing);
+            self.gaps.place(&self.bounds, nearest_m, aside);
+            self.gaps.crossing(triangles, &mut crossing);
+            for &triangle in &crossing {
+                self.triangle(pass, triangles[triangle as usize], person, view);
             }
-            let aside_cdeg = cdeg(aside.asin());
-            let (from_cdeg, to_cdeg) = if narrow {
-                let (from, to) = bounds.tangent;
-                (pass.middle_cdeg + cdeg(from.atan()), pass.middle_cdeg + cdeg(to.atan()))
-            } else {
-                (f64::NEG_INFINITY, f64::INFINITY)
-            };
-            for beam in self.beams[first..].iter().take_while(|b| b.slope <= high) {
-                let from = view.column_at(from_cdeg - beam.turned_cdeg - ROUNDING_CDEG - aside_cdeg).ceil();
-                let to = view.column_at(to_cdeg - beam.turned_cdeg + ROUNDING_CDEG + aside_cdeg).floor();
-                let from = from.max(*pass.columns.start() as f64);
-                let to = to.min(*pass.columns.end() as f64);
-                if from <= to {
-                    for column in from as usize..=to as usize {
-                        self.fire(pass, corners, column, beam.beam, person, view);
-                    }
+            self.crossing = crossing;
+        } else {
+            triangles.iter().for_each(|&triangle| self.triangle(pass, triangle, person, view));
+        }
+    }
+
+    /// Draws what beams meet of a triangle.
+    fn triangle(&self, pass: &Pass, triangle: [u32; 3], person: u32, view: &mut View) {
+        let corners = triangle.map(|i| i as usize);
+        let [a, b, c] = corners.map(|i| self.bounds[i]);
+        let bounds = a.around(b).around(c);
+        if bounds.ahead_m.1.is_nan() || bounds.ahead_m.1 <= 0.0 {
+            return;
+        }
+        let width = bounds.tangent.1 - bounds.tangent.0;
+        let narrow = bounds.ahead_m.0 > 4.0 * self.aside_m && width < 1.0;
+        // By what a beam that does not pass through the axis seems turned and stretched, at most.
+        let aside = if narrow { self.aside_m / bounds.ahead_m.0 } else { 0.0 };
+        let (low, high) = match narrow {
+            true => stretched(bounds.slope, width * width + 4.0 * aside * aside),
+            false => self.slopes_near_axis(corners),
+        };
+        let first = self.steps.first_from(low, &self.beams);
+        if first == self.beams.len() || self.beams[first].slope > high {
+            return;
+        }
+        let aside_cdeg = if aside > 0.0 { cdeg(aside.asin()) } else { 0.0 };
+        let (from_cdeg, to_cdeg) = if narrow {
+            let (from, to) = bounds.tangent;
+            (pass.middle_cdeg + cdeg(from.atan()), pass.middle_cdeg + cdeg(to.atan()))
+        } else {
+            (f64::NEG_INFINITY, f64::INFINITY)
+        };
+        let (start, end) = (*pass.columns.start() as f64, *pass.columns.end() as f64);
+        for beam in self.beams[first..].iter().take_while(|b| b.slope <= high) {
+            let from = view.column_at(from_cdeg - beam.turned_cdeg - ROUNDING_CDEG - aside_cdeg).max(start);
+            let to = view.column_at(to_cdeg - beam.turned_cdeg + ROUNDING_CDEG + aside_cdeg).min(end);
+            // The cast of what is not negative is its whole part.
+            let whole = from as usize;
+            let from = if (whole as f64) < from { whole + 1 } else { whole };
+            if from as f64 <= to {
+                for column in from..=to as usize {
+                    self.fire(pass, corners, column, beam.beam, person, view);
                 }
             }
         }
     }
 
-    /// Bounds of every vertex over the pass. Vertices move straight, so that what bounds both ends bounds the way.
-    fn bound(&mut self, middle_cdeg: f64) {
+    /// Bounds of every vertex over the pass, and the least distance along the middle azimuth. Vertices move straight, so that
+    /// what bounds both ends bounds the way.
+    fn bound(&mut self, middle_cdeg: f64) -> f64 {
         let (sin, cos) = (middle_cdeg * 0.01).to_radians().sin_cos();
         let at = |p: DVec3| {
             let ahead_m = p.x * cos - p.y * sin;
@@ -232,6 +257,7 @@ impl Painter {
         };
         self.bounds.clear();
         self.bounds.extend(self.start_m.iter().zip(&self.end_m).map(|(&a, &b)| at(a).around(at(b))));
+        self.bounds.iter().map(|bounds| bounds.ahead_m.0).fold(f64::INFINITY, f64::min)
     }
 
     /// Slopes of a triangle that reaches round the spin axis: only its height and its far end bound them.
@@ -316,7 +342,7 @@ fn past_axis(beam: &Beam) -> (f64, f64) {
 /// Slopes between corners are steeper than at them: a chord is nearer to the axis than its ends, by up to the
 /// cosine of half the angle between them. 1 / cos(w / 2) < 1 + w2 / 4 for w < 2, and w < the tangents' difference, whose
 /// square is given.
-fn stretched((low, high): (f64, f64), width_squared: f64) -> (f64, f64) {
+pub(super) fn stretched((low, high): (f64, f64), width_squared: f64) -> (f64, f64) {
     let stretch = 1.0 + width_squared * 0.25;
     (low.min(low * stretch), high.max(high * stretch))
 }
