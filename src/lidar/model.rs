@@ -90,7 +90,7 @@ pub(super) trait Format: Debug + Send + Sync {
     fn packet_bytes(&self, model: &Model) -> usize;
     /// Gives each column, in order of time, to `sink`, or none and why.
     fn decode(&self, model: &Model, received_ns: i64, payload: &[u8], sink: Sink) -> Result<(), Refused>;
-    /// The payload of columns that follow one another: what `packet::encode` promises.
+    /// The payload of columns that follow one another: what `packet::encode` promises. Ranges that are missing are no returns.
     fn encode(&self, model: &Model, columns: &[Column], range_m: &[f32], reflectivity: &[u8]) -> Vec<u8>;
 }
 

@@ -86,6 +86,20 @@ pub fn encode(
     Packet { time_ns: packet_time_ns, payload: model.format.encode(model, columns, range_m, reflectivity) }
 }
 
+/// The packet of columns without any return: what the sensor says of their times and azimuths.
+///
+/// # Panics
+/// When there is no column or more than a packet holds.
+#[doc(hidden)] // See `encode`.
+pub fn encode_columns(model: &Model, columns: &[Column], packet_time_ns: i64) -> Packet {
+    assert!(
+        (1..=columns_per_packet(model)).contains(&columns.len()),
+        "{} columns in a packet",
+        columns.len()
+    );
+    Packet { time_ns: packet_time_ns, payload: model.format.encode(model, columns, &[], &[]) }
+}
+
 #[cfg(test)]
 #[path = "packet_tests.rs"]
 pub(super) mod tests;

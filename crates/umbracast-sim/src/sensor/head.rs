@@ -90,13 +90,11 @@ impl Head {
     /// belong together. (A real head is up to 0.01 degrees beside what it reports.)
     pub fn reported(&self, columns: Range<u64>) -> Vec<Column> {
         let per_packet = self.packet_columns();
-        let rays = self.model.beams.len() * per_packet as usize;
-        let (ranges, reflectivities) = (vec![0.0; rays], vec![0; rays]);
         let mut reported = Vec::with_capacity((columns.end - columns.start) as usize);
         for packet in columns.start / per_packet..columns.end.div_ceil(per_packet) {
             let turn = self.turn(packet);
             let packet_ns = turn[0].time_ns;
-            let sent = packet::encode(&self.model, &turn, &ranges, &reflectivities, packet_ns);
+            let sent = packet::encode_columns(&self.model, &turn, packet_ns);
             let mut number = packet * per_packet;
             packet::decode(&self.model, &sent, &mut Health::default(), |column, _, _| {
                 if columns.contains(&number) {
