@@ -242,21 +242,24 @@ impl Painter {
     /// what bounds both ends bounds the way.
     fn bound(&mut self, middle_cdeg: f64) -> f64 {
         let (sin, cos) = (middle_cdeg * 0.01).to_radians().sin_cos();
-        let at = |p: DVec3| {
-            let ahead_m = p.x * cos - p.y * sin;
-            let tangent = -(p.x * sin + p.y * cos) / ahead_m;
-            let distance_m = p.truncate().length();
+        // Both ends abreast, for they divide and take roots in one instruction.
+        let over = |way: [DVec3; 2]| {
+            let ahead_m = way.map(|p| p.x * cos - p.y * sin);
+            let right_m = way.map(|p| -(p.x * sin + p.y * cos));
+            let tangent = [right_m[0] / ahead_m[0], right_m[1] / ahead_m[1]];
+            let squared = way.map(|p| p.x * p.x + p.y * p.y);
+            let distance_m = [squared[0].sqrt(), squared[1].sqrt()];
+            let inverse = [1.0 / distance_m[0], 1.0 / distance_m[1]];
+            let low = [0, 1].map(|end| (way[end].z - self.highest_origin_m) * inverse[end]);
+            let high = [0, 1].map(|end| (way[end].z - self.lowest_origin_m) * inverse[end]);
             Bounds {
-                ahead_m: (ahead_m, ahead_m),
-                tangent: (tangent, tangent),
-                slope: (
-                    (p.z - self.highest_origin_m) / distance_m,
-                    (p.z - self.lowest_origin_m) / distance_m,
-                ),
+                ahead_m: (ahead_m[0].min(ahead_m[1]), ahead_m[0].max(ahead_m[1])),
+                tangent: (tangent[0].min(tangent[1]), tangent[0].max(tangent[1])),
+                slope: (low[0].min(low[1]), high[0].max(high[1])),
             }
         };
         self.bounds.clear();
-        self.bounds.extend(self.start_m.iter().zip(&self.end_m).map(|(&a, &b)| at(a).around(at(b))));
+        self.bounds.extend(self.start_m.iter().zip(&self.end_m).map(|(&a, &b)| over([a, b])));
         self.bounds.iter().map(|bounds| bounds.ahead_m.0).fold(f64::INFINITY, f64::min)
     }
 
