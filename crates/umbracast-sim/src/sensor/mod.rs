@@ -36,6 +36,8 @@ use crate::body::Walker;
 #[derive(Debug, Clone)]
 pub struct Sensors {
     sensors: Vec<Simulated>,
+    /// The view before, for its buffers.
+    spent: Option<View>,
 }
 
 #[derive(Debug, Clone)]
@@ -81,7 +83,7 @@ impl Sensors {
                 .map_err(|error| error.within(format_args!("site.sensors.{}", sensor.name)))
         };
         let sensors = site.sensors.iter().enumerate().map(simulate).collect::<Result<_, _>>()?;
-        Ok(Self { sensors })
+        Ok(Self { sensors, spent: None })
     }
 
     /// Begins another scene in the same hall: as [`Sensors::new`] with this seed, without tracing the hall again.
@@ -106,7 +108,8 @@ impl Sensors {
     /// later. The returns are those of the columns that fire in this frame, as the assembler cuts frames.
     pub fn frame(&mut self, index: u64, walkers: &[Walker]) -> (Vec<Vec<Packet>>, Vec<u32>) {
         let mut returns = vec![0; walkers.len()];
-        let packets = self.sensors.iter_mut().map(|s| s.frame(index, walkers, &mut returns)).collect();
+        let spent = &mut self.spent;
+        let packets = self.sensors.iter_mut().map(|s| s.frame(index, walkers, &mut returns, spent)).collect();
         (packets, returns)
     }
 
@@ -159,18 +162,26 @@ impl Simulated {
         })
     }
 
-    fn frame(&mut self, index: u64, walkers: &[Walker], returns: &mut [u32]) -> Vec<Packet> {
-        let mut view = self.look(index, walkers);
+    fn frame(
+        &mut self,
+        index: u64,
+        walkers: &[Walker],
+        returns: &mut [u32],
+        spent: &mut Option<View>,
+    ) -> Vec<Packet> {
+        let mut view = self.look(index, walkers, spent.take());
         self.noise.measure(index, &mut view);
-        self.send(&view, returns)
+        let packets = self.send(&view, returns);
+        *spent = Some(view);
+        packets
     }
 
     /// What is really there.
-    fn look(&mut self, index: u64, walkers: &[Walker]) -> View {
+    fn look(&mut self, index: u64, walkers: &[Walker], spent: Option<View>) -> View {
         let time_ns = index as i64 * umbracast::STEP_NS;
         let later = self.later.iter_mut().rev().find(|(after_ns, _)| time_ns >= *after_ns);
         let outlook = later.map_or(&mut self.outlook, |(_, outlook)| outlook);
-        let mut view = View::of_hall(&outlook.hall, &self.head, index);
+        let mut view = View::of_hall(&outlook.hall, &self.head, index, spent);
         for (pane, painter) in (0..).zip(std::iter::once(&mut outlook.painter).chain(&mut outlook.reflected))
         {
             view.pane = pane;

@@ -66,14 +66,15 @@ impl Noise {
         if let Some(dark) = &self.dark_cloth {
             self.swallow(dark, view, &mut stream(scene_and_sensor, "dark cloth", frame));
         }
-        let scales = self.scales(view);
+        let mut scales = std::mem::take(&mut view.scales);
+        self.scales(view, &mut scales);
         let image = &mut view.image;
         let mut range_draws = stream(scene_and_sensor, "range noise", frame);
         let mut loss_draws = stream(scene_and_sensor, "drop-outs", frame);
         // The draw is below this for the given share of 64-bit numbers; the cast saturates.
         let lost_below = (self.dropout * 2.0_f64.powi(64)) as u64;
         for ((range_m, reflectivity), scale) in
-            image.range_m.iter_mut().zip(&mut image.reflectivity).zip(scales)
+            image.range_m.iter_mut().zip(&mut image.reflectivity).zip(&scales)
         {
             let noise: f32 = StandardNormal.sample(&mut range_draws);
             *range_m += self.range_bias_m + self.range_noise_m * scale * noise;
@@ -82,14 +83,15 @@ impl Noise {
                 (*range_m, *reflectivity) = (0.0, 0);
             }
         }
+        view.scales = scales;
     }
 
-    /// How many times as much as the data sheet says each pixel's range errs.
-    pub(super) fn scales(&self, view: &View) -> Vec<f32> {
+    /// Writes how many times as much as the data sheet says each pixel's range errs.
+    pub(super) fn scales(&self, view: &View, scales: &mut Vec<f32>) {
         let mut dark =
             self.dark_cloth.map(|dark| Wearers { share: dark.people, seed: self.seed, wears: Vec::new() });
         let per_column_rad = view.step_rad() as f32;
-        let mut scales = view.slopes_m();
+        view.slopes_m(scales);
         // Without a branch, for vector registers.
         for (scale, &range_m) in scales.iter_mut().zip(&view.image.range_m) {
             let slope = *scale / (range_m * per_column_rad);
@@ -102,7 +104,6 @@ impl Noise {
             }
         }
         scales.iter_mut().for_each(|less| *less = less.sqrt().min(MOST));
-        scales
     }
 
     /// Loses a share of what comes back of those who wear dark cloth: the same people for every sensor.

@@ -44,7 +44,7 @@ impl Survey {
     /// With the sensors of that site, in its order.
     pub fn new(site: &Site, sensors: &Sensors) -> Self {
         let lookout = |(simulated, sensor): (&Simulated, &umbracast::site::Sensor)| {
-            let view = View::of_hall(&simulated.outlook.hall, &simulated.head, 0);
+            let view = View::of_hall(&simulated.outlook.hall, &simulated.head, 0, None);
             Lookout {
                 site_from_sensor: sensor.site_from_sensor(),
                 painter: simulated.outlook.painter.clone(),

@@ -125,7 +125,7 @@ fn assert_as_the_oracle_sees(
     let oracle = Oracle::new(site, walkers);
     let (mut rays, mut bodies, mut differences) = (0, 0, Vec::new());
     for (simulated, sensor) in sensors.sensors.iter_mut().zip(&site.sensors) {
-        let view = simulated.look(frame, walkers);
+        let view = simulated.look(frame, walkers, None);
         let (apart, compared) = oracle.compare(sensor, &view.image, stride);
         differences.extend(apart);
         rays += compared;
@@ -160,7 +160,7 @@ fn columns_come_out_of_the_decoder_when_and_where_they_were_fired() {
         let mut site = site();
         site.sensors[0].model = model.into();
         let mut sensors = Sensors::new(&site, 0).unwrap();
-        let views: Vec<View> = (0..3).map(|k| sensors.sensors[0].look(k, &[])).collect();
+        let views: Vec<View> = (0..3).map(|k| sensors.sensors[0].look(k, &[], None)).collect();
         let mut packets: Vec<Packet> = (0..3).flat_map(|k| sensors.frame(k, &[]).0.swap_remove(0)).collect();
         packets.extend(sensors.flush().swap_remove(0));
         let decoded = decoded(&sensors, 0, &packets);
@@ -216,7 +216,7 @@ fn points_lie_on_a_moving_body_at_the_time_they_carry() {
     site.sensors.iter_mut().for_each(|sensor| sensor.range_noise_m = 0.0);
     let mut sensors = Sensors::new(&site, 1).unwrap();
     let walkers = [walker(0, 0.3, 4.5)];
-    let empty: Vec<View> = sensors.sensors.iter_mut().map(|s| s.look(4, &[])).collect();
+    let empty: Vec<View> = sensors.sensors.iter_mut().map(|s| s.look(4, &[], None)).collect();
     let packets = sensors.frame(4, &walkers).0;
     let (mut points, mut late) = (0, 0);
     for (sensor, view) in empty.iter().enumerate() {
@@ -248,9 +248,10 @@ fn points_lie_on_a_moving_body_at_the_time_they_carry() {
 fn noise_and_drop_outs_have_the_given_statistics() {
     let mut sensors = Sensors::new(&site(), 5).unwrap();
     let simulated = &mut sensors.sensors[0];
-    let mut view = simulated.look(0, &[]);
+    let mut view = simulated.look(0, &[], None);
     let truth = view.image.range_m.clone();
-    let scales = simulated.noise.scales(&view);
+    let mut scales = Vec::new();
+    simulated.noise.scales(&view, &mut scales);
     simulated.noise.measure(0, &mut view);
     let errors: Vec<f64> = truth
         .iter()
@@ -273,8 +274,9 @@ fn noise_and_drop_outs_have_the_given_statistics() {
 fn ranges_err_more_far_away_and_on_slant_surfaces() {
     let mut sensors = Sensors::new(&site(), 5).unwrap();
     let simulated = &mut sensors.sensors[0];
-    let view = simulated.look(0, &[]);
-    let scales = simulated.noise.scales(&view);
+    let view = simulated.look(0, &[], None);
+    let mut scales = Vec::new();
+    simulated.noise.scales(&view, &mut scales);
     let of = |wanted: &dyn Fn(f32, f32) -> bool| {
         let pixels = (0..scales.len()).filter(|&i| wanted(view.image.range_m[i], view.slope_m(i)));
         let scales: Vec<f32> = pixels.map(|i| scales[i]).collect();
@@ -328,7 +330,7 @@ fn a_surveyed_body_gives_the_returns_that_it_gives_in_a_scene() {
     for (x, y) in [(0.0, 0.0), (-12.0, 12.0), (-15.5, 0.0), (3.0, -9.0)] {
         let there = [standing(x, y)];
         let rays = |sensor: &mut Simulated| {
-            let owner = sensor.look(0, &there).owner;
+            let owner = sensor.look(0, &there, None).owner;
             owner.iter().filter(|&&owner| owner != NOBODY).count() as f64
         };
         let expected: Vec<f64> = sensors.sensors.iter_mut().map(rays).collect();
@@ -357,8 +359,8 @@ fn a_person_before_a_mirror_is_shown_behind_it_as_nobodys_body() {
     site.simulation.panes = vec![mirror];
     let mut sensors = Sensors::new(&site, 0).unwrap();
     let walkers = [walker(0, f64::to_radians(60.0), 3.0)];
-    let empty = sensors.sensors[0].look(4, &[]);
-    let view = sensors.sensors[0].look(4, &walkers);
+    let empty = sensors.sensors[0].look(4, &[], None);
+    let view = sensors.sensors[0].look(4, &walkers, None);
     let site_from_sensor = site.sensors[0].site_from_sensor();
     let (mut straight, mut reflected) = (0, 0);
     for c in 0..view.image.columns.len() {

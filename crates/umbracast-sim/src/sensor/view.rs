@@ -30,29 +30,49 @@ pub struct View {
     hall_m: Vec<f32>,
     /// Empty in a hall without panes.
     mirrored: Vec<Mirrored>,
+    /// How many times as much as the data sheet says each pixel's range errs, once it is measured.
+    pub scales: Vec<f32>,
 }
 
 impl View {
-    /// The empty hall in frame `index`.
-    pub fn of_hall(hall: &HallImage, head: &Head, index: u64) -> Self {
+    /// The empty hall in frame `index`. A view that is no longer needed gives its buffers: new ones are pages that the system has
+    /// to clear.
+    pub fn of_hall(hall: &HallImage, head: &Head, index: u64, spent: Option<Self>) -> Self {
         let columns = head.frame_columns(index);
         let first_column = columns.start;
         let beams = head.model.beams.clone();
         let columns = head.reported(columns);
         let rays = columns.len() * beams.len();
-        let mut image = RangeImage { beams, columns, range_m: vec![0.0; rays], reflectivity: vec![0; rays] };
-        let mut mirrored = vec![Mirrored::NONE; if hall.has_panes() { rays } else { 0 }];
-        hall.show(&mut image, &mut mirrored);
-        Self {
-            hall_m: image.range_m.clone(),
-            image,
-            owner: vec![NOBODY; rays],
+        let mut view = spent.unwrap_or_else(|| Self {
+            image: RangeImage {
+                beams: beams.clone(),
+                columns: Vec::new(),
+                range_m: Vec::new(),
+                reflectivity: Vec::new(),
+            },
+            owner: Vec::new(),
             first_column,
-            first_cdeg: head.turned_cdeg(head.time_ns(first_column)),
+            first_cdeg: 0.0,
             pane: 0,
-            step_cdeg: head.rate_cdeg_per_ns * head.model.column_period_ns,
-            mirrored,
-        }
+            step_cdeg: 0.0,
+            hall_m: Vec::new(),
+            mirrored: Vec::new(),
+            scales: Vec::new(),
+        });
+        (view.image.beams, view.image.columns) = (beams, columns);
+        // All of it is written below.
+        view.image.range_m.resize(rays, 0.0);
+        view.image.reflectivity.resize(rays, 0);
+        view.mirrored.resize(if hall.has_panes() { rays } else { 0 }, Mirrored::NONE);
+        hall.show(&mut view.image, &mut view.mirrored);
+        view.hall_m.clone_from(&view.image.range_m);
+        view.owner.clear();
+        view.owner.resize(rays, NOBODY);
+        view.first_column = first_column;
+        view.first_cdeg = head.turned_cdeg(head.time_ns(first_column));
+        view.pane = 0;
+        view.step_cdeg = head.rate_cdeg_per_ns * head.model.column_period_ns;
+        view
     }
 
     /// Which column's first beam looks along an azimuth that is not wrapped.
@@ -78,10 +98,10 @@ impl View {
         if is_same && step_m < EDGE_M { step_m } else { 0.0 }
     }
 
-    /// [`Self::slope_m`] of every pixel.
-    pub fn slopes_m(&self) -> Vec<f32> {
+    /// Writes [`Self::slope_m`] of every pixel.
+    pub fn slopes_m(&self, slopes_m: &mut Vec<f32>) {
         let next = self.hall_m.get(self.image.beams.len()..).unwrap_or_default();
-        let mut slopes_m = Vec::with_capacity(self.hall_m.len());
+        slopes_m.clear();
         // As if nobody stood before the hall, without a branch, for vector registers.
         slopes_m.extend(self.hall_m.iter().zip(next).map(|(here_m, next_m)| {
             let step_m = (next_m - here_m).abs();
@@ -93,7 +113,6 @@ impl View {
             }
         }
         slopes_m.extend((slopes_m.len()..self.hall_m.len()).map(|pixel| self.slope_m(pixel)));
-        slopes_m
     }
 
     /// From one column to the next.
