@@ -56,17 +56,26 @@ impl Gaps {
         self.width = width as f32;
         // A little more for what tangents lose as `f32`.
         let square = 1.01 * width * width + 4.0 * aside * aside;
-        let last = (self.beams.len() - 1) as f64;
-        let step = |slope: f64| {
-            let step = (slope - self.lowest) * self.steps_per_slope + 2.0;
-            self.beams[step.clamp(0.0, last) as i32 as usize]
-        };
-        self.corners.clear();
-        self.corners.extend(bounds.iter().map(|bounds| {
+        let mut corners = std::mem::take(&mut self.corners);
+        corners.clear();
+        corners.extend(bounds.iter().map(|bounds| {
             let (low, high) = stretched(bounds.slope, square);
             let (from, to) = bounds.tangent;
-            Vec4::new(step(low)[0], step(high)[1], from as f32, -to as f32)
+            Vec4::new(self.at(low)[0], self.at(high)[1], from as f32, -to as f32)
         }));
+        self.corners = corners;
+    }
+
+    /// So many beams at least have a lower slope, none for what is not a number; all but a beam or so.
+    pub fn lower_beams(&self, slope: f64) -> usize {
+        self.at(slope)[0] as usize
+    }
+
+    #[inline]
+    fn at(&self, slope: f64) -> [f32; 2] {
+        let step = (slope - self.lowest) * self.steps_per_slope + 2.0;
+        // The cast takes what is not a number to 0.
+        self.beams[step.clamp(0.0, (self.beams.len() - 1) as f64) as i32 as usize]
     }
 
     /// The triangles that may meet a beam, by number.

@@ -24,7 +24,6 @@ pub struct Painter {
     sensor_from_site: Pose,
     /// From the lowest to the highest.
     beams: Vec<SlopedBeam>,
-    steps: Steps,
     /// Of the beams where they pass the sensor's axis, above the sensor's origin.
     lowest_origin_m: f64,
     highest_origin_m: f64,
@@ -93,7 +92,6 @@ impl Painter {
             highest_origin_m: past_axis().map(|(z_m, _)| z_m).fold(f64::NEG_INFINITY, f64::max),
             aside_m: past_axis().map(|(_, aside_m)| aside_m).fold(0.0, f64::max),
             column_sweep_cdeg: (turned().fold(0.0, f64::min), turned().fold(0.0, f64::max)),
-            steps: Steps::new(&beams),
             gaps: Gaps::new(beams.iter().map(|b| b.slope)),
             crossing: Vec::new(),
             beams,
@@ -212,7 +210,8 @@ impl Painter {
             true => stretched(bounds.slope, width * width + 4.0 * aside * aside),
             false => self.slopes_near_axis(corners),
         };
-        let first = self.steps.first_from(low, &self.beams);
+        let lower = self.gaps.lower_beams(low);
+        let first = lower + self.beams[lower..].iter().take_while(|b| b.slope < low).count();
         if first == self.beams.len() || self.beams[first].slope > high {
             return;
         }
@@ -286,40 +285,6 @@ impl Painter {
         if let Some(range_m) = meet(origin_m, direction, triangle_m) {
             view.show(c, b, range_m as f32, REFLECTIVITY, person);
         }
-    }
-}
-
-/// A table of even steps of slope: for each step the first beam that is not below it, so that a beam is found in a step or two.
-#[derive(Debug, Clone)]
-struct Steps {
-    lowest: f64,
-    per_slope: f64,
-    first: Vec<usize>,
-}
-
-impl Steps {
-    /// Several to a beam.
-    const PER_BEAM: usize = 8;
-
-    fn new(beams: &[SlopedBeam]) -> Self {
-        let (lowest, highest) =
-            (beams.first().map_or(0.0, |b| b.slope), beams.last().map_or(0.0, |b| b.slope));
-        let count = Self::PER_BEAM * beams.len().max(1);
-        let per_slope = count as f64 / (highest - lowest).max(1e-6);
-        let from = |step: usize| lowest + step as f64 / per_slope;
-        let first = (0..=count).map(|step| beams.partition_point(|b| b.slope < from(step))).collect();
-        Self { lowest, per_slope, first }
-    }
-
-    /// The first beam with at least this slope; one past the last where there is none.
-    fn first_from(&self, slope: f64, beams: &[SlopedBeam]) -> usize {
-        // NaN and slopes below all beams count as the lowest. One step less, for rounding may have led one too far.
-        let step = (((slope - self.lowest) * self.per_slope) as usize).saturating_sub(1);
-        let mut first = self.first[step.min(self.first.len() - 1)];
-        while beams.get(first).is_some_and(|b| b.slope < slope) {
-            first += 1;
-        }
-        first
     }
 }
 
