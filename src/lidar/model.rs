@@ -126,3 +126,18 @@ pub(super) fn whole_azimuth_cdeg(model: &Model, columns: &[Column], c: usize) ->
 pub(super) fn letters(name: &str) -> String {
     name.to_ascii_lowercase().replace(['-', '_', ' '], "")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::units_of;
+
+    #[test]
+    fn units_are_rounded_as_round_does() {
+        let halves = (0..200_000).map(|k| k as f32 * 0.5);
+        let ranges_m = halves.flat_map(|range_m| [range_m, range_m.next_up(), range_m.next_down()]);
+        let odd = [8_388_609.0, 3e9, 1e20, f32::INFINITY, f32::NAN, -0.3, -0.7, -1e20];
+        for range_m in ranges_m.chain(odd) {
+            assert_eq!(units_of(range_m, 1.0, u32::MAX), range_m.round() as u32, "{range_m}");
+        }
+    }
+}

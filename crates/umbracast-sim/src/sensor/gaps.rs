@@ -91,3 +91,27 @@ impl Gaps {
         crossing.truncate(count);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_beam_is_taken_for_lower_or_higher_than_it_is() {
+        let slopes = [-0.6, -0.25, -0.24, 0.0, 0.0, 0.19];
+        let gaps = Gaps::new(slopes.into_iter());
+        let even = (-1_000..1_000).map(|k| f64::from(k) * 1e-3);
+        let at_beams = slopes.iter().flat_map(|slope| [slope.next_down(), *slope, slope.next_up()]);
+        for slope in even.chain(at_beams).chain([f64::NEG_INFINITY, f64::INFINITY]) {
+            let [lower, not_higher] = gaps.at(slope);
+            let beams = |is: &dyn Fn(f64) -> bool| slopes.iter().filter(|&&beam| is(beam)).count() as f32;
+            // Two steps of the table.
+            let near = 2.0 * 0.79 / 192.0;
+            assert!(lower <= beams(&|beam| beam < slope), "{slope}");
+            assert!(lower >= beams(&|beam| beam < slope - near), "{slope}");
+            assert!(-not_higher >= beams(&|beam| beam <= slope), "{slope}");
+            assert!(-not_higher <= beams(&|beam| beam <= slope + near), "{slope}");
+        }
+        assert_eq!(gaps.lower_beams(f64::NAN), 0);
+    }
+}

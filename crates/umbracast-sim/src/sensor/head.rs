@@ -121,7 +121,24 @@ fn within_turn(azimuth_cdeg: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::within_turn;
+    use umbracast::Config;
+    use umbracast::lidar::Model;
+
+    use super::{Head, within_turn};
+
+    #[test]
+    fn a_column_fires_in_the_whole_nanosecond_that_is_nearest() {
+        for model in ["hdl-32e", "vlp-16", "os0-32", "xt32"] {
+            let head = Head::new(Model::by_name(model).unwrap(), &Config::default().site.sensors[0]);
+            let (period_ns, columns) = (head.model.column_period_ns, head.packet_columns());
+            for column in (0..100_000).chain(1 << 40..(1 << 40) + 100) {
+                let (first, within) = (column - column % columns, column % columns);
+                let packet_us = (first as f64 * period_ns).floor() as i64 / 1000;
+                let expected_ns = packet_us * 1000 + (within as f64 * period_ns).round() as i64;
+                assert_eq!(head.time_ns(column), expected_ns, "{model}, {column}");
+            }
+        }
+    }
 
     #[test]
     fn an_azimuth_within_the_turn_is_the_euclidean_remainder_to_the_last_bit() {
