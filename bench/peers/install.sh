@@ -65,9 +65,9 @@ python_peers() {
         without "an environment for Python"
         return
     fi
-    # One by one, so that a package that cannot be had costs its own row alone.
+    # One by one, so that a package that cannot be had costs its own row alone; none brings another version of one before it.
     for package in $(grep -v '^#' "$here/requirements.txt"); do
-        "$built/bin/pip" install --quiet "$package" || without "$package"
+        "$built/bin/pip" install --quiet --constraint "$here/requirements.txt" "$package" || without "$package"
     done
 }
 
