@@ -4,9 +4,10 @@
 use std::cmp::Reverse;
 
 use super::association::{Assignment, FORBIDDEN, in_order};
-use super::attached::Beside;
+use super::attached::{Beside, REACH_M};
 use super::followed::{Track, seconds};
 use super::gaussian::{inverted, plus, quadratic, round};
+use super::neighbours::Neighbours;
 use super::noise::{noise, sway};
 use super::numbers::Numbers;
 use super::origin::BESIDE_M;
@@ -73,6 +74,7 @@ struct Memory {
     expected: Vec<Expected>,
     /// Of people, then also of who is born.
     places_m: Vec<DVec2>,
+    neighbours: Neighbours,
     /// Which of them have a detection in this frame.
     seen: Vec<bool>,
     assignment: Assignment,
@@ -213,7 +215,8 @@ impl MixtureTracker {
 
     fn correct(&mut self, time_ns: i64, last_ns: i64, detections: &[Detection]) {
         let Self { numbers, people, memory, visibility, .. } = self;
-        let Memory { order, expected, assignment, places_m, .. } = memory;
+        let Memory { order, expected, assignment, places_m, neighbours, .. } = memory;
+        neighbours.renew(places_m.iter().copied());
         let step_s = seconds(last_ns, time_ns);
         for ((person, given), expected) in people.iter_mut().zip(&assignment.column_of).zip(expected) {
             let detection = given.map(|d| &detections[order[d]]);
@@ -223,9 +226,9 @@ impl MixtureTracker {
                 Some(detection) => {
                     person.matched(numbers, detection, &expected.view, visibility, time_ns, step_s);
                     let at_m = person.filter.position_m();
-                    let near = |place: &&DVec2| place.distance_squared(at_m) < ALONE_M * ALONE_M;
+                    let near = |k: &usize| places_m[*k].distance_squared(at_m) < ALONE_M * ALONE_M;
                     // The person is one of them.
-                    if numbers.shape && places_m.iter().filter(near).nth(1).is_none() {
+                    if numbers.shape && neighbours.about(at_m, ALONE_M).filter(near).nth(1).is_none() {
                         person.see_alone(detection, &expected.view);
                     }
                 }
@@ -238,30 +241,32 @@ impl MixtureTracker {
     /// Counts how long each track has stood where a track of more matches stands. All are judged on the same places,
     /// so the order does not matter.
     fn mark_duplicates(&mut self, step_s: f64) {
-        let Memory { ranks, places_m, .. } = &mut self.memory;
+        let Memory { ranks, places_m, neighbours, .. } = &mut self.memory;
         ranks.clear();
         ranks.extend(self.people.iter().map(|p| (Reverse(p.confirmed), Reverse(p.matches), p.id)));
         places_m.clear();
         places_m.extend(self.people.iter().map(|p| p.filter.position_m()));
+        neighbours.renew(places_m.iter().copied());
         for i in 0..self.people.len() {
             let place_m = places_m[i];
             let doubles = |k: usize| places_m[k].distance(place_m) < DUPLICATE_M && ranks[k] < ranks[i];
-            let doubled = (0..self.people.len()).any(doubles);
+            let doubled = neighbours.about(place_m, DUPLICATE_M).any(doubles);
             let person = &mut self.people[i];
             person.doubled_s = if doubled { person.doubled_s + step_s } else { 0.0 };
         }
     }
 
-    /// Finds who moves with somebody.
+    /// Finds who moves with somebody, of those who were just found to be near each other.
     fn mark_attached(&mut self, step_s: f64) {
         if !self.numbers.things {
             return;
         }
-        let beside = &mut self.memory.beside;
+        let Memory { beside, neighbours, .. } = &mut self.memory;
         beside.clear();
         beside.extend(self.people.iter().map(Person::beside));
         for (person, thing) in self.people.iter_mut().zip(&*beside) {
-            person.attached.look(thing, beside, step_s);
+            let near = || neighbours.about(thing.position_m, REACH_M).map(|k| &beside[k]);
+            person.attached.look(thing, near, step_s);
         }
     }
 

@@ -23,6 +23,7 @@ mod noise;
 mod shape;
 mod followed;
 mod origin;
+mod neighbours;
 mod attached;
 mod person;
 mod given;
