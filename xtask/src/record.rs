@@ -79,7 +79,7 @@ const JOBS: [Job; 55] = [
     job("tripods", "from two sensors on tripods to warnings, command by command", 2, Needs::Nothing, calibrate::tripods),
     job("logictronix", "real people before a real VLP-16", 1, Needs::Data, logictronix::logictronix),
     job("speed", "how long a frame takes, in every mode", 1, Needs::Nothing, house::speed),
-    job("growth", "how long a step takes with more people and access points", 5, Needs::Nothing, house::growth),
+    job("growth", "how long a step takes with more people, sensors and access points", 11, Needs::Nothing, house::growth),
     job("peers", "the same work by other programs", 15, Needs::Asking, house::peers),
     job("instructions", "how many instructions a frame takes", 10, Needs::Program("valgrind"), house::instructions),
     job("soak", "a day of people, as fast as it goes, and an hour live: memory, time, numbers", 35, Needs::Asking, live::soak),
