@@ -115,15 +115,15 @@ impl Attached {
     }
 
     /// Looks at all within [`REACH_M`], `step_s` later; others may be among them, in any order.
-    pub(super) fn look<'a, Near: Iterator<Item = &'a Beside>>(
+    pub(super) fn look<'a>(
         &mut self,
         thing: &Beside,
-        near: impl Fn() -> Near,
+        mut near: impl Iterator<Item = &'a Beside> + Clone,
         step_s: f64,
     ) {
         let is_long = |body: &Beside| thing.diagonal_m > body.long_share(thing) * thing.shown_top_m;
         let off_m2 = |body: &&Beside| body.position_m.distance_squared(thing.position_m);
-        let bodies = near().filter(|body| body.may_move(thing) && is_long(body));
+        let bodies = near.clone().filter(|body| body.may_move(thing) && is_long(body));
         let nearest = bodies.min_by(|a, b| off_m2(a).total_cmp(&off_m2(b)).then(a.id.cmp(&b.id)));
         self.owner = nearest.map(|body| body.id).or(self.owner);
         if nearest.is_some() {
@@ -135,7 +135,7 @@ impl Attached {
         // Of a body as new nothing but a prior tells the height; what it shows does.
         let is_low_beside =
             |body: &Beside| body.is_over(thing) && thing.shown_top_m < HEIGHT_SHARE * body.shown_top_m;
-        self.is_undecided = self.watched_s < DECIDED_AFTER_S && near().any(is_low_beside);
+        self.is_undecided = self.watched_s < DECIDED_AFTER_S && near.any(is_low_beside);
         self.is_thing = self.lasted_s > if self.is_thing { 0.0 } else { THING_AFTER_S };
     }
 }
@@ -149,14 +149,10 @@ mod tests {
         Beside { id: 0, position_m, velocity_mps, height_m: 1.75, shown_top_m, diagonal_m }
     }
 
-    fn look(attached: &mut Attached, thing: &Beside, all: &[Beside]) {
-        attached.look(thing, || all.iter(), 0.1);
-    }
-
     /// Whether it is a thing after a second beside somebody at the origin who walks along x.
     fn is_thing(thing: Beside) -> bool {
         let mut attached = Attached::default();
-        (0..10).for_each(|_| look(&mut attached, &thing, &[thing, beside(0.0, 0.0, 1.75, 0.6)]));
+        (0..10).for_each(|_| attached.look(&thing, [thing, beside(0.0, 0.0, 1.75, 0.6)].iter(), 0.1));
         attached.is_thing()
     }
 
@@ -177,12 +173,12 @@ mod tests {
         let (pram, owner) = (beside(1.0, 0.0, 1.0, 0.7), Beside { id: 7, ..beside(0.0, 0.0, 1.75, 0.6) });
         let farther = Beside { id: 8, ..beside(-0.2, 0.1, 1.75, 0.6) };
         let mut attached = Attached::default();
-        (0..30).for_each(|_| look(&mut attached, &pram, &[pram, farther, owner]));
+        (0..30).for_each(|_| attached.look(&pram, [pram, farther, owner].iter(), 0.1));
         assert_eq!(attached.part_of(), Some(7));
-        (0..100).for_each(|_| look(&mut attached, &pram, &[pram]));
+        (0..100).for_each(|_| attached.look(&pram, [pram].iter(), 0.1));
         assert_eq!(attached.part_of(), Some(7), "nobody is as long and low");
         let stands_up = Beside { shown_top_m: 1.6, diagonal_m: 0.5, ..pram };
-        (0..30).for_each(|_| look(&mut attached, &stands_up, &[stands_up]));
+        (0..30).for_each(|_| attached.look(&stands_up, [stands_up].iter(), 0.1));
         assert_eq!(attached.part_of(), None, "it was somebody");
     }
 
@@ -191,12 +187,12 @@ mod tests {
         let (child, parent) = (beside(0.1, 0.5, 1.1, 0.4), beside(0.0, 0.0, 1.75, 0.6));
         let mut attached = Attached::default();
         let after = |frames: u32, attached: &mut Attached| {
-            (0..frames).for_each(|_| look(attached, &child, &[child, parent]));
+            (0..frames).for_each(|_| attached.look(&child, [child, parent].iter(), 0.1));
             attached.is_undecided()
         };
         assert_eq!([after(3, &mut attached), after(10, &mut attached)], [true, false]);
         let (mut among_children, other) = (Attached::default(), beside(0.5, 0.4, 1.2, 0.4));
-        look(&mut among_children, &child, &[child, other]);
+        among_children.look(&child, [child, other].iter(), 0.1);
         assert!(!among_children.is_undecided());
     }
 }

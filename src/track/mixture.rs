@@ -265,7 +265,7 @@ impl MixtureTracker {
         beside.clear();
         beside.extend(self.people.iter().map(Person::beside));
         for (person, thing) in self.people.iter_mut().zip(&*beside) {
-            let near = || neighbours.about(thing.position_m, REACH_M).map(|k| &beside[k]);
+            let near = neighbours.about(thing.position_m, REACH_M).map(|k| &beside[k]);
             person.attached.look(thing, near, step_s);
         }
     }

@@ -17,7 +17,7 @@ impl Neighbours {
     }
 
     /// The numbers of all places within `reach_m` of a place along x, and of no others; in no order that means anything.
-    pub(super) fn about(&self, at_m: DVec2, reach_m: f64) -> impl Iterator<Item = usize> {
+    pub(super) fn about(&self, at_m: DVec2, reach_m: f64) -> impl Iterator<Item = usize> + Clone {
         let first = self.by_x.partition_point(|(x, _)| at_m.x - x > reach_m);
         let within = move |(x, _): &&(f64, usize)| x - at_m.x <= reach_m;
         self.by_x[first..].iter().take_while(within).map(|(_, i)| *i)

@@ -3,12 +3,33 @@
 
 use glam::Vec4;
 
-use super::raster::{Bounds, stretched};
-
 /// Triangles are seldom longer; those that are always may meet a beam.
 const SIDE_M: f64 = 0.25;
 /// Of a step, for rounding.
 const MARGIN: f64 = 1e-3;
+
+/// Where a vertex or a triangle is during a pass: least and greatest values.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds {
+    /// Distance along the middle azimuth.
+    pub ahead_m: (f64, f64),
+    /// Tangent of the azimuth from the middle; holds where all of `ahead_m` is positive.
+    pub tangent: (f64, f64),
+    /// Rise over horizontal distance, from where any beam passes the axis.
+    pub slope: (f64, f64),
+}
+
+impl Bounds {
+    /// What bounds both.
+    pub fn around(self, other: Self) -> Self {
+        let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+        Self {
+            ahead_m: both(self.ahead_m, other.ahead_m),
+            tangent: both(self.tangent, other.tangent),
+            slope: both(self.slope, other.slope),
+        }
+    }
+}
 
 /// Finds the triangles that may meet a beam. Keeps its buffer.
 #[derive(Debug, Clone)]
@@ -90,6 +111,14 @@ impl Gaps {
         }
         crossing.truncate(count);
     }
+}
+
+/// Slopes between corners are steeper than at them: a chord is nearer to the axis than its ends, by up to the
+/// cosine of half the angle between them. 1 / cos(w / 2) < 1 + w2 / 4 for w < 2, and w < the tangents' difference, whose
+/// square is given.
+pub fn stretched((low, high): (f64, f64), width_squared: f64) -> (f64, f64) {
+    let stretch = 1.0 + width_squared * 0.25;
+    (low.min(low * stretch), high.max(high * stretch))
 }
 
 #[cfg(test)]

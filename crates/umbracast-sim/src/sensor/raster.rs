@@ -6,7 +6,7 @@ use std::ops::{Range, RangeInclusive};
 use umbracast::geometry::{DVec2, DVec3, Pose};
 use umbracast::lidar::{Azimuths, Beam};
 
-use super::gaps::Gaps;
+use super::gaps::{Bounds, Gaps, stretched};
 use super::head::Head;
 use super::view::View;
 use crate::body::Walker;
@@ -59,17 +59,6 @@ struct Pass {
     end_ns: i64,
     /// Unwrapped azimuth at the middle: what tangents are counted from.
     middle_cdeg: f64,
-}
-
-/// Where a vertex or a triangle is during a pass: least and greatest values.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Bounds {
-    /// Distance along the middle azimuth.
-    ahead_m: (f64, f64),
-    /// Tangent of the azimuth from the middle; holds where all of `ahead_m` is positive.
-    pub(super) tangent: (f64, f64),
-    /// Rise over horizontal distance, from where any beam passes the axis.
-    pub(super) slope: (f64, f64),
 }
 
 impl Painter {
@@ -288,31 +277,12 @@ impl Painter {
     }
 }
 
-impl Bounds {
-    fn around(self, other: Self) -> Self {
-        let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-        Self {
-            ahead_m: both(self.ahead_m, other.ahead_m),
-            tangent: both(self.tangent, other.tangent),
-            slope: both(self.slope, other.slope),
-        }
-    }
-}
-
 /// Where a beam's line passes the sensor's axis: how high above the origin, and at what distance. Its start is not on
 /// the axis where the head carries it around.
 fn past_axis(beam: &Beam) -> (f64, f64) {
     let (start_m, flat) = (beam.origin_m.truncate(), beam.direction.truncate());
     let ahead = flat / flat.length().max(1e-6);
     (beam.origin_m.z - start_m.dot(ahead) * beam.elevation_rad.tan(), start_m.perp_dot(ahead).abs())
-}
-
-/// Slopes between corners are steeper than at them: a chord is nearer to the axis than its ends, by up to the
-/// cosine of half the angle between them. 1 / cos(w / 2) < 1 + w2 / 4 for w < 2, and w < the tangents' difference, whose
-/// square is given.
-pub(super) fn stretched((low, high): (f64, f64), width_squared: f64) -> (f64, f64) {
-    let stretch = 1.0 + width_squared * 0.25;
-    (low.min(low * stretch), high.max(high * stretch))
 }
 
 /// Writes a walker's mesh in the sensor's frame; false when the walker is not there.
