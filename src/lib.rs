@@ -32,6 +32,7 @@
 //! ```
 
 mod elementary;
+mod shared;
 pub mod error;
 pub mod geometry;
 pub mod health;

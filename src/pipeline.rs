@@ -142,6 +142,24 @@ impl Pipeline {
         })
     }
 
+    /// Lets so many threads share what of a frame can be shared ([`Caster::use_threads`]); one does it all from the start. What a step
+    /// gives does not depend on it.
+    ///
+    /// ```
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// use umbracast::Pipeline;
+    ///
+    /// let mut alone = Pipeline::new(&umbracast::Config::default(), None)?;
+    /// let mut shared = alone.clone();
+    /// shared.use_threads(8);
+    /// assert_eq!(alone.step(&ray(1, 14.0)), shared.step(&ray(1, 14.0)));
+    /// # Ok::<(), umbracast::Error>(())
+    /// ```
+    pub fn use_threads(&mut self, threads: usize) {
+        self.caster.use_threads(threads);
+    }
+
     /// Learns the empty scene from a frame without people. Without any, the background is learned on the way.
     ///
     /// ```
@@ -328,7 +346,9 @@ impl Pipeline {
     /// # Ok::<(), umbracast::Error>(())
     /// ```
     pub fn take_over_links(&mut self, config: &Config) {
+        let threads = self.caster.threads();
         self.caster = Caster::new(&config.blockage, &config.site);
+        self.caster.use_threads(threads);
         self.fader = Fader::new(&config.site);
         self.binder = Binder::new(&config.site);
         self.listener = Listener::new(&config.site);

@@ -101,12 +101,13 @@ fn the_order_test_sees_a_group_and_a_path() {
 }
 
 #[test]
-fn the_runtime_has_no_file_socket_clock_thread_or_environment() {
+fn the_runtime_has_no_file_socket_clock_or_environment_and_one_place_for_threads() {
     let mut wrong = Vec::new();
     for (name, text) in files_below(&["src"]) {
         for word in ["std::fs", "std::net", "std::time", "std::thread", "std::env", "println!", "static mut"]
         {
-            if text.lines().any(|l| !l.trim_start().starts_with("//") && l.contains(word)) {
+            let shares = name == "src/shared.rs" && word == "std::thread";
+            if !shares && text.lines().any(|l| !l.trim_start().starts_with("//") && l.contains(word)) {
                 wrong.push(format!("{name}: {word}"));
             }
         }

@@ -76,6 +76,11 @@ impl Stages {
         })
     }
 
+    /// As a pipeline does.
+    pub fn use_threads(&mut self, threads: usize) {
+        self.caster.use_threads(threads);
+    }
+
     /// Where people are expected.
     pub fn expect(&mut self, frame: &Frame) {
         self.tracker.priors(frame.time_ns, &mut self.priors);

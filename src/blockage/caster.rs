@@ -72,6 +72,34 @@ impl Caster {
         }
     }
 
+    /// Lets so many threads share the links of a frame that has many; one does from the start. What is told of links does not depend
+    /// on it, and where links are few the caller's thread asks them alone.
+    ///
+    /// ```
+    /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
+    /// # use people::*;
+    /// # let config = umbracast::Config::default();
+    /// # let tracks = two_people();
+    /// # let forecasts = forecasts_of(&tracks);
+    /// use umbracast::blockage::Caster;
+    ///
+    /// let cast = |threads: usize| {
+    ///     let (mut caster, mut blockages) = (Caster::new(&config.blockage, &config.site), Vec::new());
+    ///     caster.use_threads(threads);
+    ///     caster.cast(&tracks, &forecasts, &mut blockages);
+    ///     blockages
+    /// };
+    /// assert_eq!(cast(1), cast(8));
+    /// ```
+    pub fn use_threads(&mut self, threads: usize) {
+        self.sampler.use_threads(threads);
+    }
+
+    /// How many may share a frame.
+    pub(crate) fn threads(&self) -> usize {
+        self.sampler.threads()
+    }
+
     /// One blockage for each access point and confirmed track, access points first. `forecasts[i]` belongs to
     /// `tracks[i]`.
     ///
@@ -201,12 +229,12 @@ impl Caster {
     ) {
         let (numbers, ue) = (&self.numbers, &self.ue);
         self.sampler.draw(numbers, ue, people.clone().chain(things));
-        for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
-            for (person, (track, _)) in people.clone().enumerate() {
-                let chances = self.sampler.chances(ue, access_point, ap_m, person, self.threshold);
-                blockages.push(told(access_point, track.id, &chances, self.threshold));
-            }
-        }
+        let chances = self.sampler.ask(ue, &self.access_points_m, self.threshold);
+        let links = (0..self.access_points_m.len())
+            .flat_map(|ap| people.clone().map(move |(track, _)| (ap, track.id)));
+        blockages.extend(
+            links.zip(chances).map(|((ap, track), chances)| told(ap, track, chances, self.threshold)),
+        );
     }
 }
 

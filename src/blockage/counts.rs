@@ -8,7 +8,7 @@ use crate::{STEP_S, STEPS};
 const LEVELS: [f64; 3] = [0.1, 0.5, 0.9];
 
 /// What the samples say of one link.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Chances {
     /// That it is blocked now.
     pub p_now: f64,

@@ -23,6 +23,7 @@ mod crossing;
 mod things;
 mod causes;
 mod counts;
+pub(crate) mod asker;
 #[doc(hidden)] // Phases of a gait, for the fit of the body.
 pub mod probability;
 mod caster;

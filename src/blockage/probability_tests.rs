@@ -5,10 +5,11 @@ use super::*;
 use crate::Config;
 use crate::blockage::body::blocks;
 use crate::blockage::counts::quantiles_s;
+use crate::blockage::{Caster, Chance};
 use crate::forecast::constant_velocity;
 use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
-use crate::site::{AccessPoint, Pillar};
+use crate::site::{AccessPoint, Pillar, Radio};
 use crate::track::Canopy;
 
 #[test]
@@ -158,6 +159,7 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
         let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
         let mut sampler = Sampler::new(&numbers, &site);
         sampler.draw(&numbers, &ue, tracks.iter().zip(&forecasts));
+        let told = sampler.ask(&ue, &aps_m, THRESHOLD).to_vec();
         for (ap, &ap_m) in aps_m.iter().enumerate() {
             for q in 0..tracks.len() {
                 let mut bits: Vec<u16> =
@@ -168,7 +170,7 @@ fn chances_are_those_of_every_body_and_ray_asked_one_by_one() {
                     seen_late += usize::from(bits[half..].iter().any(|at| *at != 0));
                     bits[half..].fill(0);
                 }
-                let found = sampler.chances(&ue, ap, ap_m, q, THRESHOLD);
+                let found = told[ap * tracks.len() + q];
                 let causes = || (0..samples).map(|k| causes(&sampler, &numbers, &ue, &site, ap_m, q, k));
                 let own: Vec<u16> = causes().map(|[own, _]| own).collect();
                 let hall: Vec<u16> = causes().map(|[_, hall]| hall).collect();
@@ -212,7 +214,7 @@ fn a_ray_meets_what_somebody_carries_beside_him() {
         let mut sampler = Sampler::new(&numbers, &config.site);
         let aps_m = [DVec3::new(8.0, 0.0, 1.2)];
         sampler.draw(&numbers, &config.site.ue, tracks.iter().zip(&forecasts));
-        sampler.chances(&config.site.ue, 0, aps_m[0], 1, 0.5).p_now
+        sampler.ask(&config.site.ue, &aps_m, 0.5)[1].p_now
     };
     assert!(p(0.0) < 0.2 && p(0.1) > 0.8, "{} {}", p(0.0), p(0.1));
 }
@@ -277,10 +279,48 @@ fn processors_with_narrower_registers_give_the_same_bits() {
     let (mut wide, mut narrow) = (Sampler::new(&numbers, &config.site), Sampler::new(&numbers, &config.site));
     wide.draw(&numbers, &ue, people());
     narrow.draw_portably(&numbers, &ue, people());
+    let told = wide.ask(&ue, &aps_m, 0.5);
+    let Sampler { figure, people, present, samples, askers, .. } = &mut narrow;
+    let among = Everybody { figure, bodies: &people[..*present], samples: *samples };
     for (ap, &ap_m) in aps_m.iter().enumerate() {
-        for q in 0..tracks.len() {
-            let found = wide.chances(&ue, ap, ap_m, q, 0.5);
-            assert_eq!(found, narrow.chances_portably(&ue, ap, ap_m, q, 0.5), "{ap}, {q}");
+        for person in 0..tracks.len() {
+            let aim = Aim { ue: &ue, ap, ap_m, person, threshold: 0.5 };
+            let expected = askers[0].ask_portably(among, aim);
+            assert_eq!(told[ap * tracks.len() + person], expected, "{ap}, {person}");
         }
     }
+}
+
+#[test]
+fn threads_that_share_the_links_of_a_frame_tell_what_one_does() {
+    let mut config = Config::default();
+    let place = |i: u32| (14.0 * DVec2::from_angle(f64::from(i))).extend(3.0).to_array();
+    let radio = Some(Radio::default());
+    let more = (0..12).map(|i| AccessPoint { name: format!("{i}"), position_m: place(i), radio });
+    config.site.access_points.extend(more);
+    // What the samples of each link said is kept for who weighs them.
+    config.site.ue.spread_m = 0.1;
+    let mut casters = [1, 2, 5].map(|threads| {
+        let mut caster = Caster::new(&config.blockage, &config.site);
+        caster.use_threads(threads);
+        caster
+    });
+    let mut random = Pcg64::seed_from_u64(6);
+    let mut fewer = Vec::new();
+    for people in [30, 30, 8, 12, 60, 60] {
+        let tracks: Vec<Track> = (0..people).map(|id| somebody(id, &mut random)).collect();
+        let forecasts: Vec<Forecast> = tracks.iter().map(constant_velocity::forecast).collect();
+        let [alone, two, five] = casters.each_mut().map(|caster| {
+            let mut blockages = Vec::new();
+            caster.cast(&tracks, &forecasts, &mut blockages);
+            let mut weighed = blockages.clone();
+            let weights: Vec<f32> = (0..128).map(|k| 0.5 + k as f32 / 128.0).collect();
+            weighed.iter_mut().enumerate().for_each(|(link, told)| caster.weigh(link, &weights, told));
+            (blockages, weighed, caster.took_fewer_samples())
+        });
+        assert!(alone == two && alone == five, "{people} people");
+        assert_ne!(alone.0, alone.1);
+        fewer.push(alone.2);
+    }
+    assert!(fewer.contains(&true) && fewer.contains(&false), "{fewer:?}");
 }

@@ -1,10 +1,7 @@
 //! Samples of one person's next second: the path of each, and what stays constant through its steps.
 //!
 //! All data are arrays by sample, in single precision and relative to the mean of the step, so that loops over
-//! samples run in vector registers. Data that only a blocking body needs, above all its gait, are computed when they
-//! are first used ([`Trajectories::walk`]).
-
-use std::collections::BTreeMap;
+//! samples run in vector registers.
 
 use super::body;
 use super::draws::Draws;
@@ -72,9 +69,7 @@ pub(crate) struct Trajectories {
     phase: Option<GaitPhase>,
     /// Phases of even shares, in their order.
     even_rad: Vec<f32>,
-    /// Of another frame until the body is in somebody's way.
     pub(super) gait: Gait,
-    walks: bool,
     /// Of this person's outline.
     figure: Option<Figure>,
     /// Offset and drift of each sample at the step that is drawn.
@@ -117,7 +112,6 @@ impl Trajectories {
         self.track = track.id;
         self.part_of = track.part_of;
         self.phase = Some(track.gait);
-        self.walks = false;
         self.mean_m = std::array::from_fn(|s| position_at(track, forecast, s));
         self.ahead = std::array::from_fn(|s| DVec2::from_angle(heading_at(track, forecast, s)));
         self.start(draws, &root(&forecast.coupling.state));
@@ -277,14 +271,9 @@ impl Trajectories {
         self.second = Disc { center_m, radius_m };
     }
 
-    /// Works out how the samples walk and face, once a frame.
+    /// Works out how the samples walk and face.
     #[inline(always)]
-    pub(super) fn walk(&mut self, figure: &Figure, draws: &BTreeMap<u64, Draws>) {
-        if self.walks {
-            return;
-        }
-        self.walks = true;
-        let draws = &draws[&self.track];
+    pub(super) fn walk(&mut self, figure: &Figure, draws: &Draws) {
         let (n, gait) = (self.samples, &mut self.gait);
         let [axis_x, axis_y] = &mut gait.axis_m;
         let [own_x, own_y] = &mut gait.own;

@@ -4,7 +4,7 @@ mod programme;
 
 use std::collections::BTreeMap;
 
-use crate::blockage::probability::chances_of;
+use crate::blockage::asker::chances_of;
 use crate::radio::{Loss, Outages, Served, Surface};
 use crate::site::{Costs, Site};
 use crate::track::Track;

@@ -1,5 +1,6 @@
 //! How long a step of the default mode takes as people, sensors and access points grow: `cargo run --release --manifest-path
-//! bench/Cargo.toml --bin growth [PEOPLE SENSORS ACCESS_POINTS | FIGURE.svg]`. On one core. Each frame is run three times from the same
+//! bench/Cargo.toml --bin growth [PEOPLE SENSORS ACCESS_POINTS [THREADS] | FIGURE.svg]`. On one core,
+//! and some rows once more on all there are. Each frame is run three times from the same
 //! memory. The table gives the fastest of the three, which other programs disturb least, and the middle one beside.
 
 use std::time::Duration;
@@ -39,6 +40,8 @@ const CASES: [[usize; 3]; 22] = [
     [1000, 16, 32],
     [3000, 16, 2],
 ];
+/// Measured with a thread a core as well.
+const SHARED: [[usize; 3]; 5] = [[10, 2, 2], [100, 2, 2], [100, 2, 64], [100, 4, 8], [1000, 16, 32]];
 /// With so many people and two sensors the figure shows how access points count.
 const LINKS_GROW_WITH: [usize; 2] = [10, 100];
 /// Until everybody is followed.
@@ -63,17 +66,24 @@ fn main() {
         "a frame is run {TRIES} times; ms, median of the frames and 99 %, of the fastest try and of the middle one"
     );
     println!(
-        "people  sensors  access points  followed  links  fastest    99 %   middle    99 %   fore  clust  detec  track  forec   cast  fewer"
+        "people  sensors  access points  threads  followed  links  fastest    99 %   middle    99 %   fore  clust  detec  track  forec   cast  fewer"
     );
-    if let [people, sensors, access_points] = &words[..] {
-        let case = [people, sensors, access_points].map(|word| word.parse().expect("a number"));
-        measure(&recording(case[0], case[1]), case);
+    if let [people, sensors, access_points, threads @ ..] = &words[..] {
+        let number = |word: &String| word.parse::<usize>().expect("a number");
+        let case = [people, sensors, access_points].map(number);
+        measure(&recording(case[0], case[1]), case, threads.first().map_or(1, number));
         return;
     }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let mut rows = Vec::new();
     for of_hall in CASES.chunk_by(|a, b| a[..2] == b[..2]) {
         let recording = recording(of_hall[0][0], of_hall[0][1]);
-        rows.extend(of_hall.iter().map(|case| measure(&recording, *case)));
+        for &case in of_hall {
+            rows.push(measure(&recording, case, 1));
+            if SHARED.contains(&case) && cores > 1 {
+                measure(&recording, case, cores);
+            }
+        }
     }
     if let [figure] = &words[..] {
         std::fs::write(figure, drawn(&rows)).expect("the figure's place can be written");
@@ -267,11 +277,13 @@ fn config([people, sensors, access_points]: [usize; 3]) -> Config {
     config
 }
 
-fn measure(recording: &Recording, case: [usize; 3]) -> Row {
+fn measure(recording: &Recording, case: [usize; 3], threads: usize) -> Row {
     let [people, sensors, access_points] = case;
     let config = config(case);
     let mut stages = Stages::new(&config, &recording.empty).expect("the defaults work");
     let mut pipeline = Pipeline::new(&config, None).expect("the defaults work");
+    pipeline.use_threads(threads);
+    stages.use_threads(threads);
     recording.empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     let (mut fastest, mut middle_one, mut parts) = (Vec::new(), Vec::new(), vec![Vec::new(); 6]);
     let (mut followed, mut links, mut fewer) = (Vec::new(), Vec::new(), 0);
@@ -308,7 +320,8 @@ fn measure(recording: &Recording, case: [usize; 3]) -> Row {
         values.sort();
         values[values.len() / 2]
     };
-    print!("{people:6} {sensors:8} {access_points:14} {:9} {:6} ", middle(&mut followed), middle(&mut links));
+    print!("{people:6} {sensors:8} {access_points:14} {threads:8} ");
+    print!("{:9} {:6} ", middle(&mut followed), middle(&mut links));
     let [median_ms, p99_ms] = [0.5, 0.99].map(|share| ms(&mut fastest, share));
     let [middle_ms, middle_p99_ms] = [0.5, 0.99].map(|share| ms(&mut middle_one, share));
     print!("{median_ms:8.2} {p99_ms:7.2} {middle_ms:8.2} {middle_p99_ms:7.2} ");

@@ -135,6 +135,7 @@ fn run(fault: &Fault, hall: &Hall) -> Result<Outcome, Error> {
             keep: None,
             points: false,
         }),
+        threads: 1,
         clock,
         counters: counters.clone(),
         whole: Arc::default(),

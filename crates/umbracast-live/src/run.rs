@@ -41,6 +41,8 @@ pub struct Settings {
     pub doors: Vec<Door>,
     /// Whether and where all is recorded.
     pub record: Option<RecordSettings>,
+    /// So many may share a frame ([`Pipeline::use_threads`]).
+    pub threads: usize,
     /// What packets are stamped with.
     pub clock: HostClock,
     /// Where it counts.
@@ -147,8 +149,9 @@ impl Live {
     /// # Errors
     /// A setting that cannot work, a port that is taken, a folder that cannot be made.
     pub fn start(settings: Settings, listener: Listener) -> Result<Self, Error> {
-        let Settings { config, weights, empty, doors, record, clock, counters, whole } = settings;
+        let Settings { config, weights, empty, doors, record, threads, clock, counters, whole } = settings;
         let mut pipeline = Pipeline::new(&config, weights.as_ref())?;
+        pipeline.use_threads(threads);
         empty.iter().for_each(|frame| pipeline.learn_empty(frame));
         let assembler = Assembler::new(&config.site)?;
         let points = record.as_ref().is_some_and(|record| record.points);

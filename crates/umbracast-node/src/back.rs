@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use umbracast::forecast::Weights;
 use umbracast::geometry::DVec2;
 use umbracast::{Config, Error, Health};
 use umbracast_io::fields;
@@ -107,14 +106,13 @@ impl Back {
     pub fn start(
         hall: &Hall,
         config: &Config,
-        weights: Option<&Weights>,
+        chain: Chain,
         row: Row,
         wait: Duration,
         clock: HostClock,
     ) -> Result<Self, Error> {
         let queue = Arc::new(Queue::new(WAITING, WhenFull::DropOldest));
         let counted = Arc::new(Counted::default());
-        let chain = Chain::new(config, weights, row)?;
         let outlets = Outlets::new(hall, config, row)?;
         let wait_ns = wait.as_nanos() as i64;
         let lead = Lead::new(hall.id(), STALE_NS.max(wait_ns));

@@ -137,7 +137,12 @@ impl Made {
 impl Chain {
     /// # Errors
     /// A setting that cannot work.
-    pub fn new(config: &Config, weights: Option<&Weights>, row: Row) -> Result<Self, Error> {
+    pub fn new(config: &Config, weights: Option<&Weights>, row: Row, threads: usize) -> Result<Self, Error> {
+        let caster = || {
+            let mut caster = Caster::new(&config.blockage, &config.site);
+            caster.use_threads(threads);
+            caster
+        };
         Ok(Self {
             clocks: Clocks::new(&config.detect, &config.site),
             clusterer: Clusterer::new(&config.detect, &config.site),
@@ -145,7 +150,7 @@ impl Chain {
             tracker: row.track.then(|| Tracker::new(&config.track, &config.site)),
             windows: Windows::default(),
             forecaster: row.forecast.then(|| Forecaster::new(&config.forecast, weights)).transpose()?,
-            caster: row.cast.then(|| Caster::new(&config.blockage, &config.site)),
+            caster: row.cast.then(caster),
             fader: Fader::new(&config.site),
             binder: Binder::new(&config.site),
             listener: Listener::new(&config.site),

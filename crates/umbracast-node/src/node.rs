@@ -21,7 +21,7 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 
 use crate::back::{Back, Counted};
-use crate::chain::Row;
+use crate::chain::{Chain, Row};
 use crate::hall::{Hall, Outlet, Urgency};
 use crate::role::Role;
 use crate::ros2;
@@ -51,6 +51,8 @@ pub struct Settings {
     pub listener: Option<Listener>,
     /// What it answers when it is asked.
     pub shared: Shared,
+    /// So many may share a frame's links ([`umbracast::blockage::Caster::use_threads`]).
+    pub threads: usize,
     /// The host's.
     pub clock: HostClock,
 }
@@ -126,6 +128,7 @@ impl Node {
             record,
             listener,
             shared,
+            threads,
             clock,
         } = settings;
         let has = |role| stages.contains(&role);
@@ -160,7 +163,8 @@ impl Node {
             hall,
         };
         for row in Row::of(&node.stages) {
-            node.backs.push(Back::start(&node.hall, &config, weights.as_ref(), row, wait, clock)?);
+            let chain = Chain::new(&config, weights.as_ref(), row, threads)?;
+            node.backs.push(Back::start(&node.hall, &config, chain, row, wait, clock)?);
         }
         // A tracker keeps its own; a front end may be a small machine.
         let keeps = [Role::Forecast, Role::Cast, Role::Record, Role::Serve];

@@ -68,6 +68,7 @@ fn a_front_end_that_starts_before_the_tracker_gets_the_empty_hall_from_it_later(
             record: None,
             listener: None,
             shared: Shared::default(),
+            threads: 1,
             clock,
         },
     )

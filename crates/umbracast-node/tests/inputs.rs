@@ -40,6 +40,7 @@ fn settings(stages: &[Role], config: &Config, source: Source) -> Settings {
         record: None,
         listener: None,
         shared: Shared::default(),
+        threads: 1,
         clock: HostClock::start(),
     }
 }

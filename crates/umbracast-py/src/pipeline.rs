@@ -45,15 +45,24 @@ pub struct Pipeline {
 
 #[pymethods]
 impl Pipeline {
-    /// Sets up every stage for a site. `scene` is written into every row.
+    /// Sets up every stage for a site. `scene` is written into every row. So many threads may share the links of a frame that has
+    /// many; results do not depend on it.
     #[new]
-    #[pyo3(signature = (site=None, *, mode="default", weights=None, scene=0))]
-    fn new(site: Option<&Bound<PyAny>>, mode: &str, weights: Option<PathBuf>, scene: u32) -> PyResult<Self> {
+    #[pyo3(signature = (site=None, *, mode="default", weights=None, scene=0, threads=1))]
+    fn new(
+        site: Option<&Bound<PyAny>>,
+        mode: &str,
+        weights: Option<PathBuf>,
+        scene: u32,
+        threads: usize,
+    ) -> PyResult<Self> {
         let site = Site::given(site)?;
         let config = site.config(site::mode(mode)?)?;
         let weights = setup::weights(weights.as_deref()).map_err(refused)?;
+        let mut pipeline = umbracast::Pipeline::new(&config, Some(&weights)).map_err(refused)?;
+        pipeline.use_threads(threads);
         Ok(Self {
-            pipeline: umbracast::Pipeline::new(&config, Some(&weights)).map_err(refused)?,
+            pipeline,
             assembler: Assembler::new(&config.site).map_err(refused)?,
             assembled: Health::default(),
             names: Arc::new(site.names()),

@@ -49,6 +49,7 @@ pub fn run(args: &args::Live, common: &Common) -> Result<Ending, Error> {
         doors: doors(&config.site, args.port, args.demo)?,
         record: recorder(&args.record),
         config: config.clone(),
+        threads: setup::threads(common.threads),
         clock,
         counters: counters.clone(),
         whole: whole.clone(),

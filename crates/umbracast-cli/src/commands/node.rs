@@ -113,6 +113,7 @@ pub fn run(args: &args::Node, common: &Common) -> Result<Ending, Error> {
         empty,
         record,
         shared,
+        threads: setup::threads(common.threads),
         clock,
     };
     let node = Node::start(hall, settings)?;

@@ -48,6 +48,8 @@ struct Method<'a> {
     config: &'a Config,
     weights: &'a Weights,
     empty: &'a [Frame],
+    /// What a scene may have where fewer scenes run than threads may.
+    threads: usize,
     /// What access points heard, where it is not in the recordings.
     reports: Option<&'a Tabled>,
     /// Where recordings of the results go, and whether with points.
@@ -79,8 +81,10 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     setup::write(&args.out.join("config.toml"), config.to_toml())?;
     let recordings = args.mcap.then_some((args.out.as_path(), args.points));
     let reports = args.reports.as_deref().map(|file| Tabled::read(file, &config.site)).transpose()?;
-    let method =
-        Method { config: &config, weights: &weights, empty: &empty, reports: reports.as_ref(), recordings };
+    let at_once = setup::threads(common.threads);
+    let threads = at_once.div_ceil(inputs.len().max(1));
+    let reports = reports.as_ref();
+    let method = Method { config: &config, weights: &weights, empty: &empty, threads, reports, recordings };
     let watch = Stopwatch::start();
     let mut tables = OutcomeTables::create(&args.out, &config.site, args.csv, true)?;
     let progress = bar(inputs.len() as u64, "scenes run", common.quiet);
@@ -114,7 +118,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
             Ok(())
         })
     };
-    let result = numbered.chunks(setup::threads(common.threads)).try_for_each(&mut run_some);
+    let result = numbered.chunks(at_once).try_for_each(&mut run_some);
     // What is done stays, also when a later input fails.
     tables.finish()?;
     result?;
@@ -233,9 +237,10 @@ fn run_scene(
     method: &Method,
     results: &SyncSender<Step>,
 ) -> Result<(Health, u64, Vec<String>), Error> {
-    let Method { config, weights, empty, reports, recordings } = method;
+    let Method { config, weights, empty, threads, reports, recordings } = method;
     let mut reports = inputs::heard(scene, input, *reports, &config.site)?;
     let mut pipeline = Pipeline::new(config, Some(weights))?;
+    pipeline.use_threads(*threads);
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     let mut recording = recordings.map(|(folder, points)| Recording::new(folder, scene, config, points));
     let (mut health, mut stage_health, mut returns) = (Health::default(), Health::default(), 0);

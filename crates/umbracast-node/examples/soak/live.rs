@@ -126,6 +126,7 @@ pub fn run(folder: &Path, hours: f64) -> Result<Verdict, Error> {
             keep: Some(KEPT),
             points: false,
         }),
+        threads: 1,
         clock,
         counters,
         whole: Arc::default(),
