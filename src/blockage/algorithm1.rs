@@ -5,8 +5,7 @@
 //! point than the considered one are tested, so the comparison is turned round. The hit has to lie on the
 //! segment between the access point and the centre of q's box, not on the infinite ray.
 
-use super::sectors::{Covered, Sectors};
-use crate::geometry::{Aabb, DVec2, DVec3, Obb, slab};
+use crate::geometry::{Aabb, Covered, DVec2, DVec3, Obb, Sectors, slab};
 
 /// A person's box, of the kind that the config chooses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,6 +71,7 @@ pub fn cast_step(access_point_m: DVec3, people: &[(DVec2, PersonBox)], blocked: 
     let asked = blocked.iter().filter(|&&blocked| !blocked).count();
     let sectors = (asked > FEW).then(|| {
         let mut sectors = Sectors::<SECTORS>::default();
+        let covered = |person: &FromAbove| Covered::of::<SECTORS>(person.middle_m, person.reach_m);
         sectors.sort(&seen.iter().map(covered).collect::<Vec<_>>());
         sectors
     });
@@ -84,7 +84,7 @@ pub fn cast_step(access_point_m: DVec3, people: &[(DVec2, PersonBox)], blocked: 
         let end_m = people[q].1.center_m();
         let hides = |p: usize| seen[p].may_hide(to_q) && people[p].1.hit(access_point_m, end_m).is_some();
         blocked[q] = match &sectors {
-            Some(sectors) => sectors.people(sector(to_q.middle_m)).iter().any(|&p| hides(p as usize)),
+            Some(sectors) => sectors.towards(to_q.middle_m).iter().any(|&p| hides(p as usize)),
             None => (0..people.len()).any(hides),
         };
     }
@@ -129,33 +129,6 @@ impl FromAbove {
         let aside_m2 = other.middle_m.perp_dot(self.middle_m);
         nearer && same_side && aside_m2 * aside_m2 <= self.reach_m * self.reach_m * other.middle2_m2
     }
-}
-
-/// The sectors that a box covers.
-fn covered(seen: &FromAbove) -> Covered {
-    let sine2 = seen.reach_m * seen.reach_m / seen.middle2_m2;
-    // The access point is in or above it, or nobody knows where it is.
-    if sine2.is_nan() || sine2 >= 1.0 {
-        return Covered { first: 0, count: SECTORS };
-    }
-    let tangent = DVec2::new((1.0 - sine2).sqrt(), sine2.sqrt());
-    let (first, last) = (
-        sector(DVec2::new(tangent.x, -tangent.y).rotate(seen.middle_m)),
-        sector(tangent.rotate(seen.middle_m)),
-    );
-    Covered { first, count: (last + SECTORS - first) % SECTORS + 1 }
-}
-
-/// Counter-clockwise from x, by a number that grows with the angle as the angle does, without its arc tangent.
-fn sector(direction: DVec2) -> usize {
-    let DVec2 { x, y } = direction;
-    let across = y / (x.abs() + y.abs());
-    let quarters = match (x < 0.0, y < 0.0) {
-        (false, false) => across,
-        (true, _) => 2.0 - across,
-        (false, true) => 4.0 + across,
-    };
-    (quarters * (SECTORS as f64 / 4.0)) as usize % SECTORS
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 pub mod body_model;
 #[doc(hidden)] // What a ray meets, for the fit, the ladder and the corpus of rays.
 pub mod body;
-mod sectors;
 #[doc(hidden)] // For the corpus of rays; `Caster` chooses by the config.
 pub mod algorithm1;
 pub(crate) mod lanes;

@@ -4,14 +4,11 @@
 //! others, and as an owner whose link may be hidden. Only pairs that share a sector are compared: at a first
 //! glance all steps at once, then step by step while somebody asks. In doubt a pair is kept, so no blockage is lost.
 
-use std::f64::consts::{PI, TAU};
-
 use super::figure::{Band, Figure};
 use super::glance::{Look, Way};
-use super::sectors::{Covered, Sectors};
 use super::spread::{Between, Spread};
 use super::trajectories::{Disc, MOMENTS, Trajectories};
-use crate::geometry::{DVec2, DVec3};
+use crate::geometry::{Covered, DVec2, DVec3, Sectors};
 use crate::site::Ue;
 
 /// A body at ten metres covers about five.
@@ -59,17 +56,7 @@ pub(super) struct Shadows {
 
 /// The sectors in which something within `disc` is seen.
 fn covered(disc: Disc, ap_m: DVec2) -> Covered {
-    let off_m = disc.center_m - ap_m;
-    let (distance_m, radius_m) = (off_m.length(), disc.radius_m + ROOM);
-    if distance_m <= radius_m {
-        return Covered { first: 0, count: SECTORS };
-    }
-    let half_rad = (radius_m / distance_m).asin();
-    let sector = |rad: f64| ((rad + PI) * (SECTORS as f64 / TAU)).floor() as i32;
-    let middle_rad = off_m.to_angle();
-    let (first, last) = (sector(middle_rad - half_rad), sector(middle_rad + half_rad));
-    let count = ((last - first + 1) as usize).min(SECTORS);
-    Covered { first: first.rem_euclid(SECTORS as i32) as usize, count }
+    Covered::of::<SECTORS>(disc.center_m - ap_m, disc.radius_m)
 }
 
 impl Shadows {

@@ -176,14 +176,14 @@ impl MixtureTracker {
     fn expect(&mut self, views: &Views, found: bool, step_s: f64) {
         let Self { numbers, visibility, people, memory, .. } = self;
         let Memory { bodies, expected, .. } = memory;
-        visibility.look(views);
         let sight_known = numbers.visibility && !(found && views.of_scans.is_empty());
         bodies.clear();
         let body = |p: &Person| p.body(p.filter.position_after(step_s), &visibility.hall);
         bodies.extend(people.iter().map(body));
+        visibility.look(views, bodies);
         expected.clear();
         expected.extend(bodies.iter().map(|body| {
-            let view = visibility.view(body, bodies);
+            let view = visibility.view(body);
             let detection_probability = match sight_known {
                 true => detection_probability(DETECTION_PROBABILITY, &view),
                 false => DETECTION_PROBABILITY,

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use crate::geometry::slab::hit_obb;
-use crate::geometry::{DMat3, DVec2, DVec3, Obb, Pose};
+use crate::geometry::{Covered, DMat3, DVec2, DVec3, Obb, Pose, Sectors};
 use crate::lidar::{Fan, SECTORS, Views, sector};
 use crate::site::{Hall, Site, from_segment_m};
 
@@ -21,6 +21,8 @@ const RETURNS_AT_HALF: f64 = 6.0;
 const SEEN_TOP_MIN_M: f64 = 0.5;
 /// Returns from a body in free sight of a sensor whose beams are unknown: enough to be found.
 const RETURNS_OF_UNKNOWN_BEAMS: f64 = 50.0;
+/// Sectors of a turn by which an eye looks for who stands in the way: a body at ten metres covers five.
+const WAYS: usize = 512;
 /// More than rounding takes from a share, and from a square metre.
 const ROUNDED: f64 = 1e-9;
 
@@ -52,6 +54,9 @@ pub struct Visibility {
     /// Shortest and longest range of each sensor of the site.
     ranges_m: Vec<(f64, f64)>,
     eyes: Vec<Eye>,
+    /// Everybody.
+    bodies: Vec<Body>,
+    covered: Vec<Covered>,
     /// Of all that could hide a body from an eye, what is near the line between them.
     between: Between,
 }
@@ -66,6 +71,8 @@ struct Eye {
     fan: Option<Fan>,
     /// Of the fan's beams: how far each rises in a metre, ascending.
     rises: Vec<f64>,
+    /// Of everybody, by number.
+    bodies: Sectors<WAYS>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -124,12 +131,16 @@ impl Visibility {
             furniture: furniture.collect(),
             ranges_m: site.sensors.iter().map(|s| (s.range_min_m, s.range_max_m)).collect(),
             eyes: Vec::new(),
+            bodies: Vec::new(),
+            covered: Vec::new(),
             between: Between::default(),
         }
     }
 
-    /// From here on as the sensors of this frame. One that sent nothing sees nobody.
-    pub fn look(&mut self, views: &Views) {
+    /// From here on as the sensors of this frame, with these bodies in each other's way. One that sent nothing sees nobody.
+    pub fn look(&mut self, views: &Views, bodies: &[Body]) {
+        self.bodies.clear();
+        self.bodies.extend_from_slice(bodies);
         self.eyes.truncate(views.of_scans.len());
         for (i, view) in views.of_scans.iter().enumerate() {
             let eye = Eye {
@@ -139,13 +150,25 @@ impl Visibility {
                 range_m: self.ranges_m.get(view.sensor).copied().unwrap_or((0.0, f64::INFINITY)),
                 fan: None,
                 rises: Vec::new(),
+                bodies: Sectors::default(),
             };
             match self.eyes.get_mut(i) {
-                // The fan's memory stays.
-                Some(old) => *old = Eye { fan: old.fan.take(), rises: std::mem::take(&mut old.rises), ..eye },
+                // What was allocated stays.
+                Some(old) => {
+                    let (rises, bodies) = (std::mem::take(&mut old.rises), std::mem::take(&mut old.bodies));
+                    *old = Eye { fan: old.fan.take(), rises, bodies, ..eye };
+                }
                 None => self.eyes.push(eye),
             }
-            self.eyes[i].take(view.fan.as_ref());
+            let eye = &mut self.eyes[i];
+            eye.take(view.fan.as_ref());
+            let covered = |body: &Body| {
+                let off_m = body.position_m - eye.origin_m.truncate();
+                Covered::of::<WAYS>(off_m, BODY_RADIUS_M + BODY_RADIUS_M)
+            };
+            self.covered.clear();
+            self.covered.extend(bodies.iter().map(covered));
+            eye.bodies.sort(&self.covered);
         }
     }
 
@@ -155,9 +178,9 @@ impl Visibility {
         self.eyes.iter().find(of_sensor).map_or(0.0, |eye| eye.gap_m(at_m))
     }
 
-    /// What `body` gives to all sensors while `others` stand round it.
-    pub fn view(&mut self, body: &Body, others: &[Body]) -> BodyView {
-        let Self { hall, pillars, furniture, eyes, between, .. } = self;
+    /// What `body` gives to all sensors while the others stand round it.
+    pub fn view(&mut self, body: &Body) -> BodyView {
+        let Self { hall, pillars, furniture, eyes, bodies, between, .. } = self;
         let mut view = BodyView {
             beams_known: !eyes.is_empty() && eyes.iter().all(|eye| eye.fan.is_some()),
             on_step: hall.has_step_about(body.position_m),
@@ -178,7 +201,9 @@ impl Visibility {
                     && from_segment_m(point, [from, body.position_m]) < near_m
             };
             between.others.clear();
-            between.others.extend(others.iter().filter(|o| *o != body && near(o.position_m, BODY_RADIUS_M)));
+            // Only who covers its sector may be as near to the line.
+            let others = eye.bodies.towards(along).iter().map(|&number| &bodies[number as usize]);
+            between.others.extend(others.filter(|o| *o != body && near(o.position_m, BODY_RADIUS_M)));
             between.pillars.clear();
             between.pillars.extend(pillars.iter().filter(|p| near(p.0, p.1)));
             between.furniture.clear();
@@ -410,8 +435,8 @@ mod tests {
 
     fn view(frame: &Frame, seen: Body, others: &[Body]) -> BodyView {
         let mut visibility = Visibility::new(&Config::default().site);
-        visibility.look(&Views::of(frame));
-        visibility.view(&seen, others)
+        visibility.look(&Views::of(frame), others);
+        visibility.view(&seen)
     }
 
     #[test]

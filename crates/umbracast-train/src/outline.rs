@@ -185,14 +185,14 @@ fn watch(scene: usize, without: bool) -> Result<Vec<Person>, Error> {
         push(&mut assembler, &now.packets, &mut health);
         while let Some(frame) = assembler.pop() {
             let outcome = pipeline.step(&frame);
-            visibility.look(&Views::of(&frame));
             let body = |t: &Track| {
                 let floor_m = config.site.hall.floor_m(t.position_m);
                 Body { position_m: t.position_m, floor_m, height_m: t.height_m }
             };
             let bodies: Vec<Body> = outcome.tracks.iter().map(body).collect();
+            visibility.look(&Views::of(&frame), &bodies);
             for (track, body) in outcome.tracks.iter().zip(&bodies).filter(|(track, _)| track.points > 0) {
-                let view = visibility.view(body, &bodies);
+                let view = visibility.view(body);
                 let own = walkers.iter().position(|walker| {
                     walker
                         .state_at(frame.time_ns)
