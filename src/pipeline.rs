@@ -142,8 +142,8 @@ impl Pipeline {
         })
     }
 
-    /// Lets so many threads share what of a frame can be shared ([`Caster::use_threads`]); one does it all from the start. What a step
-    /// gives does not depend on it.
+    /// Lets so many threads share scans and links of a frame that has many; one does it all from the start. What a step gives does
+    /// not depend on it.
     ///
     /// ```
     /// # mod people { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doctests/people.rs")); }
@@ -157,6 +157,7 @@ impl Pipeline {
     /// # Ok::<(), umbracast::Error>(())
     /// ```
     pub fn use_threads(&mut self, threads: usize) {
+        self.background.use_threads(threads);
         self.caster.use_threads(threads);
     }
 

@@ -78,6 +78,7 @@ impl Stages {
 
     /// As a pipeline does.
     pub fn use_threads(&mut self, threads: usize) {
+        self.background.use_threads(threads);
         self.caster.use_threads(threads);
     }
 

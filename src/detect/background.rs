@@ -9,10 +9,13 @@ use super::{Point, Prior, above_floor};
 use crate::config::{BackgroundMethod, DetectConfig};
 use crate::geometry::DVec3;
 use crate::lidar::{Cloud, Scan};
+use crate::shared::share;
 use crate::{Frame, Health, Site};
 
 /// Most foreground points kept of one frame: 100 people close to the sensors. Bounds the time of a frame.
 const POINTS_MAX: usize = 40_000;
+/// Threads share scans from so many on: fewer are done before another thread has begun.
+const SHARED_FROM: usize = 4;
 /// Voxels: hdl_people_tracking's edge.
 const VOXEL_M: f64 = 0.2;
 /// So many empty scans make the voxel map. The adapted code takes one; with our columns, which do not repeat from turn
@@ -41,6 +44,10 @@ pub struct Background {
     sensors: Vec<SensorModel>,
     clip: Clip,
     presence: Presence,
+    /// As many as may share the scans of a frame,
+    threads: Vec<()>,
+    /// and what each sensor gives them.
+    found: Vec<(Health, Vec<Point>)>,
     map: Option<VoxelMap>,
     /// Scans that made the map.
     map_scans: u32,
@@ -68,12 +75,20 @@ impl Background {
             sensors: site.sensors.iter().map(SensorModel::new).collect(),
             clip: Clip { hall: site.hall.clone(), highest_m: config.highest_m },
             presence: Presence::default(),
+            threads: vec![()],
+            found: Vec::new(),
             map: None,
             map_scans: 0,
             keys: Vec::new(),
             thinned: Vec::new(),
             placer: None,
         }
+    }
+
+    /// Lets so many threads share the scans of a frame of many sensors. What is found does not depend on it.
+    #[doc(hidden)] // `Pipeline::use_threads` calls it.
+    pub fn use_threads(&mut self, threads: usize) {
+        self.threads.resize(threads.max(1), ());
     }
 
     /// Learns from a frame without people (the paper's global map).
@@ -96,7 +111,9 @@ impl Background {
                 self.sensors.iter_mut().for_each(SensorModel::know);
                 let mut nothing = Vec::new();
                 for scan in &frame.scans {
-                    self.scan(frame.time_ns, scan, Learn::Empty, &mut Health::default(), &mut nothing);
+                    let Some(sensor) = self.sensors.get_mut(scan.sensor) else { continue };
+                    let look = Look { scan, time_ns: frame.time_ns, clip: &self.clip, learn: Learn::Empty };
+                    sensor.scan(look, &mut Health::default(), &mut nothing);
                 }
             }
             BackgroundMethod::Voxels => {
@@ -131,14 +148,8 @@ impl Background {
         points.clear();
         match self.method {
             BackgroundMethod::RangeImage => {
-                let mut presence = std::mem::take(&mut self.presence);
-                presence.renew(priors);
-                for scan in &frame.scans {
-                    let known = self.sensors.get(scan.sensor).is_some_and(SensorModel::is_known);
-                    let learn = if known { Learn::Furniture(&presence) } else { Learn::OnTheWay(&presence) };
-                    self.scan(frame.time_ns, scan, learn, health, points);
-                }
-                self.presence = presence;
+                self.presence.renew(priors);
+                self.scans(frame, health, points);
                 self.forget_people(frame);
             }
             BackgroundMethod::Voxels => {
@@ -249,17 +260,37 @@ impl Background {
         }
     }
 
-    /// One scan against its sensor's range image; what is new goes to `points`.
-    fn scan(
-        &mut self,
-        time_ns: i64,
-        scan: &Scan,
-        learn: Learn,
-        health: &mut Health,
-        points: &mut Vec<Point>,
-    ) {
-        let Some(sensor) = self.sensors.get_mut(scan.sensor) else { return };
-        sensor.scan(Look { scan, time_ns, clip: &self.clip, learn }, health, points);
+    /// Each scan against its sensor's range image; what is new goes to `points`.
+    fn scans(&mut self, frame: &Frame, health: &mut Health, points: &mut Vec<Point>) {
+        let Self { sensors, clip, presence, threads, found, .. } = self;
+        let (clip, presence) = (&*clip, &*presence);
+        let look = |sensor: &mut SensorModel, scan: &Scan, health: &mut Health, points: &mut Vec<Point>| {
+            let learn =
+                if sensor.is_known() { Learn::Furniture(presence) } else { Learn::OnTheWay(presence) };
+            sensor.scan(Look { scan, time_ns: frame.time_ns, clip, learn }, health, points);
+        };
+        let one_of_each = frame.scans.is_sorted_by(|a, b| a.sensor < b.sensor);
+        if threads.len() == 1 || frame.scans.len() < SHARED_FROM || !one_of_each {
+            for scan in &frame.scans {
+                if let Some(sensor) = sensors.get_mut(scan.sensor) {
+                    look(sensor, scan, health, points);
+                }
+            }
+            return;
+        }
+        found.resize_with(sensors.len(), Default::default);
+        let scan_of = |number: usize| frame.scans.iter().find(|scan| scan.sensor == number);
+        let each = sensors.iter_mut().zip(&mut *found).enumerate();
+        let each = each.filter_map(|(number, (sensor, found))| Some((sensor, scan_of(number)?, found)));
+        share(threads, each, |(), (sensor, scan, (health, points))| {
+            points.clear();
+            *health = Health::default();
+            look(sensor, scan, health, points);
+        });
+        for (of_scan, new) in frame.scans.iter().filter_map(|scan| found.get(scan.sensor)) {
+            health.add(of_scan);
+            points.extend_from_slice(new);
+        }
     }
 }
 
