@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use umbracast::{Error, Health, Mode};
 
-use super::tables::{Table, number};
+use super::tables::{Table, mean, number};
 use crate::run::pooled::Estimate;
 use crate::run::scene_score::Predictor;
 
@@ -36,6 +36,8 @@ pub struct Row {
     pub velocity_nees: Estimate,
     /// Mean displacement of the forecast at 900 ms, metres.
     pub displacement_m: Estimate,
+    /// Shares of true positions within the 50 and the 90 % region of the forecast, means over its steps.
+    pub in_regions: [Option<f64>; 2],
     /// F1 at 300 ms by access point.
     pub f1: Vec<(String, Estimate)>,
     /// The same over links in sight when it was said.
@@ -89,6 +91,7 @@ struct Stage1 {
     position_nees: Estimate,
     velocity_nees: Estimate,
     displacement_m: Vec<Estimate>,
+    coverage: Vec<Option<[f64; 2]>>,
     health: Health,
 }
 
@@ -128,6 +131,8 @@ fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
         position_nees: scores.position_nees,
         velocity_nees: scores.velocity_nees,
         displacement_m: scores.displacement_m.last().copied().unwrap_or_default(),
+        in_regions: [0, 1]
+            .map(|i| mean(&scores.coverage.iter().map(|step| Some(step.as_ref()?[i])).collect::<Vec<_>>())),
         f1: at_300_ms(mode, Predictor::Run, |window| window.f1),
         onset_f1: at_300_ms(mode, Predictor::Run, |window| window.onset_f1),
         bound_f1: at_300_ms(mode, Predictor::BoundOnce, |window| window.f1),
@@ -172,6 +177,8 @@ fn table(title: &str, rows: &[Row], text: impl Fn(Estimate, usize) -> String) ->
         "NEES",
         "of velocity",
         "900 ms, m",
+        "in 50 %",
+        "in 90 %",
     ];
     let mut table = Table::new(title, 3, &header);
     for score in ["F1", "onset", "bound once", "persistence"] {
@@ -186,6 +193,7 @@ fn table(title: &str, rows: &[Row], text: impl Fn(Estimate, usize) -> String) ->
         cells.extend([row.position_m, row.velocity_mps].map(|score| text(score, 3)));
         cells.extend([row.position_nees, row.velocity_nees].map(|score| text(score, 2)));
         cells.push(text(row.displacement_m, 3));
+        cells.extend(row.in_regions.map(|value| text(Estimate { value, ..Estimate::default() }, 2)));
         for scores in [&row.f1, &row.onset_f1, &row.bound_f1, &row.persistence_f1] {
             let of = |name: &&str| scores.iter().find(|(own, _)| own == name).map(|(_, f1)| *f1);
             cells.extend(access_points.iter().map(|name| text(of(name).unwrap_or_default(), 3)));
@@ -219,12 +227,15 @@ mod tests {
         let run = ModeRun { config: &config, rows: &run, health };
         let scene = score_scene(0, "orca-03", &truth, &[run], None, None).unwrap();
         let json = to_json(&pool(&[&scene], &["side".to_owned()]));
-        let rows = rows("lost", json.as_bytes()).unwrap();
+        let mut json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        json["groups"][0]["modes"][0]["coverage"] = serde_json::json!([[0.25, 0.75], [0.75, 1.0]]);
+        let rows = rows("lost", json.to_string().as_bytes()).unwrap();
         assert_eq!((rows.len(), rows[0].scans_missing), (1, 12));
         assert_eq!((rows[0].f1[0].0.as_str(), rows[0].f1[0].1.value), ("side", Some(1.0)));
         // Blocked in frames 30 to 39 of 40: at 27 to 29 persistence knows nothing of it yet, at 30 it does.
         assert_eq!(rows[0].persistence_f1[0].1.value, Some(0.4));
         assert_eq!((rows[0].bound_f1[0].1.value, rows[0].position_nees.value), (Some(1.0), None));
+        assert_eq!(rows[0].in_regions, [Some(0.5), Some(0.875)]);
         let text = to_text(&rows);
         assert!(!text.contains("intervals"), "of a single scene: {text}");
         let line = text.lines().last().unwrap();

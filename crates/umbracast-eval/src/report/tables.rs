@@ -446,7 +446,7 @@ pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
 }
 
-fn mean(values: &[Option<f64>]) -> Option<f64> {
+pub(super) fn mean(values: &[Option<f64>]) -> Option<f64> {
     let sum = values.iter().copied().sum::<Option<f64>>()?;
     (!values.is_empty()).then(|| sum / values.len() as f64)
 }
