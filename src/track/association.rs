@@ -33,6 +33,8 @@ pub struct Assignment {
     pub column_of: Vec<Option<usize>>,
     row_of: Vec<Option<usize>>,
     lists: Lists,
+    /// Columns that may be those of the row that is added.
+    among: Vec<usize>,
     row_price: Vec<f64>,
     /// From 0 down.
     column_price: Vec<f64>,
@@ -54,9 +56,23 @@ enum End {
 impl Assignment {
     /// [`optimal`], into `column_of`. Every cost is asked once.
     pub fn optimal(&mut self, rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) {
+        self.optimal_among(rows, columns, |_, all| all.extend(0..columns), cost);
+    }
+
+    /// The same where few columns may be a row's: `among` lists those, in any order, and all others are [`FORBIDDEN`].
+    pub fn optimal_among(
+        &mut self,
+        rows: usize,
+        columns: usize,
+        among: impl Fn(usize, &mut Vec<usize>),
+        cost: impl Fn(usize, usize) -> f64,
+    ) {
         self.lists.clear();
         for r in 0..rows {
-            self.lists.add((0..columns).map(|c| cost(r, c)));
+            self.among.clear();
+            among(r, &mut self.among);
+            self.among.sort_unstable();
+            self.lists.add(self.among.iter().map(|&column| Pair { column, cost: cost(r, column) }));
         }
         self.solve(&[], columns);
     }

@@ -74,6 +74,7 @@ struct Memory {
     expected: Vec<Expected>,
     /// Of people, then also of who is born.
     places_m: Vec<DVec2>,
+    /// Of detections, then of people.
     neighbours: Neighbours,
     /// Which of them have a detection in this frame.
     seen: Vec<bool>,
@@ -195,10 +196,12 @@ impl MixtureTracker {
     /// Each person's detection.
     fn associate(&mut self, time_ns: i64, last_ns: i64, detections: &[Detection]) {
         let Self { numbers, people, memory, .. } = self;
-        let Memory { order, expected, places_m, assignment, .. } = memory;
+        let Memory { order, expected, places_m, neighbours, assignment, .. } = memory;
         places_m.clear();
         places_m.extend(people.iter().map(|p| p.filter.position_m()));
+        neighbours.renew(order.iter().map(|&d| detections[d].position_m));
         let reach_m = GATE_M + FASTEST_MPS * seconds(last_ns, time_ns);
+        let about = |p: usize, found: &mut Vec<usize>| found.extend(neighbours.about(places_m[p], reach_m));
         let cost = |p: usize, d: usize| {
             let (person, detection) = (&people[p], &detections[order[d]]);
             if !detection.full_body && !person.confirmed {
@@ -210,7 +213,7 @@ impl MixtureTracker {
             let after_s = seconds(last_ns, measured_ns(detection, last_ns, time_ns));
             pair_cost(numbers, person, &expected[p], after_s, detection)
         };
-        assignment.optimal(people.len(), order.len(), cost);
+        assignment.optimal_among(people.len(), order.len(), about, cost);
     }
 
     fn correct(&mut self, time_ns: i64, last_ns: i64, detections: &[Detection]) {

@@ -57,10 +57,9 @@ impl Lists {
         self.lists[row].others
     }
 
-    /// A row more, with all its pairs.
-    pub(super) fn add(&mut self, costs: impl Iterator<Item = f64>) {
+    /// A row more, with all its pairs, columns ascending.
+    pub(super) fn add(&mut self, pairs: impl Iterator<Item = Pair>) {
         let from = self.pairs.len();
-        let pairs = costs.enumerate().map(|(column, cost)| Pair { column, cost });
         self.pairs.extend(pairs.filter(|pair| pair.cost < 0.0));
         self.lists.push(List { from, to: self.pairs.len(), others: 0.0 });
     }
