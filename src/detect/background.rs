@@ -4,7 +4,7 @@ use super::first_sight::of_people;
 use super::placed::Placer;
 use super::presence::Presence;
 use super::sensor_model::{Clip, Learn, Look, SensorModel, unorganised_point};
-use super::voxel::{VoxelMap, thin};
+use super::voxel::{Thinning, VoxelMap, thin};
 use super::{Point, Prior, above_floor};
 use crate::config::{BackgroundMethod, DetectConfig};
 use crate::geometry::DVec3;
@@ -51,8 +51,7 @@ pub struct Background {
     map: Option<VoxelMap>,
     /// Scans that made the map.
     map_scans: u32,
-    keys: Vec<u64>,
-    thinned: Vec<Point>,
+    thinning: Thinning,
     /// For the voxels, which take every point of a frame; made with the first.
     placer: Option<Placer>,
 }
@@ -79,8 +78,7 @@ impl Background {
             found: Vec::new(),
             map: None,
             map_scans: 0,
-            keys: Vec::new(),
-            thinned: Vec::new(),
+            thinning: Thinning::default(),
             placer: None,
         }
     }
@@ -256,7 +254,7 @@ impl Background {
             }
         }
         if self.thin_m > 0.0 {
-            thin(points, self.thin_m, self.clip.hall.middle_m(), &mut self.keys, &mut self.thinned);
+            thin(points, self.thin_m, self.clip.hall.middle_m(), &mut self.thinning);
         }
     }
 

@@ -114,19 +114,23 @@ impl VoxelMap {
     }
 }
 
-/// Replaces the points of each voxel by their centroid, in order of z, y, x; `keys` and `thinned` are scratch. Voxels
-/// count from `middle_m`, rounded to their edges.
-pub fn thin(
-    points: &mut Vec<Point>,
-    edge_m: f64,
-    middle_m: DVec2,
-    keys: &mut Vec<u64>,
-    thinned: &mut Vec<Point>,
-) {
-    // A key holds z, y and x of the voxel in 14 bits each (1.6 km at 0.1 m) and the point in the rest.
-    const AXIS_BITS: u32 = 14;
-    const INDEX_BITS: u32 = 64 - 3 * AXIS_BITS;
+/// A key holds z, y and x of a voxel in so many bits each (1.6 km at 0.1 m), and the number of a point in the rest.
+const AXIS_BITS: u32 = 14;
+const INDEX_BITS: u32 = 64 - 3 * AXIS_BITS;
+
+/// Buffers of [`thin`].
+#[derive(Debug, Clone, Default)]
+pub struct Thinning {
+    keys: Vec<u64>,
+    sorted: Vec<u64>,
+    starts: Vec<u32>,
+    thinned: Vec<Point>,
+}
+
+/// Replaces the points of each voxel by their centroid, in order of z, y, x. Voxels count from `middle_m`, rounded to their edges.
+pub fn thin(points: &mut Vec<Point>, edge_m: f64, middle_m: DVec2, memory: &mut Thinning) {
     const HALF_AXIS: i64 = 1 << (AXIS_BITS - 1);
+    let Thinning { keys, sorted, starts, thinned } = memory;
     points.truncate(1 << INDEX_BITS);
     let [zero_x, zero_y] = (middle_m / edge_m).round().to_array();
     let part = |c: f64, zero: f64| {
@@ -141,7 +145,7 @@ pub fn thin(
         let (x, y, z) = (part(x, zero_x), part(y, zero_y), part(z, 0.0));
         ((z << AXIS_BITS | y) << AXIS_BITS | x) << INDEX_BITS | i
     }));
-    keys.sort_unstable();
+    (0..3).for_each(|axis| sort_axis(keys, sorted, starts, axis));
     thinned.clear();
     for voxel in keys.chunk_by(|a, b| a >> INDEX_BITS == b >> INDEX_BITS) {
         let mut of = voxel.iter().map(|key| &points[(key & ((1 << INDEX_BITS) - 1)) as usize]);
@@ -158,6 +162,26 @@ pub fn thin(
         });
     }
     std::mem::swap(points, thinned);
+}
+
+/// Sorts keys by one axis of their voxels, counting from x, and leaves those of equal places in order.
+fn sort_axis(keys: &mut Vec<u64>, sorted: &mut Vec<u64>, starts: &mut Vec<u32>, axis: u32) {
+    const PLACES: usize = 1 << AXIS_BITS;
+    let place = |key: u64| (key >> (INDEX_BITS + axis * AXIS_BITS)) as usize % PLACES;
+    starts.clear();
+    starts.resize(PLACES, 0);
+    keys.iter().for_each(|&key| starts[place(key)] += 1);
+    let mut sum = 0;
+    for start in &mut *starts {
+        sum += std::mem::replace(start, sum);
+    }
+    sorted.resize(keys.len(), 0);
+    for &key in &*keys {
+        let start = &mut starts[place(key)];
+        sorted[*start as usize] = key;
+        *start += 1;
+    }
+    std::mem::swap(keys, sorted);
 }
 
 #[cfg(test)]
@@ -195,7 +219,7 @@ mod tests {
     #[test]
     fn thinning_keeps_one_centroid_a_voxel() {
         let mut points = vec![point(0.02, 0.05, 0.05), point(0.06, 0.05, 0.05), point(-0.02, 0.05, 0.05)];
-        thin(&mut points, 0.1, DVec2::ZERO, &mut Vec::new(), &mut Vec::new());
+        thin(&mut points, 0.1, DVec2::ZERO, &mut Thinning::default());
         assert_eq!(points.len(), 2);
         assert_eq!(points[0].position_m.x, -0.02);
         assert!((points[1].position_m.x - 0.04).abs() < 1e-12);
@@ -205,7 +229,7 @@ mod tests {
     fn thinning_keeps_voxels_apart_far_from_the_origin() {
         let far = |x: f64| point(500_000.0 + x, 5_400_000.05, 0.05);
         let mut points = vec![far(0.05), far(0.15), far(0.16)];
-        thin(&mut points, 0.1, DVec2::new(500_000.0, 5_400_000.0), &mut Vec::new(), &mut Vec::new());
+        thin(&mut points, 0.1, DVec2::new(500_000.0, 5_400_000.0), &mut Thinning::default());
         assert_eq!(points.len(), 2);
     }
 }
