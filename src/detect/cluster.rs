@@ -8,14 +8,35 @@ use crate::geometry::DVec2;
 /// Finds connected components; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct PlanGrid {
-    /// Row, column and point, sorted.
-    keys: Vec<(i32, i32, u32)>,
-    /// First key of each cell, and one past the last.
-    starts: Vec<u32>,
+    /// Cell and point, sorted.
+    keys: Vec<(u64, u32)>,
+    /// Place and radius of each point, in that order.
+    discs: Vec<(DVec2, f64)>,
+    /// Ascending, and one past the last.
+    cells: Vec<Cell>,
     /// Union-find over the cells.
     parents: Vec<u32>,
     /// By rows above: where the neighbours of the last cell began.
     begins: Vec<u32>,
+}
+
+/// A cell that holds points.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    key: u64,
+    /// Its first point, of all in the order of cells.
+    start: u32,
+}
+
+/// In the order of rows, then of columns.
+fn key_of(row: i32, column: i32) -> u64 {
+    let unsigned = |number: i32| u64::from(number as u32 ^ 1 << 31);
+    unsigned(row) << 32 | unsigned(column)
+}
+
+fn row_and_column(key: u64) -> (i32, i32) {
+    let signed = |bits: u64| (bits as u32 ^ 1 << 31) as i32;
+    (signed(key >> 32), signed(key))
 }
 
 impl PlanGrid {
@@ -33,78 +54,70 @@ impl PlanGrid {
         let cell_m = radius_min_m * std::f64::consts::FRAC_1_SQRT_2;
         let radius_max_m = radius_m.iter().copied().fold(radius_min_m, f64::max);
         let reach = (radius_max_m / cell_m).ceil() as i32;
-        self.keys.clear();
-        self.keys.extend(points_m.iter().zip(0..).map(|(p, i)| {
+        let Self { keys, discs, cells, parents, begins } = self;
+        keys.clear();
+        keys.extend(points_m.iter().zip(0..).map(|(p, i)| {
             let cell = (*p / cell_m).floor();
-            (cell.y as i32, cell.x as i32, i)
+            (key_of(cell.y as i32, cell.x as i32), i)
         }));
-        self.keys.sort_unstable();
-        self.starts.clear();
-        for (k, key) in self.keys.iter().enumerate() {
-            if k == 0 || (key.0, key.1) != (self.keys[k - 1].0, self.keys[k - 1].1) {
-                self.starts.push(k as u32);
+        keys.sort_unstable();
+        discs.clear();
+        discs.extend(keys.iter().map(|&(_, i)| (points_m[i as usize], radius_m[i as usize])));
+        cells.clear();
+        for (&(key, _), start) in keys.iter().zip(0..) {
+            if cells.last().is_none_or(|last: &Cell| last.key != key) {
+                cells.push(Cell { key, start });
             }
         }
-        let cells = self.starts.len();
-        self.starts.push(self.keys.len() as u32);
-        self.parents.clear();
-        self.parents.extend(0..cells as u32);
-        self.begins.clear();
-        self.begins.resize(reach as usize + 1, 0);
-        for a in 0..cells {
-            self.join_neighbours(a, reach, points_m, radius_m);
+        let count = cells.len();
+        cells.push(Cell { key: u64::MAX, start: keys.len() as u32 });
+        parents.clear();
+        parents.extend(0..count as u32);
+        begins.clear();
+        begins.resize(reach as usize + 1, 0);
+        for a in 0..count {
+            self.join_neighbours(a, reach);
         }
         self.label(points_m.len(), labels)
     }
 
     /// Joins a cell with those after it in its own row and in the `reach` rows above.
-    fn join_neighbours(&mut self, a: usize, reach: i32, points_m: &[DVec2], radius_m: &[f64]) {
-        let cells = self.starts.len() - 1;
-        let (row, column, _) = self.keys[self.starts[a] as usize];
+    fn join_neighbours(&mut self, a: usize, reach: i32) {
+        let Self { discs, cells, parents, begins, .. } = self;
+        let (cells, last) = (&**cells, cells.len() - 1);
+        let (row, column) = row_and_column(cells[a].key);
         for dy in 0..=reach {
-            let from = (row.saturating_add(dy), if dy == 0 { column } else { column.saturating_sub(reach) });
-            let place = |b: usize| {
-                let key = self.keys[self.starts[b] as usize];
-                (key.0, key.1)
-            };
-            let mut b = if dy == 0 { a + 1 } else { self.begins[dy as usize] as usize };
+            let row = row.saturating_add(dy);
+            let first = key_of(row, if dy == 0 { column } else { column.saturating_sub(reach) });
+            let end = key_of(row, column.saturating_add(reach));
+            let mut b = if dy == 0 { a + 1 } else { begins[dy as usize] as usize };
             // Cells come in order, so their neighbours do, but where numbers of rows end.
-            if dy > 0 && b > 0 && place(b - 1) >= from {
+            if dy > 0 && b > 0 && cells[b - 1].key >= first {
                 b = 0;
             }
-            while b < cells && place(b) < from {
+            while b < last && cells[b].key < first {
                 b += 1;
             }
-            self.begins[dy as usize] = b as u32;
-            while b < cells && place(b) <= (from.0, column.saturating_add(reach)) {
-                let (root_a, root_b) = (find(&mut self.parents, a as u32), find(&mut self.parents, b as u32));
-                if root_a != root_b && self.touch(a, b, points_m, radius_m) {
+            begins[dy as usize] = b as u32;
+            while b < last && cells[b].key <= end {
+                let (root_a, root_b) = (find(parents, a as u32), find(parents, b as u32));
+                let of = |cell: usize| &discs[cells[cell].start as usize..cells[cell + 1].start as usize];
+                if root_a != root_b && touch(of(a), of(b)) {
                     // The smaller root stays, so the result does not depend on the order of joining.
-                    self.parents[root_a.max(root_b) as usize] = root_a.min(root_b);
+                    parents[root_a.max(root_b) as usize] = root_a.min(root_b);
                 }
                 b += 1;
             }
         }
     }
 
-    fn touch(&self, a: usize, b: usize, points_m: &[DVec2], radius_m: &[f64]) -> bool {
-        let of = |cell: usize| &self.keys[self.starts[cell] as usize..self.starts[cell + 1] as usize];
-        of(a).iter().any(|&(_, _, i)| {
-            let (p, r) = (points_m[i as usize], radius_m[i as usize]);
-            of(b).iter().any(|&(_, _, j)| {
-                let r = r.max(radius_m[j as usize]);
-                p.distance_squared(points_m[j as usize]) <= r * r
-            })
-        })
-    }
-
     fn label(&mut self, points: usize, labels: &mut Vec<u32>) -> usize {
         const NONE: u32 = u32::MAX;
         labels.clear();
         labels.resize(points, NONE);
-        for cell in 0..self.starts.len() - 1 {
-            let root = find(&mut self.parents, cell as u32);
-            for &(_, _, i) in &self.keys[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
+        for (of, cell) in self.cells.windows(2).zip(0..) {
+            let root = find(&mut self.parents, cell);
+            for &(_, i) in &self.keys[of[0].start as usize..of[1].start as usize] {
                 labels[i as usize] = root;
             }
         }
@@ -121,6 +134,16 @@ impl PlanGrid {
         }
         next as usize
     }
+}
+
+/// Whether any two points of two cells are joined.
+fn touch(a: &[(DVec2, f64)], b: &[(DVec2, f64)]) -> bool {
+    a.iter().any(|&(p, r)| {
+        b.iter().any(|&(q, other_r)| {
+            let r = r.max(other_r);
+            p.distance_squared(q) <= r * r
+        })
+    })
 }
 
 fn find(parents: &mut [u32], mut cell: u32) -> u32 {

@@ -173,8 +173,9 @@ impl Clusterer {
         self.radius_m.clear();
         for &i in &self.shown {
             let position_m = points[i as usize].position_m;
-            let range_m = self.sensors_m.iter().map(|s| s.distance(position_m)).fold(f64::INFINITY, f64::min);
-            let range_m = if range_m.is_finite() { range_m } else { 0.0 };
+            let ranges_m2 = self.sensors_m.iter().map(|s| s.distance_squared(position_m));
+            let range_m2 = ranges_m2.fold(f64::INFINITY, f64::min);
+            let range_m = if range_m2.is_finite() { range_m2.sqrt() } else { 0.0 };
             self.plan_m.push(self.moved_m[i as usize].truncate());
             self.radius_m.push(self.radius.radius_m + self.radius.per_range * range_m);
         }
