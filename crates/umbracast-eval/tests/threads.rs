@@ -42,7 +42,8 @@ fn a_step_gives_the_same_on_any_number_of_threads() {
     alone.take_over_links(&config);
     let crowd = circle_crossing(Preset::Mixed, 16, CIRCLE_M / 2.0, SEED);
     let mut scene = Scene::new(crowd, &config.site, SEED).unwrap();
-    let (mut assembler, mut health, mut links) = (Assembler::new(&config.site).unwrap(), Health::default(), 0);
+    let (mut assembler, mut health, mut links) =
+        (Assembler::new(&config.site).unwrap(), Health::default(), 0);
     for _ in 0..FRAMES {
         push(&mut assembler, &scene.next_frame().unwrap().packets, &mut health);
         while let Some(frame) = assembler.pop() {
