@@ -19,6 +19,7 @@ pub enum PersonBox {
 impl PersonBox {
     /// BoundingBoxTransform (Algorithm 1, line 8): moved to the predicted position, and turned if it can be.
     #[must_use]
+    #[inline]
     pub fn moved_by(&self, offset_m: DVec2, turn_rad: f64) -> Self {
         match self {
             Self::Aabb(aabb) => Self::Aabb(aabb.moved_by(offset_m)),
@@ -36,6 +37,7 @@ impl PersonBox {
     }
 
     /// The end of the ray: the centre of the box.
+    #[inline]
     pub fn center_m(&self) -> DVec3 {
         match self {
             Self::Aabb(aabb) => aabb.center_m(),
@@ -44,6 +46,7 @@ impl PersonBox {
     }
 
     /// CheckIntersect (line 12): where along the segment the box is first met.
+    #[inline]
     fn hit(&self, start_m: DVec3, end_m: DVec3) -> Option<f64> {
         match self {
             Self::Aabb(aabb) => slab::hit_aabb(aabb, start_m, end_m),
@@ -139,6 +142,7 @@ struct FromAbove {
 }
 
 impl FromAbove {
+    #[inline]
     fn of(access_point_m: DVec3, (position_m, person_box): &(DVec2, PersonBox)) -> Self {
         let position_m = position_m - access_point_m.truncate();
         let middle_m = (person_box.center_m() - access_point_m).truncate();
