@@ -108,8 +108,8 @@ impl Rays {
     fn sort(&mut self) {
         let Self { seen, sorted, covered, sectors } = self;
         let is_near = |(person, then): (&FromAbove, &FromAbove)| {
-            let slack_m = SLACK_M - (person.reach_m - then.reach_m).max(0.0);
-            person.middle_m.distance_squared(then.middle_m) <= slack_m * slack_m.max(0.0)
+            let moved_m = person.middle_m.distance(then.middle_m);
+            moved_m + person.reach_m <= then.reach_m + SLACK_M
         };
         if seen.len() == sorted.len() && seen.iter().zip(&*sorted).all(is_near) {
             return;
