@@ -1,7 +1,7 @@
 //! Every implementation of stage 3 against `testdata/blockage/scenes.toml`, whose answers were computed by hand.
 
 use serde::Deserialize;
-use umbracast::blockage::algorithm1::{PersonBox, cast_step};
+use umbracast::blockage::algorithm1::{PersonBox, Rays};
 use umbracast::blockage::body::{self, Posture};
 use umbracast::blockage::body_model::{Arms, BodyModel, Slice};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
@@ -57,7 +57,7 @@ fn corpus() -> Vec<Scene> {
 fn algorithm1(scene: &Scene, person_box: impl Fn(&Person) -> PersonBox) -> Vec<bool> {
     let people: Vec<_> = scene.people.iter().map(|p| (p.position_m, person_box(p))).collect();
     let mut blocked = vec![false; people.len()];
-    cast_step(scene.access_point_m, &people, &mut blocked);
+    Rays::default().cast_step(scene.access_point_m, &people, &mut blocked);
     blocked
 }
 

@@ -19,6 +19,7 @@ pub enum PersonBox {
 impl PersonBox {
     /// BoundingBoxTransform (Algorithm 1, line 8): moved to the predicted position, and turned if it can be.
     #[must_use]
+    #[inline]
     pub fn moved_by(&self, offset_m: DVec2, turn_rad: f64) -> Self {
         match self {
             Self::Aabb(aabb) => Self::Aabb(aabb.moved_by(offset_m)),
@@ -36,6 +37,7 @@ impl PersonBox {
     }
 
     /// The end of the ray: the centre of the box.
+    #[inline]
     pub fn center_m(&self) -> DVec3 {
         match self {
             Self::Aabb(aabb) => aabb.center_m(),
@@ -44,6 +46,7 @@ impl PersonBox {
     }
 
     /// CheckIntersect (line 12): where along the segment the box is first met.
+    #[inline]
     fn hit(&self, start_m: DVec3, end_m: DVec3) -> Option<f64> {
         match self {
             Self::Aabb(aabb) => slab::hit_aabb(aabb, start_m, end_m),
@@ -60,44 +63,75 @@ impl PersonBox {
     }
 }
 
-/// One step (lines 5 to 24): marks in `blocked` every person whose ray from the access point meets a nearer
-/// person's box. `people` are the moved positions with their moved boxes. Whoever is marked already is not
-/// tested again, which is what makes `blocked` that of the window.
-///
-/// The listing tests every pair. Here a pair is tested only where the boxes lie in one direction from the access point; the
-/// answers are the same.
-pub fn cast_step(access_point_m: DVec3, people: &[(DVec2, PersonBox)], blocked: &mut [bool]) {
-    let seen: Vec<FromAbove> = people.iter().map(|person| FromAbove::of(access_point_m, person)).collect();
-    let asked = blocked.iter().filter(|&&blocked| !blocked).count();
-    let sectors = (asked > FEW).then(|| {
-        let mut sectors = Sectors::<SECTORS>::default();
-        let covered = |person: &FromAbove| Covered::of::<SECTORS>(person.middle_m, person.reach_m);
-        sectors.sort(&seen.iter().map(covered).collect::<Vec<_>>());
-        sectors
-    });
-    for (q, to_q) in seen.iter().enumerate() {
-        if blocked[q] {
-            continue;
+/// Casts rays step after step in the same memory.
+#[derive(Debug, Clone, Default)]
+pub struct Rays {
+    /// Those of the step at hand.
+    seen: Vec<FromAbove>,
+    /// Who was sorted by direction last, each with [`SLACK_M`] to move.
+    sorted: Vec<FromAbove>,
+    covered: Vec<Covered>,
+    sectors: Sectors<SECTORS>,
+}
+
+impl Rays {
+    /// One step (lines 5 to 24): marks in `blocked` every person whose ray from the access point meets a nearer
+    /// person's box. `people` are the moved positions with their moved boxes. Whoever is marked already is not
+    /// tested again, which is what makes `blocked` that of the window.
+    ///
+    /// The listing tests every pair. Here a pair is tested only where the boxes lie in about one direction from the access point;
+    /// the answers are the same.
+    pub fn cast_step(&mut self, access_point_m: DVec3, people: &[(DVec2, PersonBox)], blocked: &mut [bool]) {
+        self.seen.clear();
+        self.seen.extend(people.iter().map(|person| FromAbove::of(access_point_m, person)));
+        let are_many = blocked.iter().filter(|&&blocked| !blocked).count() > FEW;
+        if are_many {
+            self.sort();
         }
-        // q's own box is never a candidate, so the nearest box that is hit (lines 13 to 16) is always another's: any hit
-        // means blocked (lines 21, 22).
-        let end_m = people[q].1.center_m();
-        let hides = |p: usize| seen[p].may_hide(to_q) && people[p].1.hit(access_point_m, end_m).is_some();
-        blocked[q] = match &sectors {
-            Some(sectors) => sectors.towards(to_q.middle_m).iter().any(|&p| hides(p as usize)),
-            None => (0..people.len()).any(hides),
+        let Self { seen, sectors, .. } = self;
+        for (q, to_q) in seen.iter().enumerate() {
+            if blocked[q] {
+                continue;
+            }
+            // q's own box is never a candidate, so the nearest box that is hit (lines 13 to 16) is always another's: any hit
+            // means blocked (lines 21, 22).
+            let end_m = people[q].1.center_m();
+            let hides = |p: usize| seen[p].may_hide(to_q) && people[p].1.hit(access_point_m, end_m).is_some();
+            blocked[q] = match are_many {
+                true => sectors.towards(to_q.middle_m).iter().any(|&p| hides(p as usize)),
+                false => (0..people.len()).any(hides),
+            };
+        }
+    }
+
+    /// Sorts people by direction, unless all are still about where they were when they were sorted.
+    fn sort(&mut self) {
+        let Self { seen, sorted, covered, sectors } = self;
+        let is_near = |(person, then): (&FromAbove, &FromAbove)| {
+            let moved_m = person.middle_m.distance(then.middle_m);
+            moved_m + person.reach_m <= then.reach_m + SLACK_M
         };
+        if seen.len() == sorted.len() && seen.iter().zip(&*sorted).all(is_near) {
+            return;
+        }
+        sorted.clone_from(seen);
+        covered.clear();
+        covered.extend(seen.iter().map(|p| Covered::of::<SECTORS>(p.middle_m, p.reach_m + SLACK_M)));
+        sectors.sort(covered);
     }
 }
 
 /// Up to so many people who are not blocked yet, testing every pair is faster than sorting by direction.
 const FEW: usize = 24;
-/// Of a turn. A person ten metres away covers about three.
-const SECTORS: usize = 256;
+/// Of a turn. A person ten metres away covers about two, with room to move.
+const SECTORS: usize = 64;
+/// So far people may move before they are sorted again: as far as they walk in four steps.
+const SLACK_M: f64 = 0.6;
 /// More than rounding errs by.
 const ROOM_M: f64 = 1e-6;
 
 /// A person from above, from the access point.
+#[derive(Debug, Clone)]
 struct FromAbove {
     position_m: DVec2,
     distance2_m2: f64,
@@ -108,6 +142,7 @@ struct FromAbove {
 }
 
 impl FromAbove {
+    #[inline]
     fn of(access_point_m: DVec3, (position_m, person_box): &(DVec2, PersonBox)) -> Self {
         let position_m = position_m - access_point_m.truncate();
         let middle_m = (person_box.center_m() - access_point_m).truncate();
@@ -152,11 +187,12 @@ mod tests {
     #[test]
     fn sorted_by_direction_the_answers_are_those_of_every_pair() {
         let mut random = rand_pcg::Pcg64::seed_from_u64(3);
+        let mut rays = Rays::default();
         for count in [3, 20, 25, 60, 300] {
             for _ in 0..20 {
                 let mut place = || random.random_range(-9.0..9.0);
                 let ap_m = DVec3::new(place(), place(), 0.5 * place().abs());
-                let people: Vec<(DVec2, PersonBox)> = (0..count)
+                let mut people: Vec<(DVec2, PersonBox)> = (0..count)
                     .map(|i| {
                         let at_m = DVec2::new(place(), place());
                         let middle_m = (at_m + 0.02 * DVec2::new(place(), place())).extend(0.9);
@@ -166,9 +202,16 @@ mod tests {
                         (at_m, if i % 2 == 0 { PersonBox::Aabb(aabb) } else { PersonBox::Obb(obb) })
                     })
                     .collect();
-                let mut blocked = vec![false; count];
-                cast_step(ap_m, &people, &mut blocked);
-                assert_eq!(blocked, every_pair(ap_m, &people));
+                for _ in 0..4 {
+                    let mut blocked = vec![false; count];
+                    rays.cast_step(ap_m, &people, &mut blocked);
+                    assert_eq!(blocked, every_pair(ap_m, &people));
+                    for (at_m, person_box) in &mut people {
+                        let offset_m = 0.03 * DVec2::new(place(), place());
+                        *at_m += offset_m;
+                        *person_box = person_box.moved_by(offset_m, place());
+                    }
+                }
             }
         }
     }

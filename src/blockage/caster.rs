@@ -1,7 +1,7 @@
 //! Casts a ray from every access point to every person, by the method of the config.
 
 use super::Blockage;
-use super::algorithm1::{self, PersonBox};
+use super::algorithm1::{PersonBox, Rays};
 use super::counts::Chances;
 use super::numbers::Numbers;
 use super::probability::{Drawn, Sampler};
@@ -194,14 +194,15 @@ impl Caster {
                 people.iter().zip(&boxes_now).map(place).collect()
             })
             .collect();
+        let mut rays = Rays::default();
         for (access_point, &ap_m) in self.access_points_m.iter().enumerate() {
             let mut now = vec![false; people.len()];
-            algorithm1::cast_step(ap_m, &moved[0], &mut now);
+            rays.cast_step(ap_m, &moved[0], &mut now);
             let mut windows = vec![[false; STEPS]; people.len()];
             let mut blocked = vec![false; people.len()];
             for step in 1..=STEPS {
                 // Algorithm 1, line 4
-                algorithm1::cast_step(ap_m, &moved[step], &mut blocked);
+                rays.cast_step(ap_m, &moved[step], &mut blocked);
                 windows.iter_mut().zip(&blocked).for_each(|(window, &b)| window[step - 1] = b);
             }
             blockages.extend(people.iter().enumerate().map(|(i, (track, _))| Blockage {

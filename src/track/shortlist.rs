@@ -71,24 +71,38 @@ impl Lists {
 
     #[inline(always)]
     fn add_portable(&mut self, costs: &[f64], columns: usize) {
+        let mut others = 0.0;
         for row in costs.chunks_exact(columns.max(1)) {
             let from = self.pairs.len();
-            let others = about_first(row);
-            let (blocks, rest) = row.as_chunks::<BLOCK>();
-            for (b, block) in blocks.iter().enumerate() {
-                let mut bits = below(block, others);
-                while bits != 0 {
-                    let k = bits.trailing_zeros() as usize;
-                    self.pairs.push(Pair { column: b * BLOCK + k, cost: block[k] });
-                    bits &= bits - 1;
-                }
-            }
-            for (column, &cost) in (blocks.len() * BLOCK..).zip(rest) {
-                if cost < others {
-                    self.pairs.push(Pair { column, cost });
-                }
+            // Rows are mostly alike, so what limits one row's list is tried with the next.
+            self.add_below(row, others);
+            let listed = self.pairs.len() - from;
+            let is_short = listed < FIRST / 2 && others < 0.0;
+            if is_short || listed > 2 * FIRST {
+                self.pairs.truncate(from);
+                others = about_first(row);
+                self.add_below(row, others);
             }
             self.lists.push(List { from, to: self.pairs.len(), others });
+        }
+    }
+
+    /// The pairs of a row that cost less than a limit.
+    #[inline(always)]
+    fn add_below(&mut self, row: &[f64], limit: f64) {
+        let (blocks, rest) = row.as_chunks::<BLOCK>();
+        for (b, block) in blocks.iter().enumerate() {
+            let mut bits = below(block, limit);
+            while bits != 0 {
+                let k = bits.trailing_zeros() as usize;
+                self.pairs.push(Pair { column: b * BLOCK + k, cost: block[k] });
+                bits &= bits - 1;
+            }
+        }
+        for (column, &cost) in (blocks.len() * BLOCK..).zip(rest) {
+            if cost < limit {
+                self.pairs.push(Pair { column, cost });
+            }
         }
     }
 
@@ -123,18 +137,12 @@ impl Lists {
 /// cost, and one of these is it.
 #[inline(always)]
 fn about_first(row: &[f64]) -> f64 {
-    /// So many least costs stay in registers.
-    const LANES: usize = BLOCK / 2;
     let (blocks, rest) = row.as_chunks::<BLOCK>();
     let mut least = [0.0; BLOCK];
-    for first in [0, LANES] {
-        let mut lanes = [0.0; LANES];
-        for block in blocks {
-            for k in 0..LANES {
-                lanes[k] = smaller(block[first + k], lanes[k]);
-            }
+    for block in blocks {
+        for k in 0..BLOCK {
+            least[k] = smaller(block[k], least[k]);
         }
-        least[first..][..LANES].copy_from_slice(&lanes);
     }
     for (least, &cost) in least.iter_mut().zip(rest) {
         *least = smaller(cost, *least);

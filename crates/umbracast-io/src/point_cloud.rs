@@ -27,6 +27,10 @@ struct Field {
     datatype: u8,
 }
 
+/// Types of fields as messages number them.
+const UINT32: u8 = 6;
+const FLOAT32: u8 = 7;
+
 /// Reads a message; `None` for bytes that are none, or a cloud without x, y and z.
 pub fn read(bytes: &[u8]) -> Option<PointCloud> {
     let mut d = Decoder::new(bytes)?;
@@ -52,36 +56,102 @@ pub fn read(bytes: &[u8]) -> Option<PointCloud> {
     let field =
         |names: &[&str]| fields.iter().find(|(name, _)| names.contains(name)).map(|(_, field)| *field);
     let [x, y, z] = [field(&["x"])?, field(&["y"])?, field(&["z"])?];
-    let reflectivity = field(&["intensity", "reflectivity"]);
-    let nanoseconds = field(&["t", "offset_time"]);
-    let (seconds, since_1970) = (field(&["time"]), field(&["timestamp"]));
+    let layout = Layout {
+        position: [x, y, z],
+        reflectivity: field(&["intensity", "reflectivity"]),
+        time: match (field(&["t", "offset_time"]), field(&["time"]), field(&["timestamp"])) {
+            (Some(field), _, _) => Time::Nanoseconds(field),
+            (_, Some(field), _) => Time::Seconds(field),
+            (_, _, Some(field)) => Time::Since1970(field),
+            _ => Time::OfMessage,
+        },
+        stamp_ns,
+    };
     // Three numbers of a point take twelve bytes in nearly every cloud; where they take fewer, the list grows.
     let points = Vec::with_capacity(height.saturating_mul(width).min(data.len() / 12));
     let mut cloud = PointCloud { stamp_ns, frame_id, points, dropped: 0 };
     // A cloud without columns has no points, however many rows it names.
     let rows = if width == 0 { 0 } else { height };
-    let starts = (0..rows).flat_map(|row| (0..width).map(move |column| row * row_step + column * point_step));
-    for start in starts {
-        let point = &data[start..start + point_step];
-        let value = |field: Field| field.value(point, big_endian);
-        let time_ns = if let Some(field) = nanoseconds {
-            stamp_ns.saturating_add(value(field)? as i64)
-        } else if let Some(field) = seconds {
-            stamp_ns.saturating_add((value(field)? * 1e9) as i64)
-        } else if let Some(field) = since_1970 {
-            (value(field)? * 1e9) as i64
-        } else {
-            stamp_ns
-        };
-        let position_m = [value(x)? as f32, value(y)? as f32, value(z)? as f32];
-        if !position_m.iter().all(|m| m.is_finite()) {
-            cloud.dropped += 1;
-            continue;
+    let points =
+        (0..rows).flat_map(|row| data[row * row_step..][..width * point_step].chunks_exact(point_step));
+    let mut take = |point: SensorPoint| match point.position_m.iter().all(|m| m.is_finite()) {
+        true => cloud.points.push(point),
+        false => cloud.dropped += 1,
+    };
+    if layout.is_usual(big_endian, point_step) {
+        points.for_each(|point| take(layout.usual_point(point)));
+    } else {
+        for point in points {
+            take(layout.point(point, big_endian)?);
         }
-        let reflectivity = reflectivity.and_then(value).unwrap_or(0.0) as f32;
-        cloud.points.push(SensorPoint { position_m, time_ns, reflectivity });
     }
     Some(cloud)
+}
+
+/// Where a point's numbers stand.
+struct Layout {
+    position: [Field; 3],
+    reflectivity: Option<Field>,
+    time: Time,
+    stamp_ns: i64,
+}
+
+/// What tells a point's time.
+enum Time {
+    /// After the message's.
+    Nanoseconds(Field),
+    /// After the message's.
+    Seconds(Field),
+    Since1970(Field),
+    OfMessage,
+}
+
+impl Layout {
+    /// `None` where a number cannot be read.
+    fn point(&self, point: &[u8], big_endian: bool) -> Option<SensorPoint> {
+        let value = |field: Field| field.value(point, big_endian);
+        let time_ns = match self.time {
+            Time::Nanoseconds(field) => self.stamp_ns.saturating_add(value(field)? as i64),
+            Time::Seconds(field) => self.stamp_ns.saturating_add((value(field)? * 1e9) as i64),
+            Time::Since1970(field) => (value(field)? * 1e9) as i64,
+            Time::OfMessage => self.stamp_ns,
+        };
+        let [x, y, z] = self.position;
+        let position_m = [value(x)? as f32, value(y)? as f32, value(z)? as f32];
+        let reflectivity = self.reflectivity.and_then(value).unwrap_or(0.0) as f32;
+        Some(SensorPoint { position_m, time_ns, reflectivity })
+    }
+
+    /// Whether [`Self::usual_point`] reads the points: all within their bytes and of the types that nearly every driver writes.
+    fn is_usual(&self, big_endian: bool, point_step: usize) -> bool {
+        let whole = |field: &Field, datatype: u8| {
+            field.datatype == datatype && field.offset.checked_add(4).is_some_and(|end| end <= point_step)
+        };
+        let time = match &self.time {
+            Time::Nanoseconds(field) => whole(field, UINT32),
+            Time::OfMessage => true,
+            Time::Seconds(_) | Time::Since1970(_) => false,
+        };
+        !big_endian
+            && time
+            && self.position.iter().chain(&self.reflectivity).all(|field| whole(field, FLOAT32))
+    }
+
+    /// [`Self::point`] without a look at types.
+    #[inline(always)]
+    fn usual_point(&self, point: &[u8]) -> SensorPoint {
+        let bytes = |field: Field| point[field.offset..].first_chunk().copied().unwrap_or_default();
+        let number = |field: Field| f32::from_le_bytes(bytes(field));
+        let after_ns = match self.time {
+            Time::Nanoseconds(field) => u32::from_le_bytes(bytes(field)),
+            _ => 0,
+        };
+        SensorPoint {
+            position_m: self.position.map(number),
+            time_ns: self.stamp_ns.saturating_add(after_ns.into()),
+            reflectivity: self.reflectivity.map_or(0.0, number),
+        }
+    }
 }
 
 impl Field {
@@ -90,8 +160,8 @@ impl Field {
     fn value(self, point: &[u8], big_endian: bool) -> Option<f64> {
         // Nearly every field is one of these.
         match (self.datatype, big_endian, point.get(self.offset..)?.first_chunk()) {
-            (7, false, Some(bytes)) => Some(f64::from(f32::from_le_bytes(*bytes))),
-            (6, false, Some(bytes)) => Some(f64::from(u32::from_le_bytes(*bytes))),
+            (FLOAT32, false, Some(bytes)) => Some(f64::from(f32::from_le_bytes(*bytes))),
+            (UINT32, false, Some(bytes)) => Some(f64::from(u32::from_le_bytes(*bytes))),
             _ => self.any_value(point, big_endian),
         }
     }
@@ -178,6 +248,21 @@ mod tests {
         }
         let cloud = read(&message(("t", 6, &7_000_u32.to_be_bytes()), true)).unwrap();
         assert_eq!((cloud.points[0].position_m, cloud.points[0].time_ns), ([1.0, 2.0, 3.0], STAMP_NS + 7000));
+    }
+
+    #[test]
+    fn a_usual_point_is_read_as_any_other() {
+        let field = |offset, datatype| Field { offset, datatype };
+        let numbers = [1.5_f32, -0.25, 3e-39, 17.0].map(f32::to_le_bytes).concat();
+        let point = [&numbers[..], &4_000_000_007_u32.to_le_bytes()].concat();
+        for (time, reflectivity) in
+            [(Time::Nanoseconds(field(16, UINT32)), Some(field(12, FLOAT32))), (Time::OfMessage, None)]
+        {
+            let position = [0, 4, 8].map(|offset| field(offset, FLOAT32));
+            let layout = Layout { position, reflectivity, time, stamp_ns: STAMP_NS };
+            assert!(layout.is_usual(false, 20) && !layout.is_usual(true, 20) && !layout.is_usual(false, 11));
+            assert_eq!(Some(layout.usual_point(&point)), layout.point(&point, false));
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use umbracast::STEPS;
-use umbracast::blockage::algorithm1::{PersonBox, cast_step};
+use umbracast::blockage::algorithm1::{PersonBox, Rays};
 use umbracast::geometry::{Aabb, DVec2, DVec3};
 
 use crate::exchange::{Answer, times, write_f64};
@@ -44,13 +44,15 @@ pub fn row(folder: &Path) -> Answer {
             write_f64(folder, "ap", &[3], &AP_M.to_array());
         },
         |scene| {
+            let (mut rays, mut people) = (Rays::default(), Vec::with_capacity(scene.now.len()));
             let mut blocked = vec![false; scene.now.len()];
             for step_m in &scene.steps_m {
                 let moved = |(&(from_m, aabb), &to_m): (&(DVec2, Aabb), &DVec2)| {
                     (to_m, PersonBox::Aabb(aabb).moved_by(to_m - from_m, 0.0))
                 };
-                let people: Vec<_> = scene.now.iter().zip(step_m).map(moved).collect();
-                cast_step(AP_M, &people, &mut blocked);
+                people.clear();
+                people.extend(scene.now.iter().zip(step_m).map(moved));
+                rays.cast_step(AP_M, &people, &mut blocked);
             }
             blocked
         },
