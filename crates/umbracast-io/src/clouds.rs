@@ -1,10 +1,12 @@
 //! What was seen and found as point clouds in the site's frame, for other programs: whole scans, the foreground, the ways of
 //! people, and links. Fields: `x y z` in metres, `time_s` since 1970, and what each function says.
 
+use std::sync::LazyLock;
+
 use glam::DVec2;
 use umbracast::detect::Point;
 use umbracast::geometry::DVec3;
-use umbracast::lidar::{Cloud, Frame};
+use umbracast::lidar::{Azimuths, Cloud, Frame};
 use umbracast::{STEPS, Site};
 
 use crate::pcd::{PcdCloud, PcdField, PcdKind};
@@ -12,6 +14,12 @@ use crate::rows::{LinkRow, TrackRow};
 
 /// So far apart are the points along a link.
 const ALONG_M: f64 = 0.1;
+
+/// Where scans' azimuths point, for who places all returns of a scan: the table is made once.
+pub fn azimuths() -> &'static Azimuths {
+    static OF_A_TURN: LazyLock<Azimuths> = LazyLock::new(Azimuths::of_a_turn);
+    &OF_A_TURN
+}
 
 /// Every return of a frame, placed where its sensor hangs: `intensity`, `sensor` (its place in the site).
 pub fn of_frame(frame: &Frame) -> PcdCloud {
@@ -24,7 +32,12 @@ pub fn of_frame(frame: &Frame) -> PcdCloud {
                 for (at, &range_m) in image.range_m.iter().enumerate().filter(|(_, range_m)| **range_m > 0.0)
                 {
                     let (c, b) = (at / beams, at % beams);
-                    let at_m = scan.site_from_sensor.point(image.point_m(c, b, f64::from(range_m)));
+                    let at_m = scan.site_from_sensor.point(image.tabled_point_m(
+                        azimuths(),
+                        c,
+                        b,
+                        f64::from(range_m),
+                    ));
                     made.push(at_m, image.time_ns(c, b), &[f64::from(image.reflectivity[at]), sensor]);
                 }
             }

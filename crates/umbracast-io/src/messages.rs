@@ -7,6 +7,7 @@ use umbracast::geometry::Pose;
 use umbracast::lidar::{Cloud, Packet, Scan};
 
 use crate::cdr::{Decoder, Encoder};
+use crate::clouds::azimuths;
 use crate::rows::{PeopleLinkRow, PeopleRow};
 
 /// Bytes of a Velodyne packet, fixed in `velodyne_msgs/VelodynePacket`.
@@ -211,7 +212,7 @@ pub fn cloud(stamp_ns: i64, sensor: &str, scan: &Scan) -> Vec<u8> {
             let i = c * beams + b;
             let range_m = image.range_m[i];
             let p = if range_m > 0.0 {
-                image.point_m(c, b, f64::from(range_m)).as_vec3()
+                image.tabled_point_m(azimuths(), c, b, f64::from(range_m)).as_vec3()
             } else {
                 glam::Vec3::NAN
             };

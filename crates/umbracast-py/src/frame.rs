@@ -8,6 +8,8 @@ use pyo3::prelude::*;
 use umbracast::geometry::{DVec3, Pose};
 use umbracast::lidar::{Cloud, Scan, SensorPoint};
 
+use umbracast_io::clouds::azimuths;
+
 use crate::told::wrong;
 
 /// A frame: the points of all sensors in 100 ms.
@@ -99,7 +101,7 @@ impl Frame {
                         image.range_m.iter().enumerate().filter(|(_, range_m)| **range_m > 0.0)
                     {
                         let (c, b) = (at / beams, at % beams);
-                        let place_m = pose.point(image.point_m(c, b, range_m.into()));
+                        let place_m = pose.point(image.tabled_point_m(azimuths(), c, b, range_m.into()));
                         see(scan.sensor, place_m, image.time_ns(c, b));
                     }
                 }

@@ -5,10 +5,11 @@
 
 use std::path::{Path, PathBuf};
 
-use umbracast::lidar::{Assembler, Azimuths, Cloud};
+use umbracast::lidar::{Assembler, Cloud};
 use umbracast::{Config, Health, Site};
 use umbracast_eval::run::chain;
 use umbracast_eval::score::scene::{SceneTruth, note_truth};
+use umbracast_io::clouds::azimuths;
 use umbracast_io::input::Given;
 use umbracast_io::point_cloud;
 use umbracast_io::recording::{Entry, RecordingReader, RecordingWriter};
@@ -102,7 +103,7 @@ fn clouds_of(path: &Path) -> Columns {
 fn packets_of(path: &Path, site: &Site) -> Columns {
     let given = Given::of(&[path.to_owned()]).expect("the recording is there");
     let inputs = given.of_site(site, &[]).expect("the recording is of the site");
-    let (azimuths, mut columns) = (Azimuths::of_a_turn(), Columns::default());
+    let mut columns = Columns::default();
     let lost = inputs.scenes[0].frames(site, &mut Health::default(), |frame| {
         for scan in &frame.scans {
             let Cloud::Organised(image) = &scan.cloud else { continue };
@@ -110,7 +111,7 @@ fn packets_of(path: &Path, site: &Site) -> Columns {
                 for b in 0..image.beams.len() {
                     let range_m = image.range_m[c * image.beams.len() + b];
                     if range_m > 0.0 {
-                        let at_m = image.tabled_point_m(&azimuths, c, b, range_m.into()).as_vec3();
+                        let at_m = image.tabled_point_m(azimuths(), c, b, range_m.into()).as_vec3();
                         columns.x_m.push(at_m.x);
                         columns.y_m.push(at_m.y);
                         columns.z_m.push(at_m.z);
