@@ -7,7 +7,6 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use umbracast::geometry::{DVec3, Pose};
 use umbracast::lidar::{Cloud, Scan, SensorPoint};
-
 use umbracast_io::clouds::azimuths;
 
 use crate::told::wrong;
