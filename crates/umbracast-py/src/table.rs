@@ -70,7 +70,12 @@ impl Table {
         match column.data_type() {
             DataType::Float64 => lent(this, column.as_primitive::<Float64Type>()),
             DataType::UInt32 => lent(this, column.as_primitive::<UInt32Type>()),
-            DataType::UInt64 => lent(this, column.as_primitive::<UInt64Type>()),
+            DataType::UInt64 if column.null_count() == 0 => lent(this, column.as_primitive::<UInt64Type>()),
+            DataType::UInt64 => {
+                let value = |v: Option<u64>| v.map_or(f64::NAN, |v| v as f64);
+                let values = column.as_primitive::<UInt64Type>().iter().map(value).collect();
+                Ok(PyArray1::from_vec(py, values).into_any())
+            }
             DataType::Int64 => lent(this, column.as_primitive::<Int64Type>()),
             DataType::Boolean if column.null_count() == 0 => {
                 let values: Vec<bool> = column.as_boolean().iter().flatten().collect();

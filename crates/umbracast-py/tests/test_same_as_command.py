@@ -95,6 +95,14 @@ def test_truth_and_answers_have_the_digests_of_the_command(both):
             assert digest(table) == digest_of_csv(folder / "out" / f"{name}.csv", table), name
 
 
+def test_whoever_is_nobodys_thing_has_nan_for_an_owner_and_not_track_0(both):
+    _, scene = both
+    pipeline = umbracast.Pipeline(scene.site, threads=2)
+    pipeline.learn(scene.empty)
+    owners = pipeline.run(scene.frames[:20]).tracks["part_of"]
+    assert len(owners) > 0 and all(math.isnan(owner) for owner in owners)
+
+
 def test_frame_by_frame_and_by_packets_is_the_same(both):
     _, scene = both
     whole = umbracast.Pipeline(scene.site)
