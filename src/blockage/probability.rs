@@ -183,7 +183,7 @@ impl Sampler {
         self.kept[..self.kept_links].get(link).into_iter().flat_map(Kept::any_now)
     }
 
-    /// What becomes of such a link if its samples weigh so much: as [`Self::chances`]. `None` where nothing is kept.
+    /// What becomes of such a link if its samples weigh so much: as [`Self::ask`] tells it. `None` where nothing is kept.
     pub(super) fn weighed(&self, link: usize, weights: &[f32], threshold: f64) -> Option<Chances> {
         let kept = self.kept[..self.kept_links].get(link)?;
         let weigh = |word: usize, bits: u32| weight_of(&weights[word * WORD..], bits);

@@ -1,7 +1,6 @@
 //! How long a step of the default mode takes as people, sensors and access points grow: `cargo run --release --manifest-path
-//! bench/Cargo.toml --bin growth [PEOPLE SENSORS ACCESS_POINTS [THREADS] | FIGURE.svg]`. On one core,
-//! and some rows once more on all there are. Each frame is run three times from the same
-//! memory. The table gives the fastest of the three, which other programs disturb least, and the middle one beside.
+//! bench/Cargo.toml --bin growth [PEOPLE SENSORS ACCESS_POINTS [THREADS] | FIGURE.svg]`. On one core, and some rows once more on all
+//! there are. Each frame is run three times from the same memory. The table gives the fastest of the three, which other programs disturb least, and the middle one beside.
 
 use std::time::Duration;
 

@@ -82,7 +82,7 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
     let recordings = args.mcap.then_some((args.out.as_path(), args.points));
     let reports = args.reports.as_deref().map(|file| Tabled::read(file, &config.site)).transpose()?;
     let at_once = setup::threads(common.threads);
-    let threads = at_once.div_ceil(inputs.len().max(1));
+    let threads = (at_once / inputs.len().max(1)).max(1);
     let reports = reports.as_ref();
     let method = Method { config: &config, weights: &weights, empty: &empty, threads, reports, recordings };
     let watch = Stopwatch::start();
