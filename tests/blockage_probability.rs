@@ -2,6 +2,7 @@
 
 use umbracast::blockage::body_model::{Arms, BodyModel, Slice};
 use umbracast::blockage::{Blockage, Caster, Numbers};
+use umbracast::config::BlockageConfig;
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
 use umbracast::gait::GaitPhase;
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
@@ -203,4 +204,12 @@ fn a_crowd_sheds_samples_says_so_and_hardly_changes_what_it_tells() {
     let mean = off.iter().sum::<f64>() / off.len() as f64;
     // One sigma of a single one is 0.09 at most.
     assert!(mean > 0.0 && mean < 0.03, "{mean}");
+    let mut of_all = Caster::new(&BlockageConfig { samples_min: 128, ..config.blockage }, &config.site);
+    let mut again = Vec::new();
+    for _ in 0..2 {
+        again.clear();
+        of_all.cast(&tracks, &forecasts, &mut again);
+        assert!(!of_all.took_fewer_samples(), "nobody allowed it to");
+    }
+    assert_eq!(again, all);
 }

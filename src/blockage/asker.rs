@@ -22,10 +22,8 @@ use crate::site::Ue;
 /// with two access points have a thousand meetings at most, and all samples.
 const TESTS_MAX: usize = 1 << 18;
 /// What a person takes of that by being seen and followed, which lasts as long as so many tests: a crowd's frame is not to last
-/// longer for it. Forty people are left the fewest samples, which moves their F1 and calibration by less than .002.
+/// longer for it. Forty people are left the fewest samples.
 const TESTS_PER_PERSON: usize = 6000;
-/// Fewer samples are not taken: a probability of 0.5 is then 0.09 off (one sigma).
-const SAMPLES_MIN: usize = WORD;
 /// Room from the start for the meetings of one link at a step in a crowd, so that a step allocates nothing.
 const MEETINGS: usize = 1 << 7;
 
@@ -55,6 +53,8 @@ pub(super) struct Everybody<'a> {
     pub(super) bodies: &'a [Trajectories],
     /// How many samples of each count.
     pub(super) samples: usize,
+    /// And the fewest that may.
+    pub(super) samples_min: usize,
 }
 
 /// A link: from which access point to whose UE.
@@ -209,7 +209,7 @@ impl Asker {
     #[inline(always)]
     fn count_unasked(&mut self, among: Everybody) {
         for step in 0..MOMENTS {
-            while affordable(among.bodies.len(), self.asked) > SAMPLES_MIN
+            while affordable(among.bodies.len(), self.asked, among.samples_min) > among.samples_min
                 && self.shadows.next(among.figure, among.bodies, step).is_some()
             {
                 self.asked += 1;
@@ -265,10 +265,10 @@ pub(crate) fn chances_of<'a>(lost: impl Fn(usize) -> &'a [u32], samples: usize, 
     counts.chances(samples as f64)
 }
 
-/// How many samples there is time for, in whole words: with so many people, and so many meetings of all their links.
-pub(super) fn affordable(people: usize, meetings: usize) -> usize {
+/// How many samples there is time for, with so many people, and so many meetings of all their links: whole words, or `least`.
+pub(super) fn affordable(people: usize, meetings: usize, least: usize) -> usize {
     let tests = TESTS_MAX.saturating_sub(TESTS_PER_PERSON * people);
-    (tests / meetings.max(1)).max(SAMPLES_MIN) / WORD * WORD
+    (tests / meetings.max(1) / WORD * WORD).max(least)
 }
 
 impl Link {

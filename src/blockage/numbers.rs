@@ -8,6 +8,8 @@ use crate::config::{BlockageConfig, Mechanism};
 pub struct Numbers {
     /// Joint samples of everybody's trajectory.
     pub samples: usize,
+    /// The fewest of them that are asked, however many bodies may stand in the way.
+    pub samples_min: usize,
     /// Seed of the samples.
     pub seed: u64,
     /// Whether the steps of a sample are one trajectory: those of a window are not independent. Otherwise each step is
@@ -40,6 +42,7 @@ impl Numbers {
         }
         Self {
             samples: config.samples,
+            samples_min: config.samples_min,
             seed: config.seed,
             joint: !without(Mechanism::JointSampling),
             body,

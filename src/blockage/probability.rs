@@ -40,8 +40,9 @@ pub struct Sampler {
     present: usize,
     /// How many of them have links.
     links_of: usize,
-    /// How many samples each of them has.
+    /// How many samples each of them has, and the fewest that a frame may have.
     samples: usize,
+    samples_min: usize,
     hall: Hall,
     /// As many as threads may ask.
     askers: Vec<Asker>,
@@ -77,6 +78,7 @@ impl Sampler {
             present: 0,
             links_of: 0,
             samples: numbers.samples,
+            samples_min: numbers.samples_min,
             hall: site.hall.clone(),
             askers: vec![Asker::new(site)],
             asked: 0,
@@ -110,7 +112,8 @@ impl Sampler {
         self.draws.retain(|&id, _| people.clone().any(|(track, _)| track.id == id));
         // Where there is more to ask than time allows, samples are left out, for all links alike; what is left is a sample of
         // the same distribution, for draws are in no order. A frame has about as much to ask as the one before.
-        self.samples = numbers.samples.min(affordable(self.present, self.asked));
+        self.samples = numbers.samples.min(affordable(self.present, self.asked, numbers.samples_min));
+        self.samples_min = numbers.samples_min;
         self.askers.iter_mut().for_each(Asker::begin);
         self.present = 0;
         for (track, forecast) in people {
@@ -159,7 +162,12 @@ impl Sampler {
         self.chances.resize(links, Chances::default());
         self.kept_links = if self.keeps { links } else { 0 };
         self.kept.resize_with(self.kept.len().max(self.kept_links), Kept::default);
-        let among = Everybody { figure: &self.figure, bodies: &self.people[..self.present], samples };
+        let among = Everybody {
+            figure: &self.figure,
+            bodies: &self.people[..self.present],
+            samples,
+            samples_min: self.samples_min,
+        };
         let mut kept = self.kept[..self.kept_links].chunks_mut(RUN);
         let runs = self.chances.chunks_mut(RUN).map(|chances| (chances, kept.next().unwrap_or_default()));
         let askers =

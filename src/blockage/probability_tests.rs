@@ -280,8 +280,9 @@ fn processors_with_narrower_registers_give_the_same_bits() {
     wide.draw(&numbers, &ue, people());
     narrow.draw_portably(&numbers, &ue, people());
     let told = wide.ask(&ue, &aps_m, 0.5);
-    let Sampler { figure, people, present, samples, askers, .. } = &mut narrow;
-    let among = Everybody { figure, bodies: &people[..*present], samples: *samples };
+    let Sampler { figure, people, present, samples, samples_min, askers, .. } = &mut narrow;
+    let (samples, samples_min) = (*samples, *samples_min);
+    let among = Everybody { figure, bodies: &people[..*present], samples, samples_min };
     for (ap, &ap_m) in aps_m.iter().enumerate() {
         for person in 0..tracks.len() {
             let aim = Aim { ue: &ue, ap, ap_m, person, threshold: 0.5 };

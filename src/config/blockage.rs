@@ -18,6 +18,8 @@ pub struct BlockageConfig {
     pub person_box: BoxKind,
     /// Joint samples of everybody's trajectory.
     pub samples: usize,
+    /// The fewest of them that a crowd is left with.
+    pub samples_min: usize,
     /// Seed of the samples.
     pub seed: u64,
     /// A link counts as blocked, now or within any window, at this probability.

@@ -27,6 +27,9 @@ pub(super) fn stages(
         let found = blockage.samples;
         return Err(Error::new(format!("blockage.samples: expected 1 to {SAMPLES_MAX}, found {found}")));
     }
+    if blockage.samples_min < 1 {
+        return Err(Error::new("blockage.samples_min: expected 1 or more, found 0".to_owned()));
+    }
     if !(blockage.threshold > 0.0 && blockage.threshold <= 1.0) {
         let found = blockage.threshold;
         return Err(Error::new(format!(

@@ -82,6 +82,8 @@ struct Memory {
     taken: Vec<bool>,
     ranks: Vec<Rank>,
     beside: Vec<Beside>,
+    /// Of things, ascending.
+    owners: Vec<u64>,
 }
 
 /// Fewest first: the confirmed, those of more matches, the older.
@@ -327,10 +329,16 @@ impl MixtureTracker {
 
     /// Everybody's track, in the memory of the last frame's.
     fn tell(&mut self, time_ns: i64, step_s: f64, tracks: &mut Vec<Track>) {
+        let owners = &mut self.memory.owners;
+        owners.clear();
+        owners.extend(self.people.iter().filter_map(|person| person.attached.part_of()));
+        owners.sort_unstable();
         tracks.truncate(self.people.len());
         for (i, person) in self.people.iter_mut().enumerate() {
             let observed = tracks.get_mut(i).map(|old| std::mem::take(&mut old.observed)).unwrap_or_default();
-            let track = person.track(&self.numbers, time_ns, step_s, &self.visibility.hall, observed);
+            let has_thing = owners.binary_search(&person.id).is_ok();
+            let track =
+                person.track(&self.numbers, has_thing, time_ns, step_s, &self.visibility.hall, observed);
             match tracks.get_mut(i) {
                 Some(old) => *old = track,
                 None => tracks.push(track),

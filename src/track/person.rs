@@ -63,6 +63,10 @@ const SHOWN_SHARE: f64 = 0.6;
 const BOX_AVERAGE_S: f64 = 1.0;
 /// The width of a box until one was seen.
 const WIDTH_M: f64 = 0.5;
+/// How far the axis of who pushes or pulls something lies off for as long as he does, one sigma of an axis: now and then its points
+/// count as his. And of who carries something over the head, which hides it. Both beside what the outline leaves.
+const WITH_THING_M: f64 = 0.03;
+const WITH_CANOPY_M: f64 = 0.015;
 
 /// A track with everything behind it, at the time of the last frame.
 #[derive(Debug, Clone)]
@@ -283,10 +287,12 @@ impl Person {
         }
     }
 
-    /// The track at the frame's time, `step_s` after the last frame; the filter stands there. `observed` gives its memory.
+    /// The track at the frame's time, `step_s` after the last frame, of who has a thing or none; the filter stands there. `observed`
+    /// gives its memory.
     pub(super) fn track(
         &mut self,
         numbers: &Numbers,
+        has_thing: bool,
         time_ns: i64,
         step_s: f64,
         hall: &Hall,
@@ -298,7 +304,11 @@ impl Person {
         self.observed.push(time_ns, position_m, velocity_mps);
         observed.clone_from(&self.observed.0);
         let outline_m = self.outline.levels_m();
-        let lasting_m2 = numbers.usual.axis_variance_m2(&outline_m);
+        let canopy = self.shape.canopy();
+        let with_thing_m = if has_thing { WITH_THING_M } else { 0.0 };
+        let with_canopy_m = if canopy.is_some() { WITH_CANOPY_M } else { 0.0 };
+        let lasting_m2 =
+            numbers.usual.axis_variance_m2(&outline_m) + with_thing_m.powi(2) + with_canopy_m.powi(2);
         let mut covariance = state.P;
         (0..2).for_each(|axis| covariance[axis][axis] += lasting_m2);
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
@@ -316,7 +326,7 @@ impl Person {
             width_scale: 1.0,
             width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m,
-            canopy: self.shape.canopy(),
+            canopy,
             gait: self.limb_phase.phase(velocity_mps.length()),
             points: self.points,
             confirmed: self.confirmed

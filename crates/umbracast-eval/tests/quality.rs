@@ -5,7 +5,7 @@ use umbracast::{Config, Mode};
 use umbracast_eval::run::chain::{People, SceneSpec, Spec, run};
 use umbracast_eval::run::pooled::{Group, score};
 use umbracast_eval::run::scene_score::Predictor;
-use umbracast_sim::body::Bodies;
+use umbracast_sim::body::{Bodies, kind::Kind};
 use umbracast_sim::crowd::{Preset, circle_crossing};
 
 /// Within 300 ms, from the access point at the side.
@@ -46,7 +46,7 @@ const BOUNDS: [Bounds; 3] = [
 fn no_crowd_scores_below_its_bounds() {
     let mut fallen = Vec::new();
     for (seed, bounds) in (100_000..).step_by(SCENES).zip(&BOUNDS) {
-        let group = scores(bounds, seed);
+        let group = scores(bounds.preset, bounds.site, Bodies::default(), seed);
         let links = group.link(Some(Mode::Default), Predictor::Run, ACCESS_POINT).unwrap();
         let window = &links.windows[WINDOW - 1];
         let ece = links.windows.iter().filter_map(|w| w.ece).sum::<f64>() / links.windows.len() as f64;
@@ -66,20 +66,31 @@ fn no_crowd_scores_below_its_bounds() {
     assert!(fallen.is_empty(), "{fallen:#?}");
 }
 
+#[test]
+fn who_pushes_something_or_carries_it_over_the_head_is_followed_no_surer_than_right() {
+    // Measured: 2.9 and 1.9; without a part of the spread of their own 4.1 and 2.4.
+    for (kind, nees_max) in [(Kind::Frame, 3.1), (Kind::Umbrella, 2.2)] {
+        let group = scores(Preset::Orca03, "", Bodies::new(vec![(kind, 1.0)], []).unwrap(), 100_100);
+        let nees = group.modes[0].position_nees.value.unwrap();
+        println!("{kind:?}: NEES {nees:.3}, at most {nees_max}");
+        assert!(nees < nees_max, "{kind:?}: expected {nees_max} at most, found {nees}");
+    }
+}
+
 /// Ten people cross a small circle, so that they meet after a few seconds; a scene ends when most have crossed.
-fn scores(bounds: &Bounds, first_seed: u64) -> Group {
+fn scores(preset: Preset, site: &str, bodies: Bodies, first_seed: u64) -> Group {
     let scene = |seed: u64| {
-        let mut crowd = circle_crossing(bounds.preset, 10, 7.0, seed);
+        let mut crowd = circle_crossing(preset, 10, 7.0, seed);
         crowd.duration_ns = crowd.duration_ns.min(14_000_000_000);
         SceneSpec {
-            group: bounds.preset.name().to_owned(),
+            group: preset.name().to_owned(),
             seed,
             people: People::Replayed(crowd),
-            bodies: Bodies::default(),
+            bodies: bodies.clone(),
         }
     };
     let spec = Spec {
-        configs: vec![Config::with_overlay(Mode::Default, bounds.site, "site").unwrap()],
+        configs: vec![Config::with_overlay(Mode::Default, site, "site").unwrap()],
         weights: None,
         scenes: (first_seed..).take(SCENES).map(scene).collect(),
         keep: None,

@@ -70,6 +70,47 @@ pub fn shapes(book: &mut Book) -> Result<()> {
     Ok(())
 }
 
+/// Whether the owner's body blocks a device in the hand, in halls of other shapes: of who stops, queues and meets, and of people
+/// of many kinds among them.
+pub fn hands(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record hands");
+    let kinds = "bag=0.15,phone=0.15,child=0.15,gesturing=0.15,rucksack=0.1,wheelchair=0.1";
+    for (people, bodies) in [("mixed", ""), ("kinds", kinds)] {
+        for site in ["l-hall", "hexagon", "corridor"] {
+            let file = format!("config/sites/{site}.toml");
+            let mut words =
+                vec!["evaluate", "--mode", "default", "--scenes", "20", "--preset", "mixed", "--site", &file];
+            if !bodies.is_empty() {
+                words.extend(["--bodies", bodies]);
+            }
+            book.line(&format!("# {people}, {site}: umbracast {}", words.join(" ")));
+            let said = book.quietly(&words.into_iter().map(OsString::from).collect::<Vec<_>>())?;
+            let by_cause = said.lines().skip_while(|line| !line.starts_with("Blockage by cause"));
+            for line in
+                by_cause.filter(|line| line.starts_with("access point") || line.contains("the owner  "))
+            {
+                book.line(line);
+            }
+            book.line("");
+        }
+    }
+    Ok(())
+}
+
+/// Crowds that are asked with fewer samples beside the same crowds asked with all.
+pub fn shedding(book: &mut Book) -> Result<()> {
+    book.command("cargo xtask record shedding");
+    let all = book.scratch("all-samples.toml");
+    fs::write(&all, "[blockage]\nsamples_min = 128\n").map_err(|e| e.to_string())?;
+    for (people, scenes) in [("40", "8"), ("100", "4"), ("300", "2")] {
+        let crowd = ["--scenes", scenes, "--preset", "orca-03", "--people", people];
+        book.score(&format!("{people}-as-shipped"), crowd)?;
+        let site = [OsString::from("--site"), argument(&all)];
+        book.score(&format!("{people}-all-samples"), crowd.map(OsString::from).into_iter().chain(site))?;
+    }
+    book.compare()
+}
+
 /// Other bodies and real people beside the ORCA row.
 pub fn people(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record people");

@@ -44,6 +44,8 @@ pub struct Row {
     pub onset_f1: Vec<(String, Estimate)>,
     /// F1 at 300 ms of devices that are bound to a track once.
     pub bound_f1: Vec<(String, Estimate)>,
+    /// Expected calibration error of the window in which it is largest.
+    pub worst_ece: Vec<(String, Estimate)>,
     /// F1 at 300 ms of who says "as now", the present being the truth's.
     pub persistence_f1: Vec<(String, Estimate)>,
     /// Scans of sensors that were not there.
@@ -77,6 +79,7 @@ struct Window {
     w: usize,
     f1: Estimate,
     onset_f1: Estimate,
+    ece: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -108,13 +111,20 @@ pub fn rows(name: &str, scores_json: &[u8]) -> Result<Vec<Row>, Error> {
 }
 
 fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
-    let at_300_ms = |mode: Option<Mode>, predictor: Predictor, score: fn(&Window) -> Estimate| {
-        let own = |links: &&Links| links.mode == mode && links.predictor == predictor.name();
-        let of = |links: &Links| {
-            let window = links.windows.iter().find(|window| window.w == 3);
-            (links.access_point.clone(), window.map(score).unwrap_or_default())
+    let by_access_point =
+        |mode: Option<Mode>, predictor: Predictor, score: &dyn Fn(&[Window]) -> Estimate| {
+            let own = |links: &&Links| links.mode == mode && links.predictor == predictor.name();
+            let of = |links: &Links| (links.access_point.clone(), score(&links.windows));
+            group.links.iter().filter(own).map(of).collect()
         };
-        group.links.iter().filter(own).map(of).collect()
+    let at_300_ms = |mode: Option<Mode>, predictor: Predictor, score: fn(&Window) -> Estimate| {
+        let of =
+            |windows: &[Window]| windows.iter().find(|window| window.w == 3).map(score).unwrap_or_default();
+        by_access_point(mode, predictor, &of)
+    };
+    let worst_ece = |windows: &[Window]| {
+        let value = windows.iter().filter_map(|window| window.ece).reduce(f64::max);
+        Estimate { value, ..Estimate::default() }
     };
     let mode = Some(scores.mode);
     Row {
@@ -136,6 +146,7 @@ fn row(name: &str, group: &Group, scores: &Stage1) -> Row {
         f1: at_300_ms(mode, Predictor::Run, |window| window.f1),
         onset_f1: at_300_ms(mode, Predictor::Run, |window| window.onset_f1),
         bound_f1: at_300_ms(mode, Predictor::BoundOnce, |window| window.f1),
+        worst_ece: by_access_point(mode, Predictor::Run, &worst_ece),
         persistence_f1: at_300_ms(None, Predictor::PersistenceOfTruth, |window| window.f1),
         scans_missing: scores.health.sensors_missing,
     }
@@ -181,7 +192,7 @@ fn table(title: &str, rows: &[Row], text: impl Fn(Estimate, usize) -> String) ->
         "in 90 %",
     ];
     let mut table = Table::new(title, 3, &header);
-    for score in ["F1", "onset", "bound once", "persistence"] {
+    for score in ["F1", "onset", "worst ECE", "bound once", "persistence"] {
         table.header.extend(access_points.iter().map(|name| format!("{score} {name}")));
     }
     table.header.push("scans missing".to_owned());
@@ -194,7 +205,7 @@ fn table(title: &str, rows: &[Row], text: impl Fn(Estimate, usize) -> String) ->
         cells.extend([row.position_nees, row.velocity_nees].map(|score| text(score, 2)));
         cells.push(text(row.displacement_m, 3));
         cells.extend(row.in_regions.map(|value| text(Estimate { value, ..Estimate::default() }, 2)));
-        for scores in [&row.f1, &row.onset_f1, &row.bound_f1, &row.persistence_f1] {
+        for scores in [&row.f1, &row.onset_f1, &row.worst_ece, &row.bound_f1, &row.persistence_f1] {
             let of = |name: &&str| scores.iter().find(|(own, _)| own == name).map(|(_, f1)| *f1);
             cells.extend(access_points.iter().map(|name| text(of(name).unwrap_or_default(), 3)));
         }
