@@ -3,7 +3,7 @@
 
 use super::arms::{ARM_M, have_one_head, is_arm};
 use super::canopy::is_overhead;
-use super::expected::{EXPECTED_HALVES_M, are_expected_apart, expected, expected_near};
+use super::expected::{EXPECTED_HALVES_M, apart_m, are_expected_apart, expected, expected_near};
 use super::means::{PASSES, means, one_more, people_if};
 use super::memory::{Memory, PEOPLE_OF_CLUSTER};
 use super::part::{POINTS_MIN, Part};
@@ -15,7 +15,7 @@ use crate::geometry::{DVec2, DVec3};
 const HALVES_M: f64 = 0.42;
 /// What ends below this height is legs alone: the hips of most adults.
 pub(super) const FULL_BODY_TOP_M: f64 = 0.9;
-/// Parts whose means are nearer than this are one person: nobody's body axis comes nearer to another's.
+/// Parts whose means are nearer than this are one person: outside a press nobody's body axis comes nearer to another's.
 const ONE_PERSON_M: f64 = 0.33;
 /// A low part nearer than this to a person is a leg: half a stride.
 const LIMB_M: f64 = 0.55;
@@ -143,8 +143,9 @@ fn among_known(
         }
         whole.look(moved_m);
         let ends_m = whole.ends_m(whole.axis_m(moved_m));
+        let beside_m = apart_m(BESIDE_M, priors[k].position_m, priors);
         let beside_m =
-            priors[k].shape.map_or(BESIDE_M, |shape| BESIDE_M.max(HALVES_OF_LENGTH * shape.longest_m()));
+            priors[k].shape.map_or(beside_m, |shape| beside_m.max(HALVES_OF_LENGTH * shape.longest_m()));
         let are_two =
             |two: &[Part]| are_people(two, beside_m) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M);
         let first = parts.len();
@@ -299,16 +300,16 @@ fn tidy(parts: &mut Vec<Part>) {
 }
 
 fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> bool {
-    let apart_m = a.mean_m().distance(b.mean_m());
+    let (middle_m, off_m) = (a.mean_m().midpoint(b.mean_m()), a.mean_m().distance(b.mean_m()));
     if a.owner.is_some() && b.owner.is_some() {
         return false;
     }
-    if apart_m < ONE_PERSON_M {
+    if off_m < apart_m(ONE_PERSON_M, middle_m, priors) {
         return !are_expected_apart(a.mean_m(), b.mean_m(), priors);
     }
     // A leg in mid-stride stands apart from its body, is low, and shows less.
     let (small, large) = if a.points.len() < b.points.len() { (a, b) } else { (b, a) };
-    if apart_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m {
+    if off_m < LIMB_M && small.top_m < LIMB_TOP_SHARE * large.top_m {
         return true;
     }
     // Who is not known has no arms here, for strangers who stand close show as little of themselves.
@@ -419,6 +420,25 @@ mod tests {
         let close = [body(0.0, 0.0), body(0.35, 0.0)].concat();
         assert_eq!(people(&close, &[]), 1);
         assert_eq!(people(&close, &[prior(0.0, 0.0), prior(0.4, 0.0)]), 2);
+    }
+
+    #[test]
+    fn who_is_pressed_between_others_is_not_one_with_a_neighbour() {
+        // Two who were just found, 0.3 m apart, of whom one is known, and four around them.
+        let pressed =
+            [(0.0, 0.0), (-0.4, 0.0), (0.0, -0.4), (0.0, 0.4), (0.7, 0.0)].map(|(x, y)| prior(x, y));
+        let points_m = [body(0.0, 0.0), body(0.3, 0.0)].concat();
+        let left = |priors: &[Prior]| {
+            let halves = [0..40, 40..80];
+            let mut parts: Vec<Part> = halves.map(|half| Part::new(&points_m, half.collect())).into();
+            merge(&points_m, &mut parts, priors, &mut Memory::default());
+            parts.len()
+        };
+        assert_eq!(left(&pressed), 2);
+        assert_eq!(left(&pressed[..1]), 1, "nobody presses");
+        let mut with_a_pram = pressed;
+        with_a_pram[4].height_m = 1.0;
+        assert_eq!(left(&with_a_pram), 1, "what is pushed needs room");
     }
 
     #[test]

@@ -9,6 +9,31 @@ use crate::geometry::{DVec2, DVec3};
 pub(super) const EXPECTED_HALVES_M: f64 = 0.3;
 /// A point or part nearer than this to an expected person may be that person.
 const EXPECTED_M: f64 = 0.3;
+/// Where so many grown people are within this of each other, they press: their axes come as near as [`PRESSED_APART_M`]. Who sits and
+/// what is pushed is lower, and needs more room.
+const PRESSED_PEOPLE: usize = 5;
+pub const PRESSED_M: f64 = 1.0;
+const GROWN_M: f64 = 1.4;
+pub const PRESSED_APART_M: f64 = 0.25;
+
+/// Whether people so tall, all who are near a place, press there: many, and nobody among them who sits or is pushed.
+pub fn press(heights_m: impl Iterator<Item = f64>) -> bool {
+    let (mut people, mut all_grown) = (0, true);
+    for height_m in heights_m {
+        people += 1;
+        all_grown &= height_m > GROWN_M;
+    }
+    all_grown && people >= PRESSED_PEOPLE
+}
+
+/// How near two are at least: `usual_m`, or less where grown people press around this place.
+pub(super) fn apart_m(usual_m: f64, at_m: DVec2, priors: &[Prior]) -> f64 {
+    let near = |prior: &&Prior| prior.confirmed && prior.position_m.distance(at_m) < PRESSED_M;
+    match press(priors.iter().filter(near).map(|prior| prior.height_m)) {
+        true => PRESSED_APART_M,
+        false => usual_m,
+    }
+}
 
 /// How many confirmed people are expected so near to any of these that none of them is alone.
 pub(super) fn expected_near(parts: &[&Part], priors: &[Prior]) -> usize {

@@ -40,6 +40,7 @@ pub use background::keep_most;
 pub use canopy::Overhead;
 pub use clocks::Clocks;
 pub use doubled::doubled;
+pub(crate) use expected::{PRESSED_APART_M, PRESSED_M, press};
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
 #[doc(hidden)] // For the card of the model of the body axis.

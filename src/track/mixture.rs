@@ -16,7 +16,7 @@ use super::remembered::{FURNITURE_MAX, PEOPLE_MAX, Remembered, Words};
 use super::visibility::{Body, BodyView, Visibility, detection_probability};
 use crate::Site;
 use crate::config::TrackConfig;
-use crate::detect::{Detection, Prior};
+use crate::detect::{Detection, PRESSED_APART_M, PRESSED_M, Prior, press};
 use crate::geometry::DVec2;
 use crate::lidar::Views;
 
@@ -36,11 +36,12 @@ const BIRTH_RADIUS_M: f64 = 0.45;
 /// crowd, whose clusters are shared out among those who are known, so that nobody is found in halves.
 const BIRTH_BESIDE_SEEN_M: f64 = 0.30;
 const CROWD_PEOPLE: usize = 3;
-const CROWD_M: f64 = 1.0;
 /// What is found so near to a person may be his arm, or held by him: half the span of a tall one's arms.
 const ARM_REACH_M: f64 = 0.95;
-/// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it.
+/// Two tracks nearer than this are one body whose halves two tracks share: no two trunks fit into it. Where people press, who is
+/// found so near is more often somebody whose place is known badly.
 const DUPLICATE_M: f64 = 0.3;
+const DUPLICATE_PRESSED_M: f64 = 0.2;
 /// How much higher than his head, and lower than his highest slice that beams meet, detections of somebody end; from twice as much
 /// on they are taken for somebody else's, or say nothing: one in twenty does.
 const ABOVE_M: f64 = 0.12;
@@ -254,8 +255,12 @@ impl MixtureTracker {
         neighbours.renew(places_m.iter().copied());
         for i in 0..self.people.len() {
             let place_m = places_m[i];
-            let doubles = |k: usize| places_m[k].distance(place_m) < DUPLICATE_M && ranks[k] < ranks[i];
-            let doubled = neighbours.about(place_m, DUPLICATE_M).any(doubles);
+            let near = |k: &usize| places_m[*k].distance(place_m) < PRESSED_M;
+            let heights_m =
+                neighbours.about(place_m, PRESSED_M).filter(near).map(|k| self.people[k].height_m().0);
+            let least_m = if press(heights_m) { DUPLICATE_PRESSED_M } else { DUPLICATE_M };
+            let doubles = |k: usize| places_m[k].distance(place_m) < least_m && ranks[k] < ranks[i];
+            let doubled = neighbours.about(place_m, least_m).any(doubles);
             let person = &mut self.people[i];
             person.doubled_s = if doubled { person.doubled_s + step_s } else { 0.0 };
         }
@@ -299,10 +304,15 @@ impl MixtureTracker {
         places_m.extend(people.iter().map(|p| p.filter.position_m()));
         for (&d, _) in order.iter().zip(taken).filter(|(_, taken)| !**taken) {
             let detection = &detections[d];
-            let around = places_m.iter().filter(|place| place.distance(detection.position_m) < CROWD_M);
-            let crowded = around.count() >= CROWD_PEOPLE;
+            let near = |(_, place): &(usize, &DVec2)| place.distance(detection.position_m) < PRESSED_M;
+            let around = places_m.iter().enumerate().filter(near);
+            let beside_seen_m = match around.clone().count() >= CROWD_PEOPLE {
+                true if press(around.map(|(k, _)| people[k].height_m().0)) => PRESSED_APART_M,
+                true => BIRTH_BESIDE_SEEN_M,
+                false => BIRTH_RADIUS_M,
+            };
             let near = |(place_m, seen): (&DVec2, &bool)| {
-                let least_m = if crowded && *seen { BIRTH_BESIDE_SEEN_M } else { BIRTH_RADIUS_M };
+                let least_m = if *seen { beside_seen_m } else { BIRTH_RADIUS_M };
                 place_m.distance(detection.position_m) <= least_m
             };
             if !detection.full_body || places_m.iter().zip(&*seen).any(near) {
