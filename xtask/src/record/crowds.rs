@@ -102,7 +102,7 @@ pub fn shedding(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record shedding");
     let all = book.scratch("all-samples.toml");
     fs::write(&all, "[blockage]\nsamples_min = 128\n").map_err(|e| e.to_string())?;
-    for (people, scenes) in [("40", "8"), ("100", "4"), ("300", "2")] {
+    for (people, scenes) in [("40", "4"), ("100", "2")] {
         let crowd = ["--scenes", scenes, "--preset", "orca-03", "--people", people];
         book.score(&format!("{people}-as-shipped"), crowd)?;
         let site = [OsString::from("--site"), argument(&all)];
