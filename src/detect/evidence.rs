@@ -135,7 +135,7 @@ fn among_known(
     memory: &mut Memory,
 ) {
     let people = known.iter().map(|&k| &priors[k]);
-    let (mut own, strangers) = memory.share_out(moved_m, cluster, people, CROWD_SIGMA_M);
+    let (mut own, strangers) = memory.share_out(moved_m, cluster, people.clone(), CROWD_SIGMA_M);
     for (&k, mut whole) in known.iter().zip(own.drain(..)) {
         if whole.points.is_empty() {
             memory.points.give(whole.points);
@@ -143,9 +143,9 @@ fn among_known(
         }
         whole.look(moved_m);
         let ends_m = whole.ends_m(whole.axis_m(moved_m));
-        let beside_m = apart_m(BESIDE_M, priors[k].position_m, priors);
+        let apart_m = apart_m(BESIDE_M, priors[k].position_m, people.clone());
         let beside_m =
-            priors[k].shape.map_or(beside_m, |shape| beside_m.max(HALVES_OF_LENGTH * shape.longest_m()));
+            priors[k].shape.map_or(apart_m, |shape| apart_m.max(HALVES_OF_LENGTH * shape.longest_m()));
         let are_two =
             |two: &[Part]| are_people(two, beside_m) && two.iter().all(|part| part.top_m >= FULL_BODY_TOP_M);
         let first = parts.len();
@@ -300,11 +300,11 @@ fn tidy(parts: &mut Vec<Part>) {
 }
 
 fn is_one_person(moved_m: &[DVec3], a: &Part, b: &Part, priors: &[Prior]) -> bool {
-    let (middle_m, off_m) = (a.mean_m().midpoint(b.mean_m()), a.mean_m().distance(b.mean_m()));
+    let off_m = a.mean_m().distance(b.mean_m());
     if a.owner.is_some() && b.owner.is_some() {
         return false;
     }
-    if off_m < apart_m(ONE_PERSON_M, middle_m, priors) {
+    if off_m < ONE_PERSON_M && off_m < apart_m(ONE_PERSON_M, a.mean_m().midpoint(b.mean_m()), priors.iter()) {
         return !are_expected_apart(a.mean_m(), b.mean_m(), priors);
     }
     // A leg in mid-stride stands apart from its body, is low, and shows less.

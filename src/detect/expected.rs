@@ -26,10 +26,10 @@ pub fn press(heights_m: impl Iterator<Item = f64>) -> bool {
     all_grown && people >= PRESSED_PEOPLE
 }
 
-/// How near two are at least: `usual_m`, or less where grown people press around this place.
-pub(super) fn apart_m(usual_m: f64, at_m: DVec2, priors: &[Prior]) -> f64 {
+/// How near two are at least: `usual_m`, or less where those of these who are expected around this place press.
+pub(super) fn apart_m<'a>(usual_m: f64, at_m: DVec2, priors: impl Iterator<Item = &'a Prior>) -> f64 {
     let near = |prior: &&Prior| prior.confirmed && prior.position_m.distance(at_m) < PRESSED_M;
-    match press(priors.iter().filter(near).map(|prior| prior.height_m)) {
+    match press(priors.filter(near).map(|prior| prior.height_m)) {
         true => PRESSED_APART_M,
         false => usual_m,
     }

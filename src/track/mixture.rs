@@ -253,14 +253,14 @@ impl MixtureTracker {
         places_m.clear();
         places_m.extend(self.people.iter().map(|p| p.filter.position_m()));
         neighbours.renew(places_m.iter().copied());
+        let (places_m, neighbours) = (&*places_m, &*neighbours);
         for i in 0..self.people.len() {
             let place_m = places_m[i];
-            let near = |k: &usize| places_m[*k].distance(place_m) < PRESSED_M;
-            let heights_m =
-                neighbours.about(place_m, PRESSED_M).filter(near).map(|k| self.people[k].height_m().0);
-            let least_m = if press(heights_m) { DUPLICATE_PRESSED_M } else { DUPLICATE_M };
-            let doubles = |k: usize| places_m[k].distance(place_m) < least_m && ranks[k] < ranks[i];
-            let doubled = neighbours.about(place_m, least_m).any(doubles);
+            let within =
+                |m: f64| neighbours.about(place_m, m).filter(move |k| places_m[*k].distance(place_m) < m);
+            let is_doubled = |m: f64| within(m).any(|k| ranks[k] < ranks[i]);
+            let heights_m = within(PRESSED_M).map(|k| self.people[k].height_m().0);
+            let doubled = is_doubled(DUPLICATE_M) && (is_doubled(DUPLICATE_PRESSED_M) || !press(heights_m));
             let person = &mut self.people[i];
             person.doubled_s = if doubled { person.doubled_s + step_s } else { 0.0 };
         }
