@@ -354,6 +354,7 @@ mod tests {
             ("[track]\ncoast_max_s = nan", "track.coast_max_s"),
             ("[track]\nwithout = [\"arms\"]", "track.without"),
             ("[blockage]\nsamples = 0", "blockage.samples"),
+            ("[blockage]\nsamples_min = 0", "blockage.samples_min"),
             ("[blockage]\nthreshold = 1.5", "blockage.threshold"),
             ("[site]\nsensors = []", "site.sensors"),
             ("[[site.pillars]]\nposition_m = [1.0, 2.0]\nradius_m = -1.0", "site.pillars[0].radius_m"),
