@@ -45,7 +45,11 @@ ROWS = [
     ("background", CLOUDS),
     ("unorganised", CLOUDS),
     ("tracking", [(peer, ["{python}", f"{{here}}/tracking_{peer}.py", "{folder}"]) for peer in ["norfair", "motpy", "stonesoup"]]),
-    ("forecast", [(peer, ["{python}", f"{{here}}/forecast_{peer}.py", "{folder}"]) for peer in ["torch", "onnxruntime"]]),
+    (
+        "forecast",
+        [(peer, ["{python}", f"{{here}}/forecast_{peer}.py", "{folder}"]) for peer in ["torch", "onnxruntime"]]
+        + [("its multiply-adds alone", [OURS, "forecast-multiply-adds", "{folder}"])],
+    ),
     (
         "algorithm1",
         [
@@ -159,7 +163,8 @@ def main():
                     here = f"{row}, {case['case']}"
                     print(f"{here:34} {name:40} {ours_ms:10.4g} {peer_ms:10.4g} {peer_ms / ours_ms:7.2f} {aim}", flush=True)
                     both = [told(k, case["found"].get(k), v) for k, v in peer["found"].items() if not math.isnan(v)]
-                    found.append(f"{here}, {name}: {'; '.join(both)}")
+                    if both:
+                        found.append(f"{here}, {name}: {'; '.join(both)}")
     print("\nWhat both found, ours / the peer's:")
     print("\n".join(found))
 

@@ -25,13 +25,14 @@ use exchange::Answer;
 type Row = fn(&Path) -> Answer;
 
 /// Every row by name, in the order of the table, and the peers that are written in Rust as `ROW-PEER`.
-const ROWS: [(&str, Row); 15] = [
+const ROWS: [(&str, Row); 16] = [
     ("simulate", simulate::row),
     ("links", links::row),
     ("background", background::organised),
     ("unorganised", background::unorganised),
     ("tracking", tracking::row),
     ("forecast", forecast::row),
+    ("forecast-multiply-adds", forecast::multiply_adds),
     ("algorithm1", algorithm1::row),
     ("algorithm1-listing", algorithm1::listing),
     ("assignment", assignment::row),
