@@ -67,7 +67,7 @@ const JOBS: [Job; 57] = [
     job("sites", "other heights, a lost sensor, more people, pairs", 10, Needs::Nothing, crowds::sites),
     job("shapes", "three halls of other shapes, devices in the hand: what blocks, by cause", 4, Needs::Nothing, crowds::shapes),
     job("hands", "the same halls: devices in the hands of who stops and meets, and of who carries or sits", 4, Needs::Nothing, crowds::hands),
-    job("shedding", "what the samples cost that a crowd leaves out", 5, Needs::Nothing, crowds::shedding),
+    job("shedding", "what the samples cost that a crowd leaves out", 25, Needs::Nothing, crowds::shedding),
     job("strangers", "bodies of another maker, and what people carry and push", 15, Needs::Nothing, crowds::strangers),
     job("people", "other bodies, real walkers, dense crowds", 6, Needs::Data, crowds::people),
     job("walkers", "16 real walkers, ten draws of bodies, error budget and oracles", 3, Needs::Data, crowds::walkers),

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::fs;
 
 use super::book::Book;
-use crate::tools::{Result, argument};
+use crate::tools::{Result, argument, root};
 
 /// How recorded walkers of the circle antipode experiment are read.
 const ANTIPODE: [&str; 6] = ["--centre", "--unit", "cm", "--fps", "25", "--trajectories"];
@@ -97,16 +97,22 @@ pub fn hands(book: &mut Book) -> Result<()> {
     Ok(())
 }
 
-/// Crowds that are asked with fewer samples beside the same crowds asked with all.
+/// Crowds that are asked with fewer samples beside the same crowds asked with all: two of them cross the default circle, for three
+/// hundred people there is room in a concourse.
 pub fn shedding(book: &mut Book) -> Result<()> {
+    const ALL: &str = "[blockage]\nsamples_min = 128\n";
     book.command("cargo xtask record shedding");
-    let all = book.scratch("all-samples.toml");
-    fs::write(&all, "[blockage]\nsamples_min = 128\n").map_err(|e| e.to_string())?;
-    for (people, scenes) in [("40", "4"), ("100", "2")] {
-        let crowd = ["--scenes", scenes, "--preset", "orca-03", "--people", people];
-        book.score(&format!("{people}-as-shipped"), crowd)?;
-        let site = [OsString::from("--site"), argument(&all)];
-        book.score(&format!("{people}-all-samples"), crowd.map(OsString::from).into_iter().chain(site))?;
+    let concourse =
+        fs::read_to_string(root().join("config/sites/concourse.toml")).map_err(|e| e.to_string())?;
+    let crowds = [("40", "4", "orca-03", ""), ("100", "2", "orca-03", ""), ("300", "2", "mixed", &concourse)];
+    for (people, scenes, preset, site) in crowds {
+        for (name, settings) in [("as-shipped", site.to_owned()), ("all-samples", ALL.to_owned() + site)] {
+            let name = format!("{people}-{name}");
+            let file = book.scratch(&format!("{name}.toml"));
+            fs::write(&file, settings).map_err(|e| e.to_string())?;
+            let crowd = ["--scenes", scenes, "--preset", preset, "--people", people, "--site"];
+            book.score(&name, crowd.map(OsString::from).into_iter().chain([argument(&file)]))?;
+        }
     }
     book.compare()
 }
