@@ -91,11 +91,23 @@ impl Book {
         Ok(out + &err)
     }
 
-    /// Scores in memory under a name, for [`Book::compare`].
+    /// Scores in memory of mode `default` under a name, for [`Book::compare`].
     pub fn score<A: Into<OsString>>(&mut self, name: &str, words: impl IntoIterator<Item = A>) -> Result<()> {
-        let words: Vec<OsString> = words.into_iter().map(Into::into).collect();
-        let words: Vec<OsString> =
-            ["evaluate", "--mode", "default"].map(OsString::from).into_iter().chain(words).collect();
+        self.score_in("default", name, words)
+    }
+
+    /// The same of the given modes.
+    pub fn score_in<A: Into<OsString>>(
+        &mut self,
+        modes: &str,
+        name: &str,
+        words: impl IntoIterator<Item = A>,
+    ) -> Result<()> {
+        let words: Vec<OsString> = ["evaluate", "--mode", modes]
+            .map(OsString::from)
+            .into_iter()
+            .chain(words.into_iter().map(Into::into))
+            .collect();
         self.line(&format!("# {name}: umbracast {}", spoken(&words)));
         let folder = self.scratch(name);
         let scores = self.streams(&words.into_iter().chain(["--json".into()]).collect::<Vec<OsString>>())?.0;

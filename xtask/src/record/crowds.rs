@@ -135,19 +135,23 @@ pub fn people(book: &mut Book) -> Result<()> {
     book.compare()
 }
 
+/// The three methods, beside one another.
+const EVERY_MODE: &str = "hdl,paper,default";
+
 /// Bodies of the family that nothing was fitted to, and what people carry and push, 20 scenes each.
 pub fn strangers(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record strangers");
     let crowd = ["--scenes", "20", "--preset", "orca-03"];
-    book.score("own", crowd)?;
-    book.score("b", crowd.into_iter().chain(["--meshes", "b"]))?;
+    book.score_in(EVERY_MODE, "own", crowd)?;
+    book.score_in(EVERY_MODE, "b", crowd.into_iter().chain(["--meshes", "b"]))?;
     let third = ["--meshes", "b", "--bodies", "phone=0.17,pockets=0.17"];
-    book.score("b-phones", crowd.into_iter().chain(third))?;
+    book.score_in(EVERY_MODE, "b-phones", crowd.into_iter().chain(third))?;
     for kind in ["bag", "phone", "child", "rucksack", "umbrella", "pram", "frame", "wheelchair"] {
-        book.score(kind, crowd.into_iter().chain(["--bodies", kind]))?;
+        book.score_in(EVERY_MODE, kind, crowd.into_iter().chain(["--bodies", kind]))?;
     }
-    book.score("mixed", ["--scenes", "20", "--preset", "mixed"])?;
-    book.score("gesturing", ["--scenes", "20", "--preset", "mixed", "--bodies", "gesturing"])?;
+    let mixed = ["--scenes", "20", "--preset", "mixed"];
+    book.score_in(EVERY_MODE, "mixed", mixed)?;
+    book.score_in(EVERY_MODE, "gesturing", mixed.into_iter().chain(["--bodies", "gesturing"]))?;
     book.compare()
 }
 
@@ -228,7 +232,13 @@ pub fn walkers(book: &mut Book) -> Result<()> {
             book.line(&format!("{name:<42} {base_rate:>9}  {f1} {onset_f1:>9}"));
         }
     }
-    Ok(())
+    let (how, files_follow) = ANTIPODE.split_at(5);
+    for (name, meshes) in [("own", "own"), ("family b", "b")] {
+        let meshes = ["--meshes", meshes];
+        let words = how.iter().chain(&meshes).chain(files_follow).map(OsString::from);
+        book.score_in(EVERY_MODE, name, words.chain(std::iter::repeat_n(file.clone(), 20)))?;
+    }
+    book.compare()
 }
 
 /// Of the error budget and the ladder, at `side` within 300 ms: who, then base rate, F1 and onset F1.
