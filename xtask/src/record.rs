@@ -109,7 +109,7 @@ const JOBS: [Job; 57] = [
     job("explain", "why the paper's figures are what they are", 4, Needs::Nothing, scores::explain),
     job("ablation", "each mechanism off alone", 45, Needs::Data, scores::ablation),
     job("reproduce-quick", "the paper's experiment in 40 scenes", 6, Needs::Nothing, scores::reproduce_quick),
-    job("reproduce", "the paper's experiment whole, training first: an hour", 70, Needs::Asking, scores::reproduce),
+    job("reproduce", "the paper's experiment whole, training first: half an hour", 30, Needs::Asking, scores::reproduce),
     job("slurm", "the job files on a Slurm of this one machine", 3, Needs::Program("slurmctld"), house::slurm),
     job("kubernetes", "the job files as a cluster would read them", 3, Needs::Program("python3"), house::kubernetes),
     job("tests", "CI on a fresh clone, nothing built, step by step", 16, Needs::Asking, house::tests),

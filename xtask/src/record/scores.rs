@@ -64,7 +64,7 @@ pub fn reproduce_quick(book: &mut Book) -> Result<()> {
     Ok(())
 }
 
-/// The paper's experiment whole, training first: an hour on two cores. `REPRODUCE` names a folder in which an earlier
+/// The paper's experiment whole, training first: half an hour on two cores. `REPRODUCE` names a folder in which an earlier
 /// try is gone on with.
 pub fn reproduce(book: &mut Book) -> Result<()> {
     let out = std::env::var_os("REPRODUCE").map_or_else(|| book.scratch("reproduce"), PathBuf::from);
