@@ -4,12 +4,14 @@
 /// A method that does what another, always inlined, does, compiled once more for processors with wider registers, which all have
 /// instructions that find and count bits, too. No instruction that rounds otherwise is used (fused multiply-add is another
 /// feature), so both give the same bits.
+#[doc(hidden)] // For the fit of the networks.
+#[macro_export]
 macro_rules! wide {
     ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? (&mut self $($rest:tt)*) $($what:tt)*) => {
-        $crate::elementary::wide! { @ [$(#[$doc])* $vis] $name [$(<$life>)?] self [&mut self] ($($rest)*) $($what)* }
+        $crate::wide! { @ [$(#[$doc])* $vis] $name [$(<$life>)?] self [&mut self] ($($rest)*) $($what)* }
     };
     ($(#[$doc:meta])* $vis:vis fn $name:ident (&self $($rest:tt)*) $($what:tt)*) => {
-        $crate::elementary::wide! { @ [$(#[$doc])* $vis] $name [] self [&self] ($($rest)*) $($what)* }
+        $crate::wide! { @ [$(#[$doc])* $vis] $name [] self [&self] ($($rest)*) $($what)* }
     };
     (@ [$($before:tt)*] $name:ident [$($life:tt)*] $this:ident [$($receiver:tt)*] (
         $(, $arg:ident: $kind:ty)* $(,)?
@@ -34,7 +36,7 @@ macro_rules! wide {
         }
     };
 }
-pub(crate) use wide;
+pub(crate) use crate::wide;
 
 /// Adding it rounds to a whole number, which then stands in the low bits.
 const WHOLE: f64 = 6_755_399_441_055_744.0;

@@ -34,6 +34,7 @@
 mod elementary;
 mod shared;
 pub mod error;
+mod tensors;
 pub mod geometry;
 pub mod health;
 pub mod site;

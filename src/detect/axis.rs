@@ -1,187 +1,134 @@
 //! The model of the body axis: a small network that computes the position of a body's axis from what the sensors saw
 //! of it.
 //!
-//! One hidden layer of `tanh`. It runs twice, on the view and on its mirror image, so that mirrored people get
-//! mirrored positions. It ships as `models/body_axis.toml`; the card beside it has data and scores. It was fitted on
-//! simulated returns by `umbracast train axis`.
+//! Each point goes through the same three layers. The largest and the mean of each number over all points (a PointNet: Qi et
+//! al. 2017), with numbers of the whole body, go through three more. It ships as `models/body_axis.safetensors`; the card beside
+//! it has data and scores. It was fitted on simulated returns by `umbracast train axis`.
 
-use std::array::from_fn;
+use std::fmt;
+use std::sync::Arc;
 
-use serde::Deserialize;
+use safetensors::SafeTensors;
 
-use super::features::{AxisFeatures, EVEN, ODD};
+use super::axis_view::{AxisView, OF_BODY, OF_POINT};
 use crate::Error;
-use crate::elementary::{tanh, wide};
+use crate::elementary::wide;
 use crate::geometry::DVec2;
+use crate::tensors::Layer;
 
-/// Numbers that the network gives: the offset from the view's base away from the sensor and to the left of that, in
-/// units of [`UNIT_M`], then the logarithms of their variances.
+/// Numbers that the network gives: the offset from the view's base along and across, in units of [`UNIT_M`], then the
+/// logarithms of their variances.
 pub const OUTPUTS: usize = 4;
 /// Unit of the network's offsets.
 pub const UNIT_M: f64 = 0.05;
-/// Inputs are held within so many standard deviations.
-pub const INPUT_LIMIT: f64 = 4.0;
+/// Units of the layers that each point goes through, then of those of the whole body; the last gives [`OUTPUTS`].
+pub const POINT_UNITS: [usize; 3] = [32, 32, 64];
+pub const BODY_UNITS: [usize; 2] = [128, 64];
+/// What the layers of the whole body read.
+pub const POOLED: usize = 2 * POINT_UNITS[2] + OF_BODY;
 /// A cluster that is no single body shall not be moved about.
 const OFFSET_LIMIT_M: f64 = 0.15;
 /// Nor believed without end, nor be worth nothing: logarithms of variances in units.
 const LOG_VARIANCE: (f64, f64) = (-5.0, 4.0);
 
-/// The network's numbers.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AxisModel {
-    /// Mean of each even input in the training data. Odd inputs have a mean of zero.
-    pub even_mean: Vec<f64>,
-    /// Standard deviation of each even input.
-    pub even_scale: Vec<f64>,
-    /// Standard deviation of each odd input.
-    pub odd_scale: Vec<f64>,
-    /// A row for each hidden unit, its weights of the even and then the odd inputs.
-    pub hidden: Vec<Vec<f64>>,
-    /// One for each hidden unit.
-    pub hidden_bias: Vec<f64>,
-    /// A row for each output, its weights of the hidden units.
-    pub output: Vec<Vec<f64>>,
-    /// One for each output.
-    pub output_bias: Vec<f64>,
+/// The network as `umbracast train axis` made it.
+const SHIPPED: &[u8] = include_bytes!("../../models/body_axis.safetensors");
+
+/// The network's weights. A clone shares them.
+#[derive(Clone)]
+pub struct AxisModel(Arc<Network>);
+
+struct Network {
+    first: Layer<OF_POINT, { POINT_UNITS[0] }>,
+    second: Layer<{ POINT_UNITS[0] }, { POINT_UNITS[1] }>,
+    third: Layer<{ POINT_UNITS[1] }, { POINT_UNITS[2] }>,
+    fourth: Layer<POOLED, { BODY_UNITS[0] }>,
+    fifth: Layer<{ BODY_UNITS[0] }, { BODY_UNITS[1] }>,
+    head: Layer<{ BODY_UNITS[1] }, OUTPUTS>,
 }
 
 impl AxisModel {
     /// The model that is embedded in the program.
     pub fn shipped() -> Self {
-        Self::parse(include_str!("../../models/body_axis.toml"))
-            .expect("the embedded file is proven by a test")
+        Self::from_safetensors(SHIPPED).expect("the embedded file is proven by a test")
     }
 
-    /// Reads a model.
+    /// From the bytes of a safetensors file with PyTorch's tensors of f32: `points.0`, `points.1` and `points.2`, which each
+    /// point goes through, then `body.0`, `body.1` and `body.2`, with a `.weight` and a `.bias` each.
     ///
     /// # Errors
-    /// No TOML, or matrices of another shape, with what was expected and found.
-    pub fn parse(text: &str) -> Result<Self, Error> {
-        let model: Self =
-            toml::from_str(text).map_err(|e| Error::new(format!("model of the body axis: {e}")))?;
-        let units = model.hidden.len();
-        let shapes = [
-            ("even_mean", EVEN, model.even_mean.len()),
-            ("even_scale", EVEN, model.even_scale.len()),
-            ("odd_scale", ODD, model.odd_scale.len()),
-            ("hidden_bias", units, model.hidden_bias.len()),
-            ("output", OUTPUTS, model.output.len()),
-            ("output_bias", OUTPUTS, model.output_bias.len()),
-        ];
-        let rows = |name, expected, rows: &[Vec<f64>]| {
-            rows.iter().map(|row| (name, expected, row.len())).collect::<Vec<_>>()
-        };
-        let hidden = rows("a row of hidden", EVEN + ODD, &model.hidden);
-        let output = rows("a row of output", units, &model.output);
-        match shapes.into_iter().chain(hidden).chain(output).find(|(_, expected, found)| expected != found) {
-            None => Ok(model),
-            Some((name, expected, found)) => Err(Error::new(format!(
-                "model of the body axis: {name}: expected {expected} numbers, found {found}"
-            ))),
-        }
+    /// A tensor that is missing, has another shape or kind, or holds a number that is not finite.
+    pub fn from_safetensors(bytes: &[u8]) -> Result<Self, Error> {
+        let file = SafeTensors::deserialize(bytes).map_err(|e| Error::new(format!("weights: {e}")))?;
+        Ok(Self(Arc::new(Network {
+            first: Layer::read(&file, "points.0")?,
+            second: Layer::read(&file, "points.1")?,
+            third: Layer::read(&file, "points.2")?,
+            fourth: Layer::read(&file, "body.0")?,
+            fifth: Layer::read(&file, "body.1")?,
+            head: Layer::read(&file, "body.2")?,
+        })))
     }
 
     /// Ground point of the body axis, and the covariance of its error, m^2.
-    pub fn locate(&self, view: &AxisFeatures) -> (DVec2, [[f64; 2]; 2]) {
-        Network::of(self.clone()).locate(view)
-    }
-
-    /// The inputs of the network: as many standard deviations off their means.
-    pub fn inputs(&self, even: &[f64; EVEN], odd: &[f64; ODD]) -> [f64; EVEN + ODD] {
-        from_fn(|i| {
-            let input = if i < EVEN {
-                (even[i] - self.even_mean[i]) / self.even_scale[i]
-            } else {
-                odd[i - EVEN] / self.odd_scale[i - EVEN]
-            };
-            input.clamp(-INPUT_LIMIT, INPUT_LIMIT)
-        })
-    }
-}
-
-/// So many hidden units are summed up side by side.
-const UNITS: usize = 16;
-
-/// The model as it is asked: hidden units side by side, so that sums run in vector registers.
-#[derive(Debug, Clone)]
-pub(super) struct Network {
-    model: AxisModel,
-    units: Vec<Units>,
-}
-
-/// Some hidden units; of those that are not there every weight is 0.
-#[derive(Debug, Clone)]
-struct Units {
-    of_inputs: [[f64; UNITS]; EVEN + ODD],
-    bias: [f64; UNITS],
-    to_outputs: [[f64; UNITS]; OUTPUTS],
-}
-
-impl Network {
-    pub(super) fn of(model: AxisModel) -> Self {
-        let units = |first: usize| {
-            let of = |weight: &dyn Fn(usize) -> f64| -> [f64; UNITS] {
-                from_fn(|u| if first + u < model.hidden.len() { weight(first + u) } else { 0.0 })
-            };
-            Units {
-                of_inputs: from_fn(|i| of(&|u| model.hidden[u][i])),
-                bias: of(&|u| model.hidden_bias[u]),
-                to_outputs: from_fn(|o| of(&|u| model.output[o][u])),
-            }
-        };
-        let units = (0..model.hidden.len()).step_by(UNITS).map(units).collect();
-        Self { model, units }
-    }
-
-    /// See [`AxisModel::locate`].
-    pub(super) fn locate(&self, view: &AxisFeatures) -> (DVec2, [[f64; 2]; 2]) {
-        let [own, mirrored] = self.forward(view);
-        let offset = DVec2::new(own[0] + mirrored[0], own[1] - mirrored[1]) * (0.5 * UNIT_M);
-        let offset = offset.clamp_length_max(OFFSET_LIMIT_M);
-        let variance = |i: usize| {
-            (0.5 * (own[i] + mirrored[i])).clamp(LOG_VARIANCE.0, LOG_VARIANCE.1).exp() * UNIT_M * UNIT_M
-        };
+    pub fn locate(&self, view: &AxisView) -> (DVec2, [[f64; 2]; 2]) {
+        let outputs = self.0.outputs(view).map(f64::from);
+        let offset_m = (DVec2::new(outputs[0], outputs[1]) * UNIT_M).clamp_length_max(OFFSET_LIMIT_M);
+        let variance = |i: usize| outputs[i].clamp(LOG_VARIANCE.0, LOG_VARIANCE.1).exp() * UNIT_M * UNIT_M;
         let (along, across) = (variance(2), variance(3));
-        let (a, l) = (view.away, view.away.perp());
+        let (a, l) = (view.along, view.across);
         let xy = along * a.x * a.y + across * l.x * l.y;
         let covariance =
             [[along * a.x * a.x + across * l.x * l.x, xy], [xy, along * a.y * a.y + across * l.y * l.y]];
-        (view.base_m + a * offset.x + l * offset.y, covariance)
+        (view.base_m + a * offset_m.x + l * offset_m.y, covariance)
     }
+}
 
+impl fmt::Debug for AxisModel {
+    /// The widths, not thousands of numbers.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("AxisModel").field("points", &POINT_UNITS).field("body", &BODY_UNITS).finish()
+    }
+}
+
+impl Network {
     wide! {
-        fn forward(&self, view: &AxisFeatures) -> [[f64; OUTPUTS]; 2] = forward_avx2 or forward_portably
+        fn outputs(&self, view: &AxisView) -> [f32; OUTPUTS] = outputs_avx2 or outputs_portably
     }
 
-    /// What the network says of a view and of its mirror image, whose odd inputs have the other sign: the sums over the even
-    /// ones are the same.
     #[inline(always)]
-    fn forward_portably(&self, view: &AxisFeatures) -> [[f64; OUTPUTS]; 2] {
-        let inputs = self.model.inputs(&view.even, &view.odd);
-        let bias: [f64; OUTPUTS] = from_fn(|o| self.model.output_bias[o]);
-        let mut outputs = [bias; 2];
-        for units in &self.units {
-            let mut own = [0.0; UNITS];
-            for (weights, x) in units.of_inputs[..EVEN].iter().zip(&inputs) {
-                (0..UNITS).for_each(|u| own[u] += weights[u] * x);
-            }
-            let mut mirrored = own;
-            for (weights, x) in units.of_inputs[EVEN..].iter().zip(&inputs[EVEN..]) {
-                for u in 0..UNITS {
-                    let product = weights[u] * x;
-                    own[u] += product;
-                    mirrored[u] -= product;
-                }
-            }
-            for (outputs, mut sums) in outputs.iter_mut().zip([own, mirrored]) {
-                (0..UNITS).for_each(|u| sums[u] = tanh(sums[u] + units.bias[u]));
-                for (output, weights) in outputs.iter_mut().zip(&units.to_outputs) {
-                    *output += weights.iter().zip(&sums).map(|(weight, unit)| weight * unit).sum::<f64>();
-                }
+    fn outputs_portably(&self, view: &AxisView) -> [f32; OUTPUTS] {
+        const UNITS: usize = POINT_UNITS[2];
+        let (mut largest, mut sums) = ([f32::MIN; UNITS], [0.0; UNITS]);
+        for point in view.of_points() {
+            let mut first = self.first.of(point);
+            rectify(&mut first);
+            let mut second = self.second.of(&first);
+            rectify(&mut second);
+            let third = self.third.of(&second);
+            for u in 0..UNITS {
+                largest[u] = if third[u] > largest[u] { third[u] } else { largest[u] };
+                sums[u] += third[u];
             }
         }
-        outputs
+        let share = 1.0 / view.of_points().len().max(1) as f32;
+        let mut pooled = [0.0; POOLED];
+        for u in 0..UNITS {
+            (pooled[u], pooled[UNITS + u]) = (largest[u], share * sums[u]);
+        }
+        pooled[2 * UNITS..].copy_from_slice(&view.of_body);
+        let mut fourth = self.fourth.of(&pooled);
+        rectify(&mut fourth);
+        let mut fifth = self.fifth.of(&fourth);
+        rectify(&mut fifth);
+        self.head.of(&fifth)
+    }
+}
+
+#[inline(always)]
+fn rectify<const N: usize>(units: &mut [f32; N]) {
+    for unit in units {
+        *unit = if *unit > 0.0 { *unit } else { 0.0 };
     }
 }
 
@@ -190,16 +137,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shipped_model_has_the_shape_that_is_read() {
-        assert!(AxisModel::shipped().hidden.len() >= 8);
-    }
-
-    #[test]
-    fn a_model_of_another_shape_is_refused_with_what_was_expected() {
-        let text = include_str!("../../models/body_axis.toml");
-        let short = text.replacen("hidden_bias = [", "hidden_bias = [0.5, ", 1);
-        let message = AxisModel::parse(&short).unwrap_err().to_string();
-        assert!(message.contains("hidden_bias: expected"), "{message}");
-        assert!(AxisModel::parse("hidden = 3").is_err());
+    fn the_shipped_model_can_be_read_and_others_are_refused_with_what_was_expected() {
+        let message = |bytes: &[u8]| AxisModel::from_safetensors(bytes).unwrap_err().to_string();
+        assert!(AxisModel::from_safetensors(SHIPPED).is_ok());
+        assert!(message(b"no tensors").starts_with("weights: "));
+        let residual = include_bytes!("../../models/residual.safetensors");
+        assert!(
+            message(residual).contains("points.0.weight: expected f32 of shape [32, 5]"),
+            "{}",
+            message(residual)
+        );
     }
 }

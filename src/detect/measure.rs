@@ -1,10 +1,10 @@
 //! Position and boxes of one person. Heights are above the floor below the person; only the boxes are in the site
 //! frame.
 
-use super::axis::{AxisModel, Network};
+use super::axis::AxisModel;
+use super::axis_view::{AxisView, Seen};
 use super::canopy::{OVERHEAD_M, Overhead};
 use super::evidence::FULL_BODY_TOP_M;
-use super::features::{AxisFeatures, Seen};
 use super::limbs::LimbCovariance;
 use super::outline::{LEVELS, Reach, reaches};
 use super::shape::{BANDS, Moments, band_of};
@@ -87,7 +87,7 @@ pub struct Measurer {
     seated: bool,
     sensors_m: Vec<DVec3>,
     hall: Hall,
-    axis: Network,
+    axis: AxisModel,
     /// By point: whether a cluster has it.
     is_taken: Vec<bool>,
     /// Points that hang over people, above the floor, with their sensors.
@@ -116,7 +116,7 @@ impl Measurer {
             seated: !config.without.contains(&Mechanism::ChildrenAndSeated),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
             hall: site.hall.clone(),
-            axis: Network::of(AxisModel::shipped()),
+            axis: AxisModel::shipped(),
             is_taken: Vec::new(),
             overhead_m: Vec::new(),
             seen: Vec::new(),
@@ -251,11 +251,11 @@ impl Measurer {
         let (position_m, z_m, covariance_m2) = match self.position {
             PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z, None),
             PositionMethod::ShiftedMean => {
-                (self.features_within(seen, points, cluster, &[]).base_m, mean_m.z, None)
+                (self.axis_view_within(seen, points, cluster, &[]).base_m, mean_m.z, None)
             }
             PositionMethod::Fitted => {
-                let features = self.features_within(seen, points, cluster, priors);
-                let (position_m, covariance_m2) = self.axis.locate(&features);
+                let view = self.axis_view_within(seen, points, cluster, priors);
+                let (position_m, covariance_m2) = self.axis.locate(&view);
                 (position_m, mean_m.z, Some(covariance_m2))
             }
         };
@@ -296,23 +296,23 @@ impl Measurer {
 
     /// A cluster as the model of the body axis sees it; who walks there is the nearest of `priors`.
     #[doc(hidden)] // For the fit of the model of the body axis.
-    pub fn features(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> AxisFeatures {
-        self.features_within(&mut Vec::new(), points, cluster, priors)
+    pub fn axis_view(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> AxisView {
+        self.axis_view_within(&mut Vec::new(), points, cluster, priors)
     }
 
-    fn features_within(
+    fn axis_view_within(
         &self,
         memory: &mut Vec<Seen>,
         points: &[Point],
         cluster: &[u32],
         priors: &[Prior],
-    ) -> AxisFeatures {
+    ) -> AxisView {
         let seen = cluster.iter().map(|&i| &points[i as usize]);
         let mean_m =
             seen.clone().map(|p| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
         let velocity_mps = nearest(mean_m, priors).map(|prior| prior.velocity_mps);
         let floor_m = self.hall.floor_m(mean_m);
-        AxisFeatures::new(memory, seen, &self.sensors_m, floor_m, SHIFT_M, velocity_mps)
+        AxisView::new(memory, seen, &self.sensors_m, floor_m, SHIFT_M, velocity_mps)
     }
 }
 

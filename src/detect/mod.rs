@@ -13,7 +13,7 @@ mod voxel;
 mod placed;
 mod background;
 #[doc(hidden)] // What the model of the body axis reads, for its fit.
-pub mod features;
+pub mod axis_view;
 mod dp_means;
 mod part;
 mod shape;

@@ -10,8 +10,8 @@ use safetensors::SafeTensors;
 
 use super::Gaussian2;
 use super::lstm_cell::{self, GROUP, GroupState, LANES, PackedCell};
-use super::tensors::tensor;
 use crate::geometry::DVec2;
+use crate::tensors::tensor;
 use crate::track::OBSERVED;
 use crate::{Error, STEPS};
 

@@ -3,7 +3,6 @@
 mod gaussian;
 #[doc(hidden)] // The baseline of every score; `Forecaster` chooses by the config.
 pub mod constant_velocity;
-mod tensors;
 #[doc(hidden)] // What the residual network reads, for its training.
 pub mod inputs;
 #[doc(hidden)] // The residual network, for its training.

@@ -14,10 +14,10 @@ use safetensors::SafeTensors;
 
 use super::constant_velocity::ACCELERATION_PSD_M2PS3;
 use super::inputs::{INPUTS, Seen, mirror, see};
-use super::tensors::tensor;
 use super::{Coupling, Forecast, Gaussian2, constant_velocity};
 use crate::elementary::{sigmoid_f32, wide};
 use crate::geometry::DVec2;
+use crate::tensors::Layer;
 use crate::track::Track;
 use crate::{Error, STEP_S, STEPS};
 
@@ -59,12 +59,6 @@ struct Network {
     second: Layer<UNITS, UNITS>,
     head: Layer<UNITS, OUTPUTS>,
     mirror: [f32; INPUTS],
-}
-
-/// The weights of each input in turn, and the biases.
-struct Layer<const IN: usize, const OUT: usize> {
-    weights: Vec<[f32; OUT]>,
-    bias: [f32; OUT],
 }
 
 impl Residual {
@@ -190,26 +184,6 @@ impl Network {
         let first = self.first.of(inputs).map(bent);
         let second = self.second.of(&first).map(bent);
         self.head.of(&second)
-    }
-}
-
-impl<const IN: usize, const OUT: usize> Layer<IN, OUT> {
-    fn read(file: &SafeTensors<'_>, name: &str) -> Result<Self, Error> {
-        let weights = tensor(file, &format!("{name}.weight"), &[OUT, IN])?;
-        let bias = tensor(file, &format!("{name}.bias"), &[OUT])?;
-        Ok(Self {
-            weights: (0..IN).map(|input| from_fn(|output| weights[output * IN + input])).collect(),
-            bias: from_fn(|output| bias[output]),
-        })
-    }
-
-    #[inline(always)]
-    fn of(&self, inputs: &[f32; IN]) -> [f32; OUT] {
-        let mut sums = self.bias;
-        for (weights, input) in self.weights.iter().zip(inputs) {
-            sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * input);
-        }
-        sums
     }
 }
 

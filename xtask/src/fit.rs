@@ -51,7 +51,7 @@ pub fn run(names: &[&str]) -> Result<()> {
 
 fn axis(commit: &str, folder: &Path) -> Result<()> {
     umbracast(&["train", "axis", "--commit", commit, "--out", text(folder)?])?;
-    ["body_axis.toml", "body_axis.md"].iter().try_for_each(|name| take(&folder.join(name), name))
+    ["body_axis.safetensors", "body_axis.md"].iter().try_for_each(|name| take(&folder.join(name), name))
 }
 
 fn outline(commit: &str, _: &Path) -> Result<()> {

@@ -7,7 +7,9 @@
 
 pub mod adam;
 pub mod weights;
+mod layer;
 mod bodies;
+mod axis_network;
 pub mod axis;
 pub mod samples;
 pub mod residual;

@@ -16,8 +16,9 @@ use umbracast::forecast::residual::{
 use umbracast::{Error, STEP_S, STEPS};
 
 use crate::adam::Adam;
+use crate::layer::Layer;
 use crate::samples::Sample;
-use crate::weights::{Entry, to_safetensors};
+use crate::weights::to_safetensors;
 
 /// Names of the layers in a weights file, with their inputs and outputs.
 const LAYERS: [(&str, usize, usize); 3] =
@@ -114,23 +115,11 @@ pub struct Network {
     layers: [Layer; 3],
 }
 
-/// [outputs, inputs] row by row, and a bias for each output.
-#[derive(Debug, Clone, PartialEq)]
-struct Layer {
-    weight: Vec<f64>,
-    bias: Vec<f64>,
-}
-
 impl Network {
     /// As PyTorch starts its layers: every weight and bias uniform within one over the root of its layer's inputs.
     pub fn fresh(seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed);
-        let layers = LAYERS.map(|(_, inputs, outputs)| {
-            let bound = 1.0 / (inputs as f32).sqrt();
-            let mut draw = |count| (0..count).map(|_| f64::from(rng.random_range(-bound..bound))).collect();
-            Layer { weight: draw(inputs * outputs), bias: draw(outputs) }
-        });
-        Self { layers }
+        Self { layers: LAYERS.map(|(_, inputs, outputs)| Layer::fresh(inputs, outputs, &mut rng)) }
     }
 
     /// The weights file, PyTorch's layout.
@@ -138,24 +127,18 @@ impl Network {
     /// # Errors
     /// None that a network of these shapes can cause.
     pub fn to_safetensors(&self) -> Result<Vec<u8>, Error> {
-        let mut entries = Vec::new();
-        for ((name, inputs, outputs), layer) in LAYERS.iter().zip(&self.layers) {
-            let entry =
-                |shape: &[usize], values: &[f64]| Entry::new(shape, values.iter().map(|&value| value as f32));
-            entries.push((format!("{name}.weight"), entry(&[*outputs, *inputs], &layer.weight)));
-            entries.push((format!("{name}.bias"), entry(&[*outputs], &layer.bias)));
-        }
-        to_safetensors(entries, None)
+        let entries = LAYERS.iter().zip(&self.layers).flat_map(|((name, ..), layer)| layer.entries(name));
+        to_safetensors(entries.collect(), None)
     }
 
     /// Every weight in a fixed order.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        self.layers.iter().flat_map(|layer| layer.weight.iter().chain(&layer.bias).copied())
+        self.layers.iter().flat_map(Layer::numbers)
     }
 
     /// The same, to be changed.
     pub fn numbers_mut(&mut self) -> impl Iterator<Item = &mut f64> {
-        self.layers.iter_mut().flat_map(|layer| layer.weight.iter_mut().chain(&mut layer.bias))
+        self.layers.iter_mut().flat_map(Layer::numbers_mut)
     }
 
     /// What the network says.
@@ -166,13 +149,8 @@ impl Network {
     /// The mean over cases and times of the negative log-likelihood, nats, and of the weighed distance; and its
     /// gradient.
     pub fn gradient(&self, cases: &[Case]) -> (f64, Self) {
-        let zeros = || {
-            let layers = LAYERS.map(|(_, inputs, outputs)| Layer {
-                weight: vec![0.0; inputs * outputs],
-                bias: vec![0.0; outputs],
-            });
-            (0.0, Self { layers })
-        };
+        let zeros =
+            || (0.0, Self { layers: LAYERS.map(|(_, inputs, outputs)| Layer::zeros(inputs, outputs)) });
         let share = 1.0 / (cases.len() * TIMES) as f64;
         let parts: Vec<(f64, Self)> = cases
             .par_chunks(PART)
@@ -227,42 +205,6 @@ fn unbent(sums: &[f64; UNITS], to_bent: [f64; UNITS]) -> [f64; UNITS] {
         let sigmoid = 1.0 / (1.0 + (-sums[unit]).exp());
         to_bent[unit] * sigmoid * (1.0 + sums[unit] * (1.0 - sigmoid))
     })
-}
-
-impl Layer {
-    fn of<const IN: usize, const OUT: usize>(&self, inputs: &[f64; IN]) -> [f64; OUT] {
-        from_fn(|output| self.bias[output] + dot(&self.weight[output * IN..][..IN], inputs))
-    }
-
-    /// Adds the gradient to the layer's weights; returns the one to its inputs.
-    fn back<const IN: usize, const OUT: usize>(
-        &self,
-        inputs: &[f64; IN],
-        to_outputs: &[f64; OUT],
-        gradient: &mut Self,
-    ) -> [f64; IN] {
-        let mut to_inputs = [0.0; IN];
-        let rows = self.weight.chunks_exact(IN).zip(gradient.weight.chunks_exact_mut(IN));
-        for ((row, to_row), (to_bias, to_output)) in rows.zip(gradient.bias.iter_mut().zip(to_outputs)) {
-            *to_bias += to_output;
-            for k in 0..IN {
-                to_row[k] += to_output * inputs[k];
-                to_inputs[k] += to_output * row[k];
-            }
-        }
-        to_inputs
-    }
-}
-
-/// In eight sums side by side, which the processor adds at once.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a_eights, b_eights) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a_eights.remainder().iter().zip(b_eights.remainder()).map(|(a, b)| a * b).sum();
-    let mut sums = [0.0; 8];
-    for (a, b) in a_eights.zip(b_eights) {
-        (0..8).for_each(|k| sums[k] += a[k] * b[k]);
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 /// The sum over a case's times of the negative log-likelihood, nats, and of the weighed distance; and its gradient to

@@ -93,11 +93,15 @@ fn look(file: &Path) -> Result<Findings, Error> {
         "pcap" => capture(file, &mut found)?,
         "safetensors" => {
             let bytes = bytes()?;
-            let kind = match (Weights::from_safetensors(&bytes), Residual::from_safetensors(&bytes)) {
-                (Ok(_), _) => "weights of the paper's LSTM",
-                (_, Ok(_)) => "weights of the default forecast's residual network",
-                (Err(no_lstm), Err(no_residual)) => {
-                    let story = format!("neither the LSTM ({no_lstm}) nor the residual ({no_residual})");
+            let (lstm, residual) = (Weights::from_safetensors(&bytes), Residual::from_safetensors(&bytes));
+            let kind = match (lstm, residual, AxisModel::from_safetensors(&bytes)) {
+                (Ok(_), ..) => "weights of the paper's LSTM",
+                (_, Ok(_), _) => "weights of the default forecast's residual network",
+                (.., Ok(_)) => "weights of the network that finds the body axis",
+                (Err(no_lstm), Err(no_residual), Err(no_axis)) => {
+                    let story = format!(
+                        "neither the LSTM ({no_lstm}) nor the residual ({no_residual}) nor the body axis ({no_axis})"
+                    );
                     return Err(Error::new(story).within(file.display()));
                 }
             };
@@ -106,12 +110,6 @@ fn look(file: &Path) -> Result<Findings, Error> {
         }
         "toml" => {
             let text = setup::read_text(file)?;
-            if let Ok(model) = AxisModel::parse(&text) {
-                found.say("kind", "weights of the network that finds the body axis");
-                found.say("inputs", model.even_mean.len() + model.odd_scale.len());
-                found.say("hidden units", model.hidden.len());
-                return Ok(found);
-            }
             let config = Config::of_run(&text, &file.display().to_string())?;
             found.say("kind", "configuration");
             found.say("mode", config.mode.name());

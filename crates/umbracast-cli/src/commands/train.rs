@@ -54,7 +54,7 @@ fn axis(fitted: &Fitted, common: &Common) -> Result<String, Error> {
     let progress = bar(0, "scenes seen", common.quiet);
     let (model, card) = train_axis(fitted.commit.as_deref().unwrap_or_default(), advance(&progress))?;
     progress.finish_and_clear();
-    setup::write(&fitted.out.join("body_axis.toml"), model)?;
+    setup::write(&fitted.out.join("body_axis.safetensors"), model)?;
     setup::write(&fitted.out.join("body_axis.md"), &card)?;
     Ok(card)
 }

@@ -88,7 +88,7 @@ fn network(bytes: &[u8]) -> bool {
         assert_eq!(steps.len(), 1);
     }
     let residual = Residual::from_safetensors(bytes).is_ok();
-    let axis = std::str::from_utf8(bytes).is_ok_and(|text| AxisModel::parse(text).is_ok());
+    let axis = AxisModel::from_safetensors(bytes).is_ok();
     weights.is_ok() || residual || axis
 }
 

@@ -1,4 +1,4 @@
-//! What the sensors saw of one body, as inputs of the model of the body axis.
+//! What the sensors saw of one body, as the model of the body axis reads it.
 //!
 //! Sensors see the near side of a body, and legs and arms swing. Every point therefore first moves away from its own
 //! sensor by a constant, and along the person's path to the mean time of all points. [`super::axis`] does the rest,
@@ -8,26 +8,31 @@ use super::Point;
 use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{DVec2, DVec3};
 
-/// Numbers that stay when the scene is mirrored at the line of sight.
-pub const EVEN: usize = 34;
-/// Numbers that change sign.
-pub const ODD: usize = 14;
-/// Upper ends of feet, shanks, thighs, hips, waist and chest as shares of the height that was seen; then the head.
-const BANDS: [f64; 6] = [0.12, 0.3, 0.5, 0.62, 0.74, 0.86];
-/// The part whose extent tells more than its mean.
-const TRUNK: std::ops::Range<f64> = 0.5..0.86;
+/// The model looks at no more points than this.
+pub const POINTS: usize = 32;
+/// Numbers of a point.
+pub const OF_POINT: usize = 5;
+/// Numbers of the whole body.
+pub const OF_BODY: usize = 7;
+
+/// Where [`AxisView::of_body`] has the height.
+const TOP: usize = 3;
 
 /// A person's points as the model of the body axis sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AxisFeatures {
+pub struct AxisView {
     /// Mean of the points, each moved away from its sensor.
     pub base_m: DVec2,
-    /// Unit vector along the mean line of sight of the sensor that saw more.
-    pub away: DVec2,
-    /// How the points lie along it, how high, how many, from how far.
-    pub even: [f64; EVEN],
-    /// How they lie across it.
-    pub odd: [f64; ODD],
+    /// Unit vectors along the mean line of sight of the sensor that saw more, and across it: to the side to which the person
+    /// walks, so that a person and his mirror image look alike.
+    pub along: DVec2,
+    pub across: DVec2,
+    /// Its mean range in tens of metres, how far it looks down, how few points there are, how high they reach, the person's
+    /// direction of walking (0 for who stands) along and across, and the speed.
+    pub of_body: [f32; OF_BODY],
+    /// Where each point lies off the base along and across, its height, and its own line of sight along and across.
+    of_points: [[f32; OF_POINT]; POINTS],
+    n: usize,
 }
 
 /// A point that has been moved.
@@ -42,7 +47,7 @@ pub struct Seen {
     sensor: u16,
 }
 
-impl AxisFeatures {
+impl AxisView {
     /// Looks at a person's points, who stands on a floor at `floor_m`. `velocity_mps` is the person's, where it is known;
     /// `seen` is memory.
     pub fn new<'a>(
@@ -59,74 +64,57 @@ impl AxisFeatures {
         let base_m = seen.iter().map(|s| s.at_m).sum::<DVec2>() / n;
         let main = main_sensor(seen);
         let of_main = || seen.iter().filter(|s| s.sensor == main);
-        let away = of_main().map(|s| s.away).sum::<DVec2>().normalize_or(DVec2::X);
-        let along = |v: DVec2| DVec2::new(v.dot(away), v.dot(away.perp()));
-        let top_m = seen.iter().map(|s| s.z_m).fold(f64::MIN_POSITIVE, f64::max);
-
-        let mut bands = [const { Group::EMPTY }; BANDS.len() + 1];
-        let [mut whole, mut trunk, mut others] = [const { Group::EMPTY }; 3];
-        let mut others_away = DVec2::ZERO;
-        for s in &*seen {
-            let off = along(s.at_m - base_m);
-            let share = s.z_m / top_m;
-            bands[BANDS.iter().filter(|&&upper| share >= upper).count()].add(off);
-            whole.add(off);
-            if TRUNK.contains(&share) {
-                trunk.add(off);
-            }
-            if s.sensor != main {
-                others.add(off);
-                others_away += s.away;
-            }
-        }
-        let others_away = along(others_away.normalize_or_zero());
+        let along = of_main().map(|s| s.away).sum::<DVec2>().normalize_or(DVec2::X);
         let range_m = of_main().map(|s| s.range_m).sum::<f64>() / of_main().count().max(1) as f64;
         let above_m = sensors_m.get(usize::from(main)).map_or(0.0, |s| s.z - floor_m);
+        let top_m = seen.iter().map(|s| s.z_m).fold(f64::MIN_POSITIVE, f64::max);
         let speed_mps = velocity_mps.map_or(0.0, DVec2::length);
         let walks = speed_mps > WALKS_FROM_MPS;
-        let ahead = velocity_mps.filter(|_| walks).map_or(DVec2::ZERO, |v| along(v.normalize_or_zero()));
-
-        let band = |i: usize| (bands[i].mean().x, bands[i].n / n);
-        let shares =
-            std::array::from_fn::<_, 14, _>(|i| if i % 2 == 0 { band(i / 2).0 } else { band(i / 2).1 });
-        let (size, of_trunk) = (whole.size(), trunk.size());
-        let rest = [
-            whole.ends().x,
-            size.x,
-            size.y,
-            trunk.ends().x,
-            of_trunk.x,
-            of_trunk.y,
-            trunk.spread().x,
-            trunk.spread().y,
-            others.n / n,
-            others.mean().x,
-            others_away.x,
-            range_m,
-            above_m / range_m.max(1.0),
-            1.0 / n.sqrt(),
-            top_m,
-            seen.iter().map(|s| s.z_m).sum::<f64>() / n,
-            ahead.x,
-            ahead.x * ahead.x - ahead.y * ahead.y,
-            speed_mps,
-            f64::from(u8::from(walks)),
-        ];
-        let across = [
-            whole.ends().y,
-            trunk.ends().y,
-            trunk.turn(),
-            others.mean().y,
-            others_away.y,
-            ahead.y,
-            2.0 * ahead.x * ahead.y,
-        ];
+        let ahead = velocity_mps.filter(|_| walks).map_or(DVec2::ZERO, |v| v / speed_mps);
+        // Of who stands, the side to which the upper body lies.
+        let leans = || seen.iter().map(|s| (s.at_m - base_m) * s.z_m).sum();
+        let sideways = if walks { ahead } else { leans() }.dot(along.perp());
+        let across = if sideways < 0.0 { -along.perp() } else { along.perp() };
+        let framed = |v: DVec2| [v.dot(along) as f32, v.dot(across) as f32];
+        let of_point = |s: &Seen| {
+            let ([x, y], [away_x, away_y]) = (framed(s.at_m - base_m), framed(s.away));
+            [x, y, s.z_m as f32, away_x, away_y]
+        };
+        let n_looked = seen.len().min(POINTS);
+        let mut of_points = [[0.0; OF_POINT]; POINTS];
+        for (k, of) in of_points[..n_looked].iter_mut().enumerate() {
+            *of = of_point(&seen[k * seen.len() / n_looked]);
+        }
+        let [ahead_x, ahead_y] = framed(ahead);
         Self {
             base_m,
-            away,
-            even: std::array::from_fn(|i| if i < 14 { shares[i] } else { rest[i - 14] }),
-            odd: std::array::from_fn(|i| if i < 7 { bands[i].mean().y } else { across[i - 7] }),
+            along,
+            across,
+            of_body: [
+                (0.1 * range_m) as f32,
+                (above_m / range_m.max(1.0)) as f32,
+                (5.0 / n.sqrt()) as f32,
+                top_m as f32,
+                ahead_x,
+                speed_mps as f32,
+                ahead_y,
+            ],
+            of_points,
+            n: n_looked,
         }
+    }
+
+    /// Somebody of the same shape who is so many times as large.
+    #[must_use]
+    pub fn scaled(mut self, share: f32) -> Self {
+        self.of_body[TOP] *= share;
+        self.of_points.iter_mut().flat_map(|of| &mut of[..3]).for_each(|coordinate| *coordinate *= share);
+        self
+    }
+
+    /// The points that are looked at: [`POINTS`] of a cluster's, evenly, or all.
+    pub fn of_points(&self) -> &[[f32; OF_POINT]] {
+        &self.of_points[..self.n]
     }
 }
 
@@ -174,58 +162,6 @@ fn main_sensor(seen: &[Seen]) -> u16 {
     main.0
 }
 
-/// How a group of points lies, along and across the line of sight, about the mean of all points.
-struct Group {
-    n: f64,
-    sum: DVec2,
-    squares: DVec2,
-    product: f64,
-    min: DVec2,
-    max: DVec2,
-}
-
-impl Group {
-    const EMPTY: Self = Self {
-        n: 0.0,
-        sum: DVec2::ZERO,
-        squares: DVec2::ZERO,
-        product: 0.0,
-        min: DVec2::INFINITY,
-        max: DVec2::NEG_INFINITY,
-    };
-
-    fn add(&mut self, p: DVec2) {
-        self.n += 1.0;
-        self.sum += p;
-        self.squares += p * p;
-        self.product += p.x * p.y;
-        (self.min, self.max) = (self.min.min(p), self.max.max(p));
-    }
-
-    fn mean(&self) -> DVec2 {
-        self.sum / self.n.max(1.0)
-    }
-
-    /// Root mean square.
-    fn spread(&self) -> DVec2 {
-        (self.squares / self.n.max(1.0)).powf(0.5)
-    }
-
-    /// Mean product: not zero where the group lies askew.
-    fn turn(&self) -> f64 {
-        self.product / self.n.max(1.0)
-    }
-
-    /// Sum of both ends, twice the middle; zero for fewer than two points.
-    fn ends(&self) -> DVec2 {
-        if self.n < 2.0 { DVec2::ZERO } else { self.min + self.max }
-    }
-
-    fn size(&self) -> DVec2 {
-        if self.n < 2.0 { DVec2::ZERO } else { self.max - self.min }
-    }
-}
-
 /// Horizontal unit vector from a sensor to a point.
 pub fn away(sensors_m: &[DVec3], point: &Point) -> DVec2 {
     let sensor = sensors_m.get(usize::from(point.sensor));
@@ -247,8 +183,7 @@ mod tests {
     }
 
     fn position_m(points: &[Point], velocity_mps: DVec2) -> DVec2 {
-        let view =
-            AxisFeatures::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
+        let view = AxisView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
         AxisModel::shipped().locate(&view).0
     }
 
