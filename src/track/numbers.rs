@@ -78,8 +78,8 @@ impl Numbers {
         }
         let mut numbers = Self {
             motion_models,
-            sway_m: [0.015, 0.014],
-            noise_floor_m: 0.010,
+            sway_m: [0.012; 2],
+            noise_floor_m: 0.005,
             noise_share: 0.7,
             visibility: !without(Mechanism::Visibility),
             limb_phase: !without(Mechanism::LimbPhase),

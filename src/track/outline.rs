@@ -24,11 +24,6 @@ pub type LevelOutline = [f64; 4];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UsualOutline {
-    /// By level: how far the axis stands ahead of where detections say, for each metre that the level reaches farther ahead than
-    /// usual; trunks carry things, feet and heads tell.
-    pub centre_ahead: [f64; LEVELS],
-    /// The same to the left.
-    pub centre_left: [f64; LEVELS],
     /// One standard deviation of where the axis stands, along one direction, of a body whose outline is usual, metres: what no frame
     /// mends, for each sees the same body.
     pub axis_sigma_m: f64,
@@ -127,12 +122,11 @@ const LASTS_S: f64 = 30.0;
 /// A reach so many deviations off is believed no more than one at this limit: it may be somebody else's.
 const DEVIATIONS_MAX: f64 = 3.0;
 
-/// Within this time the axis moves to where the outline says.
+/// Within this time the axis moves to below the head.
 const CENTRED_S: f64 = 2.0;
 /// What reaches so much farther all round than a usual body is a chair's or a pram's, and the axis is not in its middle but below the
 /// head.
 const ROUND_MAX_M: f64 = 0.06;
-const HEAD_ALONE: [f64; LEVELS] = [0.0, 0.0, 0.0, 0.0, 1.0];
 /// Detections of nobody's axis are farther off in the long run: who sits shows his feet ahead, which tells nothing.
 const OFFSET_MAX_M: f64 = 0.06;
 
@@ -178,25 +172,12 @@ impl Outline {
         self.offset_m
     }
 
-    /// Moves the axis toward where the levels tell that it is; what is left over is what somebody carries. Returns how far it moved,
-    /// ahead and left.
-    pub(super) fn centre(&mut self, usual: &UsualOutline, step_s: f64) -> DVec2 {
-        // The weights are those of an outline about where detections say that the axis is.
-        let offset_m = self.offset_m.to_array();
-        let told = |i: usize, weights: &[f64; LEVELS]| {
-            let from_detections_m = |level: &Level| level.mean_m[i] + offset_m[i];
-            self.levels
-                .iter()
-                .zip(weights)
-                .map(|(level, weight)| from_detections_m(level) * weight)
-                .sum::<f64>()
-        };
+    /// Moves the axis of what is as round as a chair or a pram to below its head; the outline is then about that axis. Returns how
+    /// far it moved, ahead and left.
+    pub(super) fn centre(&mut self, step_s: f64) -> DVec2 {
         let is_round = self.levels.iter().any(|level| level.mean_m[2] > ROUND_MAX_M);
-        let [ahead, left] = match is_round {
-            true => [&HEAD_ALONE; 2],
-            false => [&usual.centre_ahead, &usual.centre_left],
-        };
-        let told_m = DVec2::new(told(0, ahead), told(1, left));
+        let [ahead_m, left_m, ..] = self.levels[LEVELS - 1].mean_m;
+        let told_m = if is_round { self.offset_m + DVec2::new(ahead_m, left_m) } else { DVec2::ZERO };
         let moved_m = (told_m.clamp_length_max(OFFSET_MAX_M) - self.offset_m) * (step_s / CENTRED_S).min(1.0);
         self.offset_m += moved_m;
         for level in &mut self.levels {
@@ -337,28 +318,17 @@ mod tests {
     }
 
     #[test]
-    fn feet_and_head_beside_the_axis_move_it_there_and_a_thing_at_the_trunk_hardly() {
-        let usual = UsualOutline::shipped();
-        let moved_by = |levels: &[usize]| {
-            let mut outline = watched(|level, _, sin| if levels.contains(&level) { 0.03 * sin } else { 0.0 });
-            for _ in 0..200 {
-                outline.centre(&usual, 0.1);
-            }
-            outline.offset_m().y
-        };
-        let (feet_and_head, waist) = (moved_by(&[0, 4]), moved_by(&[2]));
-        assert!((0.012..0.03).contains(&feet_and_head) && waist.abs() < 0.005, "{feet_and_head} {waist}");
-    }
-
-    #[test]
     fn who_sits_in_something_round_is_below_the_head() {
-        let usual = UsualOutline::shipped();
-        let mut outline = watched(|level, cos, sin| if level == 4 { 0.03 * sin } else { 0.1 + 0.2 * cos });
-        for _ in 0..200 {
-            outline.centre(&usual, 0.1);
-        }
-        let offset_m = outline.offset_m();
-        assert!(offset_m.distance(DVec2::Y * 0.03) < 0.01, "{offset_m:?}");
+        let offset_m = |round_m: f64| {
+            let mut outline =
+                watched(|level, cos, sin| if level == 4 { 0.03 * sin } else { round_m + 0.2 * cos });
+            for _ in 0..200 {
+                outline.centre(0.1);
+            }
+            outline.offset_m()
+        };
+        assert!(offset_m(0.1).distance(DVec2::Y * 0.03) < 0.01, "{:?}", offset_m(0.1));
+        assert_eq!(offset_m(0.0), DVec2::ZERO, "somebody slim");
     }
 
     #[test]

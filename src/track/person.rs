@@ -428,7 +428,7 @@ impl Person {
             let gap_m = visibility.gap_m(reach.sensor, detection.position_m);
             self.outline.see(&numbers.usual, reach, &axis, gap_m, body);
         }
-        let moved_m = self.outline.centre(&numbers.usual, step_s);
+        let moved_m = self.outline.centre(step_s);
         self.filter.shift(ahead.rotate(moved_m));
     }
 

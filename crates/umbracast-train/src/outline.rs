@@ -68,20 +68,12 @@ struct AxisError {
     beyond_m2: f64,
 }
 
-/// What was seen of one body, and how far its track was ahead of the true axis and left of it, summed over the frames.
+/// What was seen of one body.
 #[derive(Debug, Clone, Default)]
 struct Person {
     seen: Vec<Seen>,
     /// Where the tracker knows outlines.
     errors: Vec<AxisError>,
-    off_m: DVec2,
-    frames: f64,
-}
-
-impl Person {
-    fn bias_m(&self) -> DVec2 {
-        self.off_m / f64::max(self.frames, 1.0)
-    }
 }
 
 /// Watches so many scenes and returns the file. `scene_done` is called after each scene, from any thread.
@@ -91,7 +83,7 @@ impl Person {
 pub fn fit_outline(scenes: usize, scene_done: impl Fn(usize, usize) + Sync) -> Result<String, Error> {
     let done = AtomicUsize::new(0);
     let counted = |scene: usize| {
-        // What the tracker knows of outlines moves no axis where the usual one is asked for.
+        // Outlines shall not be those about an axis that they moved.
         let mut people = watch(scene, true)?;
         people.extend(watch(scene, false)?);
         scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, scenes);
@@ -105,34 +97,16 @@ pub fn fit_outline(scenes: usize, scene_done: impl Fn(usize, usize) + Sync) -> R
         .flat_map(|(_, people)| people.iter().flat_map(|p| &p.seen))
         .collect();
     let everybody: Vec<&Person> = watched.iter().flat_map(|(_, people)| people).collect();
-    let (levels, outlines): (Vec<UsualLevel>, Vec<Vec<Option<LevelOutline>>>) =
-        (0..LEVELS).map(|level| fit_level(level, &usual, &everybody)).unzip();
-    // Where the axis is by what the levels show: of everybody of whom each level was seen.
-    let shown: Vec<([LevelOutline; LEVELS], DVec2)> = everybody
-        .iter()
-        .enumerate()
-        .filter_map(|(who, person)| {
-            let shown: Option<Vec<LevelOutline>> = outlines.iter().map(|level| level[who]).collect();
-            Some((<[LevelOutline; LEVELS]>::try_from(shown?).ok()?, -person.bias_m()))
-        })
-        .collect();
-    let centre = |i: usize| -> [f64; LEVELS] {
-        least_squares(shown.iter().map(|(levels, off_m)| (levels.map(|outline| outline[i]), off_m[i])), 1e-3)
-    };
-    let (centre_ahead, centre_left) = (centre(0), centre(1));
+    let levels = (0..LEVELS).map(|level| fit_level(level, &usual, &everybody)).collect();
     // What no frame mends: what errors are larger than the filter of the tracker that ships says, by how unusual it takes the body.
     let left_over = || watched.iter().flat_map(|(_, people)| people.iter().flat_map(|p| &p.errors));
     let fit = least_squares(left_over().map(|e| ([1.0, e.unlike_m2], e.beyond_m2)), 0.0);
     let [axis_sigma_m, axis_sigma_per_m] = fit.map(|m2| m2.max(0.0).sqrt());
-    toml::to_string(&UsualOutline { centre_ahead, centre_left, axis_sigma_m, axis_sigma_per_m, levels })
+    toml::to_string(&UsualOutline { axis_sigma_m, axis_sigma_per_m, levels })
         .map_err(|e| Error::new(format!("outline: {e}")))
 }
 
-fn fit_level(
-    level: usize,
-    usual: &[&Seen],
-    everybody: &[&Person],
-) -> (UsualLevel, Vec<Option<LevelOutline>>) {
+fn fit_level(level: usize, usual: &[&Seen], everybody: &[&Person]) -> UsualLevel {
     let of_side = |near: bool| usual.iter().filter(move |s| s.level == level && s.near == near);
     let row = |s: &Seen| (terms(s.cos, s.speed_hz), s.reach_m / s.height_m);
     let [near, aside] = [true, false].map(|near| least_squares(of_side(near).map(|s| row(s)), 1e-6));
@@ -140,12 +114,10 @@ fn fit_level(
         let factors = if s.near { &near } else { &aside };
         s.height_m * terms(s.cos, s.speed_hz).iter().zip(factors).map(|(a, b)| a * b).sum::<f64>()
     };
-    let (mut people, mut errors): (Vec<Option<LevelOutline>>, [Vec<f64>; 2]) =
-        (Vec::new(), Default::default());
+    let (mut people, mut errors): (Vec<LevelOutline>, [Vec<f64>; 2]) = Default::default();
     for person in everybody {
         let own = || person.seen.iter().filter(|s| s.level == level);
         if own().count() < FRAMES_MIN {
-            people.push(None);
             continue;
         }
         let rows = own().map(|s| (shares(s.cos, s.sin), s.reach_m - expected_m(s)));
@@ -154,12 +126,11 @@ fn fit_level(
             let told: f64 = shares.iter().zip(outline).map(|(a, b)| a * b).sum();
             errors[usize::from(s.near)].push(off_m - told);
         }
-        people.push(Some(outline));
+        people.push(outline);
     }
     let [aside_sigma_m, near_sigma_m] = errors.map(|errors| root_mean(errors.into_iter()));
-    let person_sigma_m =
-        std::array::from_fn(|i| root_mean(people.iter().flatten().map(|outline| outline[i])));
-    (UsualLevel { near, aside, near_sigma_m, aside_sigma_m, person_sigma_m }, people)
+    let person_sigma_m = std::array::from_fn(|i| root_mean(people.iter().map(|outline| outline[i])));
+    UsualLevel { near, aside, near_sigma_m, aside_sigma_m, person_sigma_m }
 }
 
 /// Everybody in a scene: without knowledge of outlines what is seen of them, with it how far off the tracker is.
@@ -225,11 +196,6 @@ fn watch(scene: usize, without: bool) -> Result<Vec<Person>, Error> {
                     ahead: DVec2::from_angle(track.heading_rad),
                 };
                 let person = seen.entry(own).or_default();
-                if let Some(state) = walkers[own].state_at(frame.time_ns) {
-                    let off_m = track.position_m - state.position_m;
-                    person.off_m += DVec2::from_angle(-state.heading_rad).rotate(off_m);
-                    person.frames += 1.0;
-                }
                 for reach in &detection.reaches {
                     let gap_m = visibility.gap_m(reach.sensor, track.position_m);
                     for (i, (cos, sin, reach_m)) in measured(reach, &axis, gap_m).into_iter().enumerate() {

@@ -47,7 +47,7 @@ fn configuration(bytes: &[u8]) -> bool {
 
 fn networks() -> Vec<Vec<u8>> {
     let residual = include_bytes!("../../../../models/residual.safetensors").to_vec();
-    vec![small_lstm(), residual, include_bytes!("../../../../models/body_axis.toml").to_vec()]
+    vec![small_lstm(), residual, include_bytes!("../../../../models/body_axis.safetensors").to_vec()]
 }
 
 /// The paper's network with few units.
