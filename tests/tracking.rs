@@ -54,6 +54,7 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         reaches: Vec::new(),
         bands: Default::default(),
         overhead: None,
+        facing: None,
         full_body: true,
         top_m: 1.7,
         top_diagonal_m: 0.2,

@@ -15,8 +15,9 @@ pub const OF_POINT: usize = 5;
 /// Numbers of the whole body.
 pub const OF_BODY: usize = 7;
 
-/// Where [`AxisView::of_body`] has the height.
+/// Where [`AxisView::of_body`] has the height and the speed.
 const TOP: usize = 3;
+const SPEED: usize = 5;
 
 /// A person's points as the model of the body axis sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,6 +103,11 @@ impl AxisView {
             of_points,
             n: n_looked,
         }
+    }
+
+    /// Whether its person is not known to walk.
+    pub fn stands(&self) -> bool {
+        f64::from(self.of_body[SPEED]) <= WALKS_FROM_MPS
     }
 
     /// Somebody of the same shape who is so many times as large.

@@ -1,14 +1,14 @@
 //! Position and boxes of one person. Heights are above the floor below the person; only the boxes are in the site
 //! frame.
 
-use super::axis::AxisModel;
 use super::axis_view::{AxisView, Seen};
 use super::canopy::{OVERHEAD_M, Overhead};
 use super::evidence::FULL_BODY_TOP_M;
 use super::limbs::LimbCovariance;
 use super::outline::{LEVELS, Reach, reaches};
+use super::point_network::PointNetwork;
 use super::shape::{BANDS, Moments, band_of};
-use super::{Cluster, Detection, Point, Prior};
+use super::{Cluster, Detection, Point, Prior, axis, facing};
 use crate::Site;
 use crate::config::{DetectConfig, Mechanism, PositionMethod};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
@@ -87,7 +87,8 @@ pub struct Measurer {
     seated: bool,
     sensors_m: Vec<DVec3>,
     hall: Hall,
-    axis: AxisModel,
+    axis: PointNetwork,
+    facing: PointNetwork,
     /// By point: whether a cluster has it.
     is_taken: Vec<bool>,
     /// Points that hang over people, above the floor, with their sensors.
@@ -116,7 +117,8 @@ impl Measurer {
             seated: !config.without.contains(&Mechanism::ChildrenAndSeated),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
             hall: site.hall.clone(),
-            axis: AxisModel::shipped(),
+            axis: axis::shipped(),
+            facing: facing::shipped(),
             is_taken: Vec::new(),
             overhead_m: Vec::new(),
             seen: Vec::new(),
@@ -248,6 +250,8 @@ impl Measurer {
         let mean_m: DVec3 = places_m().sum::<DVec3>() / n;
         let first_ns = of().map(|p| p.time_ns).min().unwrap_or_default();
         let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
+        let who = nearest(mean_m.truncate(), priors);
+        let mut facing = None;
         let (position_m, z_m, covariance_m2) = match self.position {
             PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z, None),
             PositionMethod::ShiftedMean => {
@@ -255,7 +259,8 @@ impl Measurer {
             }
             PositionMethod::Fitted => {
                 let view = self.axis_view_within(seen, points, cluster, priors);
-                let (position_m, covariance_m2) = self.axis.locate(&view);
+                let (position_m, covariance_m2) = axis::locate(&self.axis, &view);
+                facing = who.filter(|_| view.stands()).map(|_| facing::face(&self.facing, &view));
                 (position_m, mean_m.z, Some(covariance_m2))
             }
         };
@@ -263,7 +268,6 @@ impl Measurer {
         if covariance_m2.is_some() {
             seen.iter().for_each(|s| bands[band_of(s.z_m)].add(s.at_m - position_m));
         }
-        let who = nearest(mean_m.truncate(), priors);
         let limbs = who.and_then(|who| LimbCovariance::of(of(), position_m.extend(floor_m), who));
         let of_top = places_m().filter(|p| p.z >= aabb.max_m.z - HEAD_M);
         let axes = match self.position {
@@ -279,6 +283,7 @@ impl Measurer {
         Detection {
             position_m,
             covariance_m2,
+            facing,
             limbs,
             reaches: all_reaches,
             bands,

@@ -25,8 +25,12 @@ mod arms;
 mod expected;
 mod evidence;
 mod split_merge;
-#[doc(hidden)] // The model of the body axis, for its fit and for the command that shows it.
+#[doc(hidden)] // The networks that look at one body, for their fits and for the command that shows them.
+pub mod point_network;
+#[doc(hidden)]
 pub mod axis;
+#[doc(hidden)]
+pub mod facing;
 mod limbs;
 #[doc(hidden)] // What the fit of the usual outline reads.
 pub mod outline;
@@ -41,6 +45,7 @@ pub use canopy::Overhead;
 pub use clocks::Clocks;
 pub use doubled::doubled;
 pub(crate) use expected::{PRESSED_APART_M, PRESSED_M, press};
+pub use facing::Facing;
 pub use limbs::LimbCovariance;
 pub use measure::Measurer;
 #[doc(hidden)] // For the card of the model of the body axis.
@@ -133,6 +138,8 @@ pub struct Detection {
     pub top_diagonal_m: f64,
     /// What hangs over it, such as an umbrella: the top need not be a head.
     pub overhead: Option<Overhead>,
+    /// Which way somebody known faces who stands.
+    pub facing: Option<Facing>,
     /// How arms and legs of a known walker lie.
     pub limbs: Option<LimbCovariance>,
     /// How far the body of somebody known reaches, by sensor and level.
@@ -159,6 +166,7 @@ impl Detection {
             top_m: aabb.max_m.z,
             top_diagonal_m: 0.2,
             overhead: None,
+            facing: None,
             limbs: None,
             reaches: Vec::new(),
             bands: Default::default(),

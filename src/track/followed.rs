@@ -39,10 +39,10 @@ pub struct Track {
     pub covariance: [[f64; 4]; 4],
     /// The trunk's, counter-clockwise from +x: the velocity's while walking, held while standing.
     pub heading_rad: f64,
-    /// One standard deviation of `heading_rad`: what the velocity's covariance leaves open while walking, what the width of the
-    /// shoulders does while standing, more with the time where these are not seen, and 1.81 (any direction) for who never walked.
+    /// One standard deviation of `heading_rad`: what the velocity's covariance leaves open while walking, what the body
+    /// shows does while standing, and 1.81 (any direction) for who never walked nor was seen alone.
     pub heading_sigma_rad: f64,
-    /// Probability that the trunk faces the other way: shoulders look alike from the front and from behind.
+    /// Probability that the trunk faces the other way: bodies look nearly alike from the front and from behind.
     pub heading_behind: f64,
     /// Standing height, shoes and hair included; by the paper's method the last detection's highest point.
     pub height_m: f64,

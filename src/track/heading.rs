@@ -1,13 +1,11 @@
-//! Where somebody faces: along his way, and while he stands across his shoulders.
+//! Where somebody faces: along his way, and while he stands as his body shows.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::gaussian::State;
 use super::remembered::{Remembered, Words};
-use super::visibility::BodyView;
-use crate::detect::Detection;
+use crate::detect::Facing;
 use crate::gait::WALKS_FROM_MPS;
-use crate::geometry::Obb;
 
 /// Variance of a heading that may be any: even over a turn.
 const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
@@ -15,17 +13,13 @@ const ANY_HEADING_RAD2: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
 /// that is measured here tells it.
 const STANDING_TURN_RAD2PS: f64 = 0.5;
 
-/// Returns of a standing body this much longer than wide (the difference of the squares over their sum) lie along its
-/// shoulders; and they tell how these lie so well, one standard deviation. Measured on simulated people in `config/sites/l-hall.toml`:
-/// 4 to 8 degrees from 0.3 on, no more than chance below.
-const SHOULDERS_FROM: f64 = 0.3;
-const SHOULDERS_RAD2: f64 = 0.17 * 0.17;
-/// Where others hide more of a body, or so few returns are, its shoulders are not looked for.
-const SHOULDERS_FREE: f64 = 0.9;
-const SHOULDERS_POINTS: u32 = 12;
-
 /// Probability of either way where both are alike.
 const EITHER: f64 = 0.5;
+/// Frames show the same body in nearly the same pose: so much of what one tells of its heading is new.
+const NEW_IN_A_FRAME: f64 = 0.2;
+/// However long a body is looked at, it may be one of those that look alike from the front and from behind: no look makes the
+/// opposite less likely than this.
+const BEHIND_MIN: f64 = 0.03;
 
 /// Where a trunk faces, counter-clockwise from +x.
 #[derive(Debug, Clone, Copy)]
@@ -61,31 +55,37 @@ impl Heading {
         self.variance_rad2 = self.variance_rad2.min(ANY_HEADING_RAD2);
     }
 
-    /// Learns from the shoulders of who stands, where they can be seen.
-    pub(super) fn see(&mut self, detection: &Detection, view: &BodyView, speed_mps: f64) {
-        let is_free = view.returns >= SHOULDERS_FREE * view.returns_alone;
-        let can_tell = speed_mps <= WALKS_FROM_MPS && is_free && detection.points >= SHOULDERS_POINTS;
-        if let Some(along_rad) = shoulders_rad(&detection.obb).filter(|_| can_tell) {
-            self.face_across(along_rad);
-        }
-    }
-
-    /// Faces one way or the other across a line.
-    fn face_across(&mut self, along_rad: f64) {
-        let off_rad = (along_rad + FRAC_PI_2 - self.mean_rad + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
-        if self.variance_rad2 >= ANY_HEADING_RAD2 {
-            let mean_rad = turned(self.mean_rad + off_rad);
-            *self = Self { mean_rad, variance_rad2: SHOULDERS_RAD2, behind: EITHER };
+    /// Learns from which way the body seems to face while somebody stands.
+    pub(super) fn see(&mut self, facing: &Facing, speed_mps: f64) {
+        if speed_mps > WALKS_FROM_MPS {
             return;
         }
-        let spread_rad2 = self.variance_rad2 + SHOULDERS_RAD2;
-        // How much likelier the way that lies nearer to the mean is, if the mean is right.
-        let ratio = (0.5 * ((PI - off_rad.abs()).powi(2) - off_rad.powi(2)) / spread_rad2).exp();
-        let near = (1.0 - self.behind) * ratio + self.behind;
+        let off_rad = turned(facing.heading_rad - self.mean_rad);
+        // It may be the opposite that lies near to the mean.
+        let (is_near, off_rad) = match off_rad.abs() <= FRAC_PI_2 {
+            true => (true, off_rad),
+            false => (false, turned(off_rad + PI)),
+        };
+        let log_odds = NEW_IN_A_FRAME * if is_near { facing.log_odds } else { -facing.log_odds };
+        let (ratio, spread_rad2) = match self.variance_rad2 >= ANY_HEADING_RAD2 {
+            // Nothing is known yet.
+            true => (1.0, f64::INFINITY),
+            false => {
+                let spread_rad2 = self.variance_rad2 + facing.variance_rad2 / NEW_IN_A_FRAME;
+                // How much likelier the way that lies nearer to the mean is, if the mean is right.
+                ((0.5 * ((PI - off_rad.abs()).powi(2) - off_rad.powi(2)) / spread_rad2).exp(), spread_rad2)
+            }
+        };
+        let near = ((1.0 - self.behind) * ratio + self.behind) * log_odds.exp();
         let far = (1.0 - self.behind) + self.behind * ratio;
-        self.behind = far / (near + far);
-        self.mean_rad += off_rad * self.variance_rad2 / spread_rad2;
-        self.variance_rad2 *= SHOULDERS_RAD2 / spread_rad2;
+        self.behind = (far / (near + far)).max(self.behind.min(BEHIND_MIN));
+        if spread_rad2.is_finite() {
+            self.mean_rad += off_rad * self.variance_rad2 / spread_rad2;
+            self.variance_rad2 *= facing.variance_rad2 / NEW_IN_A_FRAME / spread_rad2;
+        } else {
+            self.mean_rad += off_rad;
+            self.variance_rad2 = (facing.variance_rad2 / NEW_IN_A_FRAME).min(ANY_HEADING_RAD2);
+        }
         if self.behind > EITHER {
             (self.mean_rad, self.behind) = (self.mean_rad + PI, 1.0 - self.behind);
         }
@@ -102,51 +102,47 @@ fn turned(rad: f64) -> f64 {
     (rad + PI).rem_euclid(TAU) - PI
 }
 
-/// Along which line returns lie, if they do along any.
-fn shoulders_rad(obb: &Obb) -> Option<f64> {
-    let [long, wide] = [obb.half_m.x, obb.half_m.y];
-    let axis = if long >= wide { obb.site_from_box.x_axis } else { obb.site_from_box.y_axis };
-    let (long2, wide2) = (long * long, wide * wide);
-    ((long2 - wide2).abs() > SHOULDERS_FROM * (long2 + wide2)).then(|| axis.y.atan2(axis.x))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::{DMat3, DVec3};
 
-    /// Shoulders that lie along this line, so long and wide.
-    fn shoulders(along_rad: f64, half_m: [f64; 2]) -> Obb {
-        Obb {
-            center_m: DVec3::ZERO,
-            half_m: DVec3::new(half_m[0], half_m[1], 0.85),
-            site_from_box: DMat3::from_rotation_z(along_rad),
-        }
-    }
-
-    /// Stands for so many steps with shoulders along lines that turn by so much each.
-    fn stand(heading: &mut Heading, first_rad: f64, turn_rad: f64, steps: u32) {
+    /// Stands for so many steps and seems to face in directions that turn by so much each.
+    fn stand(heading: &mut Heading, first_rad: f64, turn_rad: f64, steps: u32, log_odds: f64) {
         for step in 0..steps {
             heading.variance_rad2 =
                 (heading.variance_rad2 + STANDING_TURN_RAD2PS * 0.1).min(ANY_HEADING_RAD2);
-            heading.face_across(first_rad + turn_rad * f64::from(step));
+            let heading_rad = first_rad + turn_rad * f64::from(step);
+            heading.see(&Facing { heading_rad, variance_rad2: 0.02, log_odds }, 0.0);
         }
     }
 
     #[test]
-    fn who_never_walked_faces_either_way_across_the_shoulders_wherever_the_hall_s_middle_is() {
+    fn a_body_that_looks_alike_from_both_sides_may_face_either_way() {
         let mut heading = Heading::ANY;
-        stand(&mut heading, 0.3, 0.0, 10);
-        let off_rad = (heading.mean_rad - 0.3 - FRAC_PI_2).rem_euclid(PI);
+        stand(&mut heading, 1.9, 0.0, 10, 0.0);
+        let off_rad = (heading.mean_rad - 1.9).rem_euclid(PI);
         assert!(off_rad.min(PI - off_rad) < 1e-9, "{heading:?}");
-        assert!(heading.behind == EITHER && heading.sigma_rad() < 0.2, "{heading:?}");
+        assert!(heading.behind == EITHER && heading.sigma_rad() < 0.3, "{heading:?}");
+    }
+
+    #[test]
+    fn who_never_walked_is_known_by_and_by_to_face_as_the_body_shows_and_never_for_sure() {
+        let mut heading = Heading::ANY;
+        stand(&mut heading, -2.0, 0.0, 3, 1.0);
+        assert!((0.3..0.45).contains(&heading.behind), "{heading:?}");
+        stand(&mut heading, -2.0, 0.0, 100, 1.0);
+        assert!((heading.mean_rad + 2.0).abs() < 0.01 && heading.behind == BEHIND_MIN, "{heading:?}");
+        // One look from where nothing is seen of the face does not turn anybody round.
+        stand(&mut heading, -2.0 + PI, 0.0, 1, 1.0);
+        assert!((heading.mean_rad + 2.0).abs() < 0.01 && heading.behind < 0.1, "{heading:?}");
     }
 
     #[test]
     fn who_walked_and_turns_on_the_spot_is_known_to_face_the_same_way_still() {
         let mut heading = Heading { mean_rad: 0.0, variance_rad2: 0.05, behind: 0.0 };
         // Three quarters of a turn in nine seconds.
-        stand(&mut heading, FRAC_PI_2, 1.5 * PI / 90.0, 91);
+        stand(&mut heading, 0.0, 1.5 * PI / 90.0, 91, 0.0);
         let off_rad = (heading.mean_rad + FRAC_PI_2).abs();
         assert!(off_rad < 0.15 && heading.behind < 1e-3, "{heading:?}");
     }
@@ -154,15 +150,7 @@ mod tests {
     #[test]
     fn who_was_long_out_of_sight_may_have_turned_round() {
         let mut heading = Heading { mean_rad: 0.0, variance_rad2: 1.5, behind: 0.0 };
-        heading.face_across(FRAC_PI_2);
+        heading.see(&Facing { heading_rad: 0.2, variance_rad2: 0.02, log_odds: 0.0 }, 0.0);
         assert!((0.01..0.2).contains(&heading.behind), "{heading:?}");
-    }
-
-    #[test]
-    fn shoulders_lie_along_what_is_long_and_what_is_round_has_none() {
-        let along = |obb: Obb| shoulders_rad(&obb).map(|rad| rad.rem_euclid(PI));
-        assert!((along(shoulders(0.4, [0.25, 0.12])).unwrap() - 0.4).abs() < 1e-12);
-        assert!((along(shoulders(0.4, [0.12, 0.25])).unwrap() - 0.4 - FRAC_PI_2).abs() < 1e-12);
-        assert_eq!(shoulders_rad(&shoulders(0.4, [0.2, 0.17])), None);
     }
 }

@@ -295,6 +295,7 @@ mod tests {
             reaches: Vec::new(),
             bands: Default::default(),
             overhead: None,
+            facing: None,
             full_body: true,
             top_m: 1.0,
             top_diagonal_m: 0.2,

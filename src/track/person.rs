@@ -370,7 +370,9 @@ impl Person {
         if !view.on_step && detection.overhead.is_none() {
             self.height.see(detection.top_m, view.beams_per_m_at_top);
         }
-        self.heading.see(detection, view, speed_mps);
+        if let Some(facing) = &detection.facing {
+            self.heading.see(facing, speed_mps);
+        }
         if let Some(visibility) = visibility.filter(|_| numbers.outline) {
             self.see_outline(numbers, detection, view, visibility, step_s);
         }

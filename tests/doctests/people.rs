@@ -41,6 +41,7 @@ pub fn detection(x_m: f64, time_ns: i64) -> umbracast::detect::Detection {
             reaches: Vec::new(),
             bands: Default::default(),
             overhead: None,
+            facing: None,
         aabb,
         obb: Obb::from_aabb(&aabb),
     }

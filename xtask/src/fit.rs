@@ -1,4 +1,4 @@
-//! Everything that the program learns from data, fitted anew in order: the body axis, outlines, stage 3's body, the forecast's
+//! Everything that the program learns from data, fitted anew in order: the body axis, which way bodies face, outlines, stage 3's body, the forecast's
 //! residual. Each fit runs the program with what was fitted before it, so the program is built again in between.
 
 use std::fs;
@@ -28,12 +28,13 @@ const RECORDED: [&str; 4] = [
 
 /// A fit: what it is called, and what makes its model and card from the commit that the card names, in a folder of its own.
 type Fit = (&'static str, fn(&str, &Path) -> Result<()>);
-const ALL: [Fit; 4] = [("axis", axis), ("outline", outline), ("body", body), ("residual", residual)];
+const ALL: [Fit; 5] =
+    [("axis", axis), ("facing", facing), ("outline", outline), ("body", body), ("residual", residual)];
 
 /// Fits these, or all; needs a clean tree, for the cards name its commit.
 pub fn run(names: &[&str]) -> Result<()> {
     if let Some(name) = names.iter().find(|name| !ALL.iter().any(|(known, _)| known == *name)) {
-        return Err(format!("fit: expected axis, outline, body or residual, found {name:?}"));
+        return Err(format!("fit: expected axis, facing, outline, body or residual, found {name:?}"));
     }
     let changed = output(&root(), "git", &["status", "--porcelain", "--untracked-files=no"])?;
     if !changed.is_empty() {
@@ -50,8 +51,19 @@ pub fn run(names: &[&str]) -> Result<()> {
 }
 
 fn axis(commit: &str, folder: &Path) -> Result<()> {
-    umbracast(&["train", "axis", "--commit", commit, "--out", text(folder)?])?;
-    ["body_axis.safetensors", "body_axis.md"].iter().try_for_each(|name| take(&folder.join(name), name))
+    of_a_body("axis", "body_axis", commit, folder)
+}
+
+fn facing(commit: &str, folder: &Path) -> Result<()> {
+    of_a_body("facing", "facing", commit, folder)
+}
+
+fn of_a_body(what: &str, name: &str, commit: &str, folder: &Path) -> Result<()> {
+    umbracast(&["train", what, "--commit", commit, "--out", text(folder)?])?;
+    ["safetensors", "md"].iter().try_for_each(|ending| {
+        let name = format!("{name}.{ending}");
+        take(&folder.join(&name), &name)
+    })
 }
 
 fn outline(commit: &str, _: &Path) -> Result<()> {

@@ -162,6 +162,7 @@ fn detection(object: &Object, after_s: f64, time_ns: i64) -> Option<Detection> {
         reaches: Vec::new(),
         bands: Default::default(),
         overhead: None,
+        facing: None,
         aabb: Aabb { min_m: obb.center_m - reach_m, max_m: obb.center_m + reach_m },
         obb,
     })

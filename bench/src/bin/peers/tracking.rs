@@ -84,6 +84,7 @@ fn detection(at_m: DVec2, time_ns: i64) -> Detection {
         reaches: Vec::new(),
         bands: Default::default(),
         overhead: None,
+        facing: None,
         aabb,
         obb: Obb::from_aabb(&aabb),
     }

@@ -390,6 +390,8 @@ pub struct Config {
 pub enum Train {
     /// Fit the model of the body axis on simulated returns; takes some minutes.
     Axis(TrainAxis),
+    /// Fit the model of which way somebody faces who stands, on the same returns; takes some minutes.
+    Facing(TrainAxis),
     /// Fit the default forecast's residual network on tracks of simulated and replayed people.
     Residual(TrainResidual),
     /// Fit what outlines of usual bodies look like, on tuning scenes; prints `models/outline.toml`.
@@ -413,7 +415,7 @@ pub struct Fitted {
     pub out: PathBuf,
 }
 
-/// `train axis`
+/// `train axis` and `train facing`
 #[derive(Debug, Args)]
 pub struct TrainAxis {
     #[command(flatten)]

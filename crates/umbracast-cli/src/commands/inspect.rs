@@ -6,7 +6,7 @@ use std::io::BufReader;
 use std::path::Path;
 
 use serde_json::json;
-use umbracast::detect::axis::AxisModel;
+use umbracast::detect::point_network::PointNetwork;
 use umbracast::forecast::{Residual, Weights};
 use umbracast::{Config, Error};
 use umbracast_io::pcap::PcapReader;
@@ -94,13 +94,15 @@ fn look(file: &Path) -> Result<Findings, Error> {
         "safetensors" => {
             let bytes = bytes()?;
             let (lstm, residual) = (Weights::from_safetensors(&bytes), Residual::from_safetensors(&bytes));
-            let kind = match (lstm, residual, AxisModel::from_safetensors(&bytes)) {
+            let kind = match (lstm, residual, PointNetwork::from_safetensors(&bytes)) {
                 (Ok(_), ..) => "weights of the paper's LSTM",
                 (_, Ok(_), _) => "weights of the default forecast's residual network",
-                (.., Ok(_)) => "weights of the network that finds the body axis",
+                (.., Ok(_)) => {
+                    "weights of a network that looks at one body: where its axis is, or which way it faces"
+                }
                 (Err(no_lstm), Err(no_residual), Err(no_axis)) => {
                     let story = format!(
-                        "neither the LSTM ({no_lstm}) nor the residual ({no_residual}) nor the body axis ({no_axis})"
+                        "neither the LSTM ({no_lstm}) nor the residual ({no_residual}) nor a network that looks at one body ({no_axis})"
                     );
                     return Err(Error::new(story).within(file.display()));
                 }

@@ -1,7 +1,7 @@
 //! What is read at the start: configurations, networks' weights, sensors' own files.
 
 use umbracast::config::DEFAULT_TOML;
-use umbracast::detect::axis::AxisModel;
+use umbracast::detect::point_network::PointNetwork;
 use umbracast::forecast::{Residual, Weights};
 use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Model};
@@ -88,7 +88,7 @@ fn network(bytes: &[u8]) -> bool {
         assert_eq!(steps.len(), 1);
     }
     let residual = Residual::from_safetensors(bytes).is_ok();
-    let axis = AxisModel::from_safetensors(bytes).is_ok();
+    let axis = PointNetwork::from_safetensors(bytes).is_ok();
     weights.is_ok() || residual || axis
 }
 

@@ -1,5 +1,5 @@
-//! The network of the body axis, its gradient written out, and its fit: the same equations as `umbracast::detect::axis`, which
-//! runs it.
+//! The networks that look at the points of one body, their gradient written out, and their fit: the same equations as
+//! `umbracast::detect::point_network`, which runs them.
 
 use std::f64::consts::PI;
 
@@ -8,9 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use umbracast::Error;
-use umbracast::detect::axis::{BODY_UNITS, OUTPUTS, POINT_UNITS, POOLED, UNIT_M};
 use umbracast::detect::axis_view::{AxisView, OF_BODY, OF_POINT, POINTS};
-use umbracast::geometry::DVec2;
+use umbracast::detect::point_network::{BODY_UNITS, OUTPUTS, POINT_UNITS, POOLED};
 
 use crate::adam::Adam;
 use crate::layer::Layer;
@@ -27,11 +26,6 @@ const RISES: f64 = 0.3;
 /// Of this share of the samples the body is made so much smaller or larger, for people of every size come.
 const SCALED: f64 = 0.2;
 const SCALES: std::ops::Range<f64> = 0.55..1.1;
-/// Errors beyond so many units pull no harder: some clusters are of two people.
-const PULL_LIMIT: f64 = 4.0;
-/// Logarithms of variances are held within.
-const LOG_VARIANCE: (f64, f64) = (-6.0, 4.0);
-
 const FIRST: usize = POINT_UNITS[0];
 const SECOND: usize = POINT_UNITS[1];
 const THIRD: usize = POINT_UNITS[2];
@@ -47,19 +41,27 @@ const LAYERS: [(&str, usize, usize); 6] = [
     ("body.2", FIFTH, OUTPUTS),
 ];
 
-/// A body as it was seen, and where its axis truly was.
+/// A body as it was seen, and what the network shall say of it.
 #[derive(Debug, Clone)]
-pub(crate) struct Sample {
+pub(crate) struct Sample<T> {
     pub(crate) view: AxisView,
-    /// From the base to the true axis.
-    pub(crate) off_m: DVec2,
+    pub(crate) truth: T,
 }
 
-/// Fits the network with Adam on the negative log-likelihood of the true offsets; returns the weights file.
+/// What a network shall say.
+pub(crate) trait Truth: Clone + Sync {
+    /// The negative log-likelihood of the truth but for a constant, and its gradient to the outputs.
+    fn loss(&self, outputs: &[f64; OUTPUTS]) -> (f64, [f64; OUTPUTS]);
+
+    /// Of a body that is so many times as large.
+    fn scaled(&self, share: f64) -> Self;
+}
+
+/// Fits a network with Adam on the negative log-likelihood; returns the weights file.
 ///
 /// # Errors
 /// Fewer samples than a batch.
-pub(crate) fn fit(samples: &[Sample]) -> Result<Vec<u8>, Error> {
+pub(crate) fn fit<T: Truth>(samples: &[Sample<T>]) -> Result<Vec<u8>, Error> {
     let batches = samples.len() / BATCH;
     if batches == 0 {
         return Err(Error::new(format!("training: expected {BATCH} samples, found {}", samples.len())));
@@ -71,7 +73,7 @@ pub(crate) fn fit(samples: &[Sample]) -> Result<Vec<u8>, Error> {
     for _ in 0..EPOCHS {
         order.shuffle(&mut rng);
         for batch in order.chunks_exact(BATCH) {
-            let batch: Vec<Sample> = batch.iter().map(|&i| resized(&samples[i], &mut rng)).collect();
+            let batch: Vec<Sample<T>> = batch.iter().map(|&i| resized(&samples[i], &mut rng)).collect();
             let gradient = network.gradient(&batch);
             let done = f64::from(adam.updates()) / (EPOCHS * batches) as f64;
             let rate = match done < RISES {
@@ -85,12 +87,12 @@ pub(crate) fn fit(samples: &[Sample]) -> Result<Vec<u8>, Error> {
     to_safetensors(entries.collect(), None)
 }
 
-fn resized(sample: &Sample, rng: &mut Pcg64) -> Sample {
+fn resized<T: Truth>(sample: &Sample<T>, rng: &mut Pcg64) -> Sample<T> {
     if !rng.random_bool(SCALED) {
         return sample.clone();
     }
     let share = rng.random_range(SCALES);
-    Sample { view: sample.view.scaled(share as f32), off_m: sample.off_m * share }
+    Sample { view: sample.view.scaled(share as f32), truth: sample.truth.scaled(share) }
 }
 
 /// A network, or anything with one number for each of its weights: its gradient.
@@ -113,13 +115,17 @@ impl Network {
     }
 
     /// Of the mean loss of a batch.
-    fn gradient(&self, batch: &[Sample]) -> Self {
+    fn gradient<T: Truth>(&self, batch: &[Sample<T>]) -> Self {
         let share = 1.0 / batch.len() as f64;
         let parts: Vec<Self> = batch
             .par_chunks(PART)
             .map(|part| {
                 let mut gradient = Self::zeros();
-                part.iter().for_each(|sample| self.add_gradient(sample, share, &mut gradient));
+                for sample in part {
+                    let pass = self.pass(&sample.view);
+                    let to_outputs = sample.truth.loss(&pass.outputs).1.map(|slope| share * slope);
+                    self.add_gradient(&sample.view, &pass, &to_outputs, &mut gradient);
+                }
                 gradient
             })
             .collect();
@@ -130,17 +136,22 @@ impl Network {
     }
 
     umbracast::wide! {
-        /// Adds `share` of the gradient of one sample's loss.
-        fn add_gradient(&self, sample: &Sample, share: f64, gradient: &mut Self) = add_gradient_avx2 or add_gradient_portably
+        /// Adds the gradient to the weights of a pass, from that to its outputs.
+        fn add_gradient(&self, view: &AxisView, pass: &Pass, to_outputs: &[f64; OUTPUTS], gradient: &mut Self)
+            = add_gradient_avx2 or add_gradient_portably
     }
 
     #[inline(always)]
-    fn add_gradient_portably(&self, sample: &Sample, share: f64, gradient: &mut Self) {
-        let (pass, view) = (self.pass(&sample.view), &sample.view);
-        let (_, to_outputs) = loss(&pass.outputs, sample);
+    fn add_gradient_portably(
+        &self,
+        view: &AxisView,
+        pass: &Pass,
+        to_outputs: &[f64; OUTPUTS],
+        gradient: &mut Self,
+    ) {
         let [first, second, third, fourth, fifth, head] = &self.layers;
         let [to_first, to_second, to_third, to_fourth, to_fifth, to_head] = &mut gradient.layers;
-        let back = head.back(&pass.fifth, &to_outputs.map(|slope| share * slope), to_head);
+        let back = head.back(&pass.fifth, to_outputs, to_head);
         let back = fifth.back(&pass.fourth, &rectified(&pass.fifth, back), to_fifth);
         let to_pooled: [f64; POOLED] = fourth.back(&pass.pooled, &rectified(&pass.fourth, back), to_fourth);
         let n = view.of_points().len();
@@ -155,8 +166,12 @@ impl Network {
         }
     }
 
+    umbracast::wide! {
+        fn pass(&self, view: &AxisView) -> Pass = pass_avx2 or pass_portably
+    }
+
     #[inline(always)]
-    fn pass(&self, view: &AxisView) -> Pass {
+    fn pass_portably(&self, view: &AxisView) -> Pass {
         let [first, second, third, fourth, fifth, head] = &self.layers;
         let mut pass = Pass {
             first: [[0.0; FIRST]; POINTS],
@@ -212,30 +227,17 @@ fn rectified<const N: usize>(given: &[f64; N], to_given: [f64; N]) -> [f64; N] {
     std::array::from_fn(|u| if given[u] > 0.0 { to_given[u] } else { 0.0 })
 }
 
-/// The negative log-likelihood of the true offset but for a constant, and its gradient to the outputs.
-fn loss(outputs: &[f64; OUTPUTS], sample: &Sample) -> (f64, [f64; OUTPUTS]) {
-    let (mut loss, mut to_outputs) = (0.0, [0.0; OUTPUTS]);
-    for (k, axis) in [sample.view.along, sample.view.across].into_iter().enumerate() {
-        let log_variance = outputs[k + 2].clamp(LOG_VARIANCE.0, LOG_VARIANCE.1);
-        let weight = (-log_variance).exp();
-        let error = (outputs[k] - sample.off_m.dot(axis) / UNIT_M).clamp(-PULL_LIMIT, PULL_LIMIT);
-        loss += 0.5 * (error * error * weight + log_variance);
-        to_outputs[k] = error * weight;
-        to_outputs[k + 2] = 0.5 * (1.0 - error * error * weight);
-    }
-    (loss, to_outputs)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::axis::Offset;
     use rand::RngExt;
-    use umbracast::detect::axis::AxisModel;
-    use umbracast::detect::{Point, SHIFT_M};
-    use umbracast::geometry::DVec3;
+    use umbracast::detect::point_network::PointNetwork;
+    use umbracast::detect::{Point, SHIFT_M, axis};
+    use umbracast::geometry::{DVec2, DVec3};
 
     /// Somebody of some points on a disc of a radius that its height tells, before a sensor: the axis is the disc's middle.
-    fn sample(rng: &mut Pcg64) -> Sample {
+    fn sample(rng: &mut Pcg64) -> Sample<Offset> {
         let sensor_m = DVec3::new(-10.0, 0.0, 5.0);
         let middle_m = DVec2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
         let radius_m = rng.random_range(0.05..0.2);
@@ -247,26 +249,28 @@ mod tests {
             })
             .collect();
         let view = AxisView::new(&mut Vec::new(), points.iter(), &[sensor_m], 0.0, SHIFT_M, None);
-        Sample { off_m: middle_m - view.base_m, view }
+        Sample { truth: Offset::of(&view, middle_m - view.base_m), view }
     }
 
-    fn samples(n: usize) -> Vec<Sample> {
+    fn samples(n: usize) -> Vec<Sample<Offset>> {
         let mut rng = Pcg64::seed_from_u64(2);
         (0..n).map(|_| sample(&mut rng)).collect()
     }
 
     #[test]
     fn a_law_is_learned_and_the_runtime_says_what_was_fitted() {
-        let all = samples(4 * BATCH + 100);
-        let (training, held_out) = all.split_at(4 * BATCH);
-        let model = AxisModel::from_safetensors(&fit(training).unwrap()).unwrap();
-        let rmse_m = |of: &dyn Fn(&Sample) -> DVec2| {
+        let all = samples(8 * BATCH + 100);
+        let (training, held_out) = all.split_at(8 * BATCH);
+        let model = PointNetwork::from_safetensors(&fit(training).unwrap()).unwrap();
+        let rmse_m = |of: &dyn Fn(&Sample<Offset>) -> DVec2| {
             let squares: f64 = held_out.iter().map(|s| of(s).length_squared()).sum();
             (squares / held_out.len() as f64).sqrt()
         };
+        let off_m =
+            |s: &Sample<Offset>| (s.view.along * s.truth.0[0] + s.view.across * s.truth.0[1]) * axis::UNIT_M;
         let (before_m, after_m) =
-            (rmse_m(&|s| s.off_m), rmse_m(&|s| model.locate(&s.view).0 - s.view.base_m - s.off_m));
-        assert!(after_m < 0.4 * before_m, "{after_m} m, {before_m} m before");
+            (rmse_m(&off_m), rmse_m(&|s| axis::locate(&model, &s.view).0 - s.view.base_m - off_m(s)));
+        assert!(after_m < 0.5 * before_m, "{after_m} m, {before_m} m before");
     }
 
     #[test]
@@ -276,14 +280,15 @@ mod tests {
         let network = Network { layers: LAYERS.map(|(_, i, o)| Layer::fresh(i, o, &mut rng)) };
         let sample = &samples(1)[0];
         let mut slope = Network::zeros();
-        network.add_gradient(sample, 1.0, &mut slope);
+        let pass = network.pass(&sample.view);
+        network.add_gradient(&sample.view, &pass, &sample.truth.loss(&pass.outputs).1, &mut slope);
         let largest = slope.numbers().fold(0.0_f64, |largest, slope| largest.max(slope.abs()));
         assert!(largest > 0.1, "a slope that tells something");
         for (i, found) in slope.numbers().enumerate().step_by(7) {
             let moved = |by: f64| {
                 let mut network = network.clone();
                 *network.numbers_mut().nth(i).unwrap() += by;
-                loss(&network.pass(&sample.view).outputs, sample).0
+                sample.truth.loss(&network.pass(&sample.view).outputs).0
             };
             let expected = (moved(MOVED) - moved(-MOVED)) / (2.0 * MOVED);
             assert!((found - expected).abs() < 1e-5 * largest, "weight {i}: {found}, expected {expected}");

@@ -1,0 +1,189 @@
+//! Bodies as sensors see them in one frame, with where they truly stand and face: what the networks that look at one body are
+//! fitted on.
+//!
+//! Training scenes have the seeds 50,000 and on, and the scenes for the errors on the cards 130,000 and on. Layouts of one, two
+//! and three sensors; people on ORCA's ways, mixed crowds, pairs, and some of them speed-augmented.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use umbracast::config::Config;
+use umbracast::detect::axis_view::{AxisView, OF_BODY, OF_POINT, POINTS};
+use umbracast::detect::point_network::{BODY_UNITS, OUTPUTS, POINT_UNITS};
+use umbracast::detect::{Background, Clusterer, Measurer, Prior};
+use umbracast::geometry::DVec2;
+use umbracast::lidar::{Assembler, Views};
+use umbracast::track::Tracker;
+use umbracast::{Error, Health};
+use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast_sim::body::{Bodies, PersonState};
+use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs, speed_augmented};
+use umbracast_sim::scene::Scene;
+
+use crate::bodies::bodies;
+use crate::point_network::{EPOCHS, SEED};
+
+/// Height of the sensors, their distance from the middle, the directions in which they stand from there, in degrees, and the
+/// scenes' seeds.
+type Layout = (f64, f64, &'static [f64], Range<u64>);
+const OPPOSITE: &[f64] = &[0.0, 180.0];
+const LAYOUTS: [Layout; 7] = [
+    (9.0, 16.0, OPPOSITE, 50_000..50_036),
+    (6.0, 12.5, OPPOSITE, 51_000..51_024),
+    (4.0, 13.0, OPPOSITE, 52_000..52_012),
+    (7.5, 14.0, OPPOSITE, 53_000..53_012),
+    (5.0, 12.0, &[0.0, 90.0], 54_000..54_024),
+    (3.0, 14.0, &[0.0, 120.0, 240.0], 55_000..55_024),
+    (7.0, 13.0, &[0.0], 56_000..56_024),
+];
+/// Scenes that are not trained on.
+const HELD_OUT: Layout = (9.0, 16.0, OPPOSITE, 130_000..130_006);
+/// Sensors look this much below the middle of the hall, so that their beams cover both ends.
+const BELOW_MIDDLE_DEG: f64 = 6.0;
+/// A cluster found nearer than this to a person is that person.
+const OWN_M: f64 = 0.3;
+/// Every so many clusters are fitted as if nothing were known of the person.
+const UNKNOWN_EVERY: usize = 6;
+const PEOPLE: usize = 12;
+
+/// A body in one frame.
+#[derive(Debug, Clone)]
+pub(crate) struct Seen {
+    pub(crate) view: AxisView,
+    /// From the view's base to the true axis.
+    pub(crate) off_m: DVec2,
+    pub(crate) heading_rad: f64,
+}
+
+/// Bodies to learn from, and others of scenes of their own. `scene_done` is called with scenes done and scenes in all, from any
+/// thread.
+///
+/// # Errors
+/// A layout that nothing can be simulated of.
+pub(crate) fn watch_all(scene_done: impl Fn(usize, usize) + Sync) -> Result<[Vec<Seen>; 2], Error> {
+    let scenes = |(_, _, _, seeds): &Layout| (seeds.end - seeds.start) as usize;
+    let (done, all) = (AtomicUsize::new(0), LAYOUTS.iter().chain([&HELD_OUT]).map(scenes).sum());
+    let told = || scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, all);
+    let of_layouts: Result<Vec<Vec<Seen>>, Error> =
+        LAYOUTS.iter().map(|layout| seen_in(layout, told)).collect();
+    Ok([of_layouts?.concat(), seen_in(&HELD_OUT, told)?])
+}
+
+/// A card's head: `what` the network computes, `command` and `commit` that made it, and on how many bodies it was fitted.
+pub(crate) fn card_head(title: &str, what: &str, command: &str, commit: &str, bodies: usize) -> String {
+    let layouts: String = LAYOUTS
+        .iter()
+        .map(|(height_m, away_m, directions_deg, seeds)| {
+            format!(
+                "- {} scenes from seed {}, HDL-32E {height_m} m high, {away_m} m from the middle, in the directions \
+                 {directions_deg:?}\n",
+                seeds.end - seeds.start,
+                seeds.start
+            )
+        })
+        .collect();
+    let commit = if commit.is_empty() { "unknown" } else { commit };
+    format!(
+        "# {title}\n\n\
+         From what the sensors saw of one body in one frame to {what}: up to {POINTS} points of {OF_POINT} numbers, each through \
+         {POINT_UNITS:?} units, then with {OF_BODY} numbers of the whole body through {BODY_UNITS:?} units, {OUTPUTS} outputs \
+         (`src/detect/point_network.rs`).\n\n\
+         Written by `umbracast train {command}`, commit {commit}.\n\n\
+         ## Data\n\nSimulated returns of {PEOPLE} people a scene, in turn: orca-03, mixed speed-augmented, orca-06, \
+         pairs 0.6 m apart, mixed, orca-03 speed-augmented. Six scenes have bodies of our own, the next six those of the \
+         third-party family `a`; then the same with telephones, bags, rucksacks and hands in pockets among them. No two \
+         people walk alike.\n\n\
+         {layouts}\n{bodies} bodies; {EPOCHS} epochs, Adam, negative log-likelihood, every fifth body made smaller or larger, \
+         seed {SEED}.\n\n"
+    )
+}
+
+/// What the errors on a card are of.
+pub(crate) fn held_out_name() -> String {
+    format!("{} scenes of their own from seed {}", HELD_OUT.3.end - HELD_OUT.3.start, HELD_OUT.3.start)
+}
+
+/// Of every scene of a layout.
+fn seen_in(layout: &Layout, scene_done: impl Fn() + Sync) -> Result<Vec<Seen>, Error> {
+    let (height_m, away_m, directions_deg, seeds) = layout.clone();
+    let mut config = Config::default();
+    let one = config.site.sensors[0].clone();
+    config.site.sensors = directions_deg
+        .iter()
+        .map(|direction_deg| {
+            let mut sensor = one.clone();
+            let [x_m, y_m] = (DVec2::from_angle(direction_deg.to_radians()) * away_m).to_array();
+            sensor.name = format!("at-{direction_deg}");
+            sensor.position_m = [x_m, y_m, height_m];
+            sensor.rotation_deg.yaw = direction_deg - 180.0;
+            sensor.rotation_deg.pitch = (height_m / away_m).atan().to_degrees() + BELOW_MIDDLE_DEG;
+            sensor
+        })
+        .collect();
+    let first = seeds.start;
+    let of_scenes = seeds.into_par_iter().map(|seed| {
+        let samples = watch(crowd_of(seed - first, seed), bodies((seed - first) / CROWDS)?, seed, &config);
+        scene_done();
+        samples
+    });
+    Ok(of_scenes.collect::<Result<Vec<Vec<Seen>>, Error>>()?.concat())
+}
+
+/// So many kinds of crowds.
+const CROWDS: u64 = 6;
+
+/// Who walks in the scene of that number.
+fn crowd_of(scene: u64, seed: u64) -> Crowd {
+    let drawn = |preset| circle_crossing(preset, PEOPLE, 12.5, seed);
+    match scene % CROWDS {
+        0 => drawn(Preset::Orca03),
+        1 => speed_augmented(&drawn(Preset::Mixed), seed),
+        2 => drawn(Preset::Orca06),
+        3 => pairs(PEOPLE / 2, 0.6, 12.5, seed),
+        4 => drawn(Preset::Mixed),
+        _ => speed_augmented(&drawn(Preset::Orca03), seed),
+    }
+}
+
+/// Every cluster of a scene that is a person's.
+fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec<Seen>, Error> {
+    let mut samples: Vec<Seen> = Vec::new();
+    let mut health = Health::default();
+    let mut background = Background::new(&config.detect, &config.site);
+    let mut clusterer = Clusterer::new(&config.detect, &config.site);
+    let mut measurer = Measurer::new(&config.detect, &config.site);
+    let mut tracker = Tracker::new(&config.track, &config.site);
+    empty_frames(&config.site, seed)?.iter().for_each(|frame| background.learn_empty(frame));
+    let mut scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&bodies);
+    let walkers = scene.walkers().to_vec();
+    let mut assembler = Assembler::new(&config.site)?;
+    let (mut priors, mut points, mut clusters, mut detections, mut tracks) =
+        (vec![], vec![], vec![], vec![], vec![]);
+    while let Some(now) = scene.next_frame() {
+        push(&mut assembler, &now.packets, &mut health);
+        while let Some(frame) = assembler.pop() {
+            tracker.priors(frame.time_ns, &mut priors);
+            background.foreground(&frame, &priors, &mut health, &mut points);
+            clusterer.clusters(&points, &priors, &mut clusters);
+            measurer.detections(&points, &clusters, &priors, &mut detections);
+            tracker.update(&Views::of(&frame), &detections, &mut tracks);
+            for cluster in &clusters {
+                let known = !samples.len().is_multiple_of(UNKNOWN_EVERY);
+                let priors: &[Prior] = if known { &priors } else { &[] };
+                let view = measurer.axis_view(&points, cluster, priors);
+                let late: i64 = cluster.iter().map(|&i| points[i as usize].time_ns - frame.time_ns).sum();
+                let time_ns = frame.time_ns + late / cluster.len() as i64;
+                let off_m = |state: &PersonState| state.position_m - view.base_m;
+                let own = walkers
+                    .iter()
+                    .filter_map(|walker| walker.state_at(time_ns))
+                    .min_by(|a, b| off_m(a).length_squared().total_cmp(&off_m(b).length_squared()))
+                    .filter(|state| off_m(state).length() < OWN_M);
+                let seen = |own: &PersonState| Seen { view, off_m: off_m(own), heading_rad: own.heading_rad };
+                samples.extend(own.as_ref().map(seen));
+            }
+        }
+    }
+    Ok(samples)
+}
