@@ -19,8 +19,7 @@ type Walkers = [(DVec2, DVec2)];
 
 /// A frame of one sensor high above the middle, whose beams are not known: everybody is in sight.
 fn frame(index: u64) -> Frame {
-    let mut site_from_sensor = Pose::IDENTITY;
-    site_from_sensor.translation_m = DVec3::new(0.0, 0.0, 30.0);
+    let site_from_sensor = Pose { translation_m: DVec3::new(0.0, 0.0, 30.0), ..Pose::IDENTITY };
     let scan = Scan { sensor: 0, site_from_sensor, cloud: Cloud::Unorganised(Vec::new()) };
     Frame { index, time_ns: (index as i64 + 1) * 100_000_000, scans: vec![scan] }
 }

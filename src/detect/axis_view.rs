@@ -177,7 +177,7 @@ pub fn away(sensors_m: &[DVec3], point: &Point) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::axis::AxisModel;
+    use crate::detect::{axis, facing};
 
     const SENSOR_M: DVec3 = DVec3::new(-10.0, 0.0, 8.0);
     const PERSON: [(f64, f64, f64); 5] =
@@ -190,7 +190,7 @@ mod tests {
 
     fn position_m(points: &[Point], velocity_mps: DVec2) -> DVec2 {
         let view = AxisView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
-        AxisModel::shipped().locate(&view).0
+        axis::locate(&axis::shipped(), &view).0
     }
 
     #[test]
@@ -200,6 +200,17 @@ mod tests {
         let b = position_m(&points(&mirrored), DVec2::from_angle(-0.4));
         assert!(a.y.abs() > 0.01, "{a}");
         assert!((a.x - b.x).abs() < 1e-12 && (a.y + b.y).abs() < 1e-12, "{a} {b}");
+    }
+
+    #[test]
+    fn who_stands_in_a_mirror_faces_as_mirrored() {
+        let heading_rad = |points: &[Point]| {
+            let view = AxisView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, None);
+            facing::face(&facing::shipped(), &view).heading_rad
+        };
+        let (a, b) =
+            (heading_rad(&points(&PERSON)), heading_rad(&points(&PERSON.map(|(x, y, z)| (x, -y, z)))));
+        assert!((a + b).abs() < 1e-12 && a.abs() > 0.01, "{a} {b}");
     }
 
     #[test]

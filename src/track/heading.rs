@@ -105,7 +105,6 @@ fn turned(rad: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{DMat3, DVec3};
 
     /// Stands for so many steps and seems to face in directions that turn by so much each.
     fn stand(heading: &mut Heading, first_rad: f64, turn_rad: f64, steps: u32, log_odds: f64) {
