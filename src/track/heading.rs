@@ -20,6 +20,8 @@ const NEW_IN_A_FRAME: f64 = 0.2;
 /// However long a body is looked at, it may be one of those that look alike from the front and from behind: no look makes the
 /// opposite less likely than this.
 const BEHIND_MIN: f64 = 0.03;
+/// Two such logarithms add up to a number that can be.
+const LOG_MAX: f64 = 300.0;
 
 /// Where a trunk faces, counter-clockwise from +x.
 #[derive(Debug, Clone, Copy)]
@@ -67,24 +69,23 @@ impl Heading {
             false => (false, turned(off_rad + PI)),
         };
         let log_odds = NEW_IN_A_FRAME * if is_near { facing.log_odds } else { -facing.log_odds };
-        let (ratio, spread_rad2) = match self.variance_rad2 >= ANY_HEADING_RAD2 {
-            // Nothing is known yet.
-            true => (1.0, f64::INFINITY),
-            false => {
-                let spread_rad2 = self.variance_rad2 + facing.variance_rad2 / NEW_IN_A_FRAME;
-                // How much likelier the way that lies nearer to the mean is, if the mean is right.
-                ((0.5 * ((PI - off_rad.abs()).powi(2) - off_rad.powi(2)) / spread_rad2).exp(), spread_rad2)
-            }
+        let said_rad2 = facing.variance_rad2 / NEW_IN_A_FRAME;
+        let (is_known, spread_rad2) = (self.variance_rad2 < ANY_HEADING_RAD2, self.variance_rad2 + said_rad2);
+        // How much likelier the way that lies nearer to the mean is, if the mean is right.
+        let log_ratio = match is_known {
+            true => 0.5 * ((PI - off_rad.abs()).powi(2) - off_rad.powi(2)) / spread_rad2,
+            false => 0.0,
         };
-        let near = ((1.0 - self.behind) * ratio + self.behind) * log_odds.exp();
+        let ratio = log_ratio.min(LOG_MAX).exp();
+        let near = ((1.0 - self.behind) * ratio + self.behind) * log_odds.clamp(-LOG_MAX, LOG_MAX).exp();
         let far = (1.0 - self.behind) + self.behind * ratio;
         self.behind = (far / (near + far)).max(self.behind.min(BEHIND_MIN));
-        if spread_rad2.is_finite() {
+        if is_known {
             self.mean_rad += off_rad * self.variance_rad2 / spread_rad2;
-            self.variance_rad2 *= facing.variance_rad2 / NEW_IN_A_FRAME / spread_rad2;
+            self.variance_rad2 *= said_rad2 / spread_rad2;
         } else {
             self.mean_rad += off_rad;
-            self.variance_rad2 = (facing.variance_rad2 / NEW_IN_A_FRAME).min(ANY_HEADING_RAD2);
+            self.variance_rad2 = said_rad2.min(ANY_HEADING_RAD2);
         }
         if self.behind > EITHER {
             (self.mean_rad, self.behind) = (self.mean_rad + PI, 1.0 - self.behind);
@@ -144,6 +145,16 @@ mod tests {
         stand(&mut heading, 0.0, 1.5 * PI / 90.0, 91, 0.0);
         let off_rad = (heading.mean_rad + FRAC_PI_2).abs();
         assert!(off_rad < 0.15 && heading.behind < 1e-3, "{heading:?}");
+    }
+
+    /// A body seen too sharply made the probability of the opposite no number.
+    #[test]
+    fn no_look_is_too_sharp() {
+        let mut heading = Heading { mean_rad: 0.0, variance_rad2: 1e-6, behind: 0.0 };
+        for heading_rad in [0.1, 3.0] {
+            heading.see(&Facing { heading_rad, variance_rad2: 1e-9, log_odds: 1e9 }, 0.0);
+            assert!((0.0..=0.5).contains(&heading.behind) && heading.mean_rad.is_finite(), "{heading:?}");
+        }
     }
 
     #[test]
