@@ -1,7 +1,7 @@
-//! What the sensors saw of one body, as the model of the body axis reads it.
+//! What the sensors saw of one body, as the networks read it that find its axis and which way it faces.
 //!
 //! Sensors see the near side of a body, and legs and arms swing. Every point therefore first moves away from its own
-//! sensor by a constant, and along the person's path to the mean time of all points. [`super::axis`] does the rest,
+//! sensor by a constant, and along the person's path to the mean time of all points. [`super::point_network`] does the rest,
 //! from how the points lie in a frame along the line of sight.
 
 use super::Point;
@@ -19,7 +19,7 @@ pub const OF_BODY: usize = 7;
 const TOP: usize = 3;
 const SPEED: usize = 5;
 
-/// A person's points as the model of the body axis sees them.
+/// A person's points as the networks see them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisView {
     /// Mean of the points, each moved away from its sensor.
