@@ -4,7 +4,7 @@
 //! Magnenat-Thalmann and Thalmann, "A global human walking model with real-time kinematic personification", The
 //! Visual Computer 6 (1990).
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Who is slower stands: he may shift his weight and look anywhere, but not in strides.
 pub const WALKS_FROM_MPS: f64 = 0.3;
@@ -12,8 +12,6 @@ pub const WALKS_FROM_MPS: f64 = 0.3;
 pub const LEFTMOST_RAD: f64 = 1.7 * PI;
 /// The trunk is farthest ahead so long after each heel touched the floor, as the source has it at a usual walk.
 pub const FOREMOST_RAD: f64 = 0.7 * PI;
-/// Arms and legs are farthest apart so long after the right heel touched the floor, as returns show it.
-pub const WIDEST_RAD: f64 = 0.05 * PI;
 /// Stride over sqrt(speed x stature), sqrt(s). The cadence that follows is within 4 % of what clinics measure on adults
 /// from 1.0 to 1.9 m/s.
 const STRIDE: f64 = 0.98;
@@ -41,21 +39,6 @@ pub struct GaitPhase {
 impl GaitPhase {
     /// Any phase.
     pub const UNKNOWN: Self = Self { phase_rad: 0.0, concentration: 0.0 };
-
-    /// What an oscillation with its quadrature, each known to `variance`, tells that is largest at the phase
-    /// `largest_rad`. The quadrature is minus the sine of the angle since the largest value.
-    #[doc(hidden)] // The tracker calls it.
-    pub fn of_wave([value, quadrature]: [f64; 2], variance: f64, largest_rad: f64, speed_mps: f64) -> Self {
-        let squared = value * value + quadrature * quadrature;
-        if speed_mps < WALKS_FROM_MPS || squared == 0.0 {
-            return Self::UNKNOWN;
-        }
-        let since_largest_rad = f64::atan2(-quadrature, value);
-        Self {
-            phase_rad: (since_largest_rad + largest_rad).rem_euclid(TAU),
-            concentration: squared / variance,
-        }
-    }
 }
 
 /// Speed over the height of the hips.
@@ -82,11 +65,6 @@ pub fn sway_share(relative_speed_hz: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn who_stands_has_no_phase() {
-        assert_eq!(GaitPhase::of_wave([0.02, 0.0], 1e-4, LEFTMOST_RAD, 0.1), GaitPhase::UNKNOWN);
-    }
 
     #[test]
     fn strides_are_as_long_as_the_way_walked_in_one() {

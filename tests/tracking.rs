@@ -49,7 +49,7 @@ fn detection(position_m: DVec2, time_ns: i64) -> Detection {
         z_m: 0.9,
         time_ns,
         points: 30,
-        limbs: None,
+        gait: None,
         reaches: Vec::new(),
         bands: Default::default(),
         overhead: None,

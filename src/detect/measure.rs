@@ -1,14 +1,13 @@
 //! Position and boxes of one person. Heights are above the floor below the person; only the boxes are in the site
 //! frame.
 
-use super::axis_view::{AxisView, Seen};
 use super::canopy::{OVERHEAD_M, Overhead};
 use super::evidence::FULL_BODY_TOP_M;
-use super::limbs::LimbCovariance;
 use super::outline::{LEVELS, Reach, reaches};
 use super::point_network::PointNetwork;
+use super::pose_view::{PoseView, Seen};
 use super::shape::{BANDS, Moments, band_of};
-use super::{Cluster, Detection, Point, Prior, axis, facing};
+use super::{Cluster, Detection, Point, Prior, pose};
 use crate::Site;
 use crate::config::{DetectConfig, Mechanism, PositionMethod};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
@@ -87,8 +86,7 @@ pub struct Measurer {
     seated: bool,
     sensors_m: Vec<DVec3>,
     hall: Hall,
-    axis: PointNetwork,
-    facing: PointNetwork,
+    pose: PointNetwork,
     /// By point: whether a cluster has it.
     is_taken: Vec<bool>,
     /// Points that hang over people, above the floor, with their sensors.
@@ -117,8 +115,7 @@ impl Measurer {
             seated: !config.without.contains(&Mechanism::ChildrenAndSeated),
             sensors_m: site.sensors.iter().map(|s| DVec3::from_array(s.position_m)).collect(),
             hall: site.hall.clone(),
-            axis: axis::shipped(),
-            facing: facing::shipped(),
+            pose: pose::shipped(),
             is_taken: Vec::new(),
             overhead_m: Vec::new(),
             seen: Vec::new(),
@@ -251,24 +248,24 @@ impl Measurer {
         let first_ns = of().map(|p| p.time_ns).min().unwrap_or_default();
         let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
         let who = nearest(mean_m.truncate(), priors);
-        let mut facing = None;
+        let (mut facing, mut gait) = (None, None);
         let (position_m, z_m, covariance_m2) = match self.position {
             PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z, None),
             PositionMethod::ShiftedMean => {
-                (self.axis_view_within(seen, points, cluster, &[]).base_m, mean_m.z, None)
+                (self.pose_view_within(seen, points, cluster, &[]).base_m, mean_m.z, None)
             }
             PositionMethod::Fitted => {
-                let view = self.axis_view_within(seen, points, cluster, priors);
-                let (position_m, covariance_m2) = axis::locate(&self.axis, &view);
-                facing = who.filter(|_| view.stands()).map(|_| facing::face(&self.facing, &view));
-                (position_m, mean_m.z, Some(covariance_m2))
+                let view = self.pose_view_within(seen, points, cluster, priors);
+                let pose = pose::pose(&self.pose, &view);
+                // Who is not known may walk or stand.
+                (facing, gait) = (pose.facing.filter(|_| who.is_some()), pose.gait);
+                (pose.position_m, mean_m.z, Some(pose.covariance_m2))
             }
         };
         let mut bands = [Moments::default(); BANDS];
         if covariance_m2.is_some() {
             seen.iter().for_each(|s| bands[band_of(s.z_m)].add(s.at_m - position_m));
         }
-        let limbs = who.and_then(|who| LimbCovariance::of(of(), position_m.extend(floor_m), who));
         let of_top = places_m().filter(|p| p.z >= aabb.max_m.z - HEAD_M);
         let axes = match self.position {
             PositionMethod::BoxCenter => ObbAxes::Eigenvectors,
@@ -284,7 +281,7 @@ impl Measurer {
             position_m,
             covariance_m2,
             facing,
-            limbs,
+            gait,
             reaches: all_reaches,
             bands,
             overhead: Overhead::about(position_m, &self.overhead_m),
@@ -299,25 +296,25 @@ impl Measurer {
         }
     }
 
-    /// A cluster as the model of the body axis sees it; who walks there is the nearest of `priors`.
-    #[doc(hidden)] // For the fit of the model of the body axis.
-    pub fn axis_view(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> AxisView {
-        self.axis_view_within(&mut Vec::new(), points, cluster, priors)
+    /// A cluster as the network of the pose sees it; who walks there is the nearest of `priors`.
+    #[doc(hidden)] // For the fit of the network of the pose.
+    pub fn pose_view(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> PoseView {
+        self.pose_view_within(&mut Vec::new(), points, cluster, priors)
     }
 
-    fn axis_view_within(
+    fn pose_view_within(
         &self,
         memory: &mut Vec<Seen>,
         points: &[Point],
         cluster: &[u32],
         priors: &[Prior],
-    ) -> AxisView {
+    ) -> PoseView {
         let seen = cluster.iter().map(|&i| &points[i as usize]);
         let mean_m =
             seen.clone().map(|p| p.position_m.truncate()).sum::<DVec2>() / cluster.len().max(1) as f64;
         let velocity_mps = nearest(mean_m, priors).map(|prior| prior.velocity_mps);
         let floor_m = self.hall.floor_m(mean_m);
-        AxisView::new(memory, seen, &self.sensors_m, floor_m, SHIFT_M, velocity_mps)
+        PoseView::new(memory, seen, &self.sensors_m, floor_m, SHIFT_M, velocity_mps)
     }
 }
 

@@ -12,8 +12,8 @@ mod sensor_model;
 mod voxel;
 mod placed;
 mod background;
-#[doc(hidden)] // What the model of the body axis reads, for its fit.
-pub mod axis_view;
+#[doc(hidden)] // What the network of the pose reads, for its fit.
+pub mod pose_view;
 mod dp_means;
 mod part;
 mod shape;
@@ -25,13 +25,10 @@ mod arms;
 mod expected;
 mod evidence;
 mod split_merge;
-#[doc(hidden)] // The networks that look at one body, for their fits and for the command that shows them.
+#[doc(hidden)] // The network that looks at one body, for its fit and for the command that shows it.
 pub mod point_network;
 #[doc(hidden)]
-pub mod axis;
-#[doc(hidden)]
-pub mod facing;
-mod limbs;
+pub mod pose;
 #[doc(hidden)] // What the fit of the usual outline reads.
 pub mod outline;
 mod measure;
@@ -45,15 +42,15 @@ pub use canopy::Overhead;
 pub use clocks::Clocks;
 pub use doubled::doubled;
 pub(crate) use expected::{PRESSED_APART_M, PRESSED_M, press};
-pub use facing::Facing;
-pub use limbs::LimbCovariance;
 pub use measure::Measurer;
-#[doc(hidden)] // For the card of the model of the body axis.
+#[doc(hidden)] // For the card of the network of the pose.
 pub use measure::SHIFT_M;
 pub use outline::{LEVELS, Reach};
+pub use pose::Facing;
 pub use shape::{BANDS, Moments, Shape};
 pub use split_merge::Clusterer;
 
+use crate::gait::GaitPhase;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 use crate::site::Hall;
 
@@ -140,8 +137,8 @@ pub struct Detection {
     pub overhead: Option<Overhead>,
     /// Which way somebody known faces who stands.
     pub facing: Option<Facing>,
-    /// How arms and legs of a known walker lie.
-    pub limbs: Option<LimbCovariance>,
+    /// Where in the stride somebody known is who walks.
+    pub gait: Option<GaitPhase>,
     /// How far the body of somebody known reaches, by sensor and level.
     pub reaches: Vec<Reach>,
     /// How the points lie about the position, band by band, along the site's axes.
@@ -167,7 +164,7 @@ impl Detection {
             top_diagonal_m: 0.2,
             overhead: None,
             facing: None,
-            limbs: None,
+            gait: None,
             reaches: Vec::new(),
             bands: Default::default(),
             aabb,

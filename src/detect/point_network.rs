@@ -8,18 +8,18 @@ use std::sync::Arc;
 
 use safetensors::SafeTensors;
 
-use super::axis_view::{AxisView, OF_BODY, OF_POINT};
+use super::pose_view::{OF_BODY, OF_POINT, PoseView};
 use crate::Error;
 use crate::elementary::wide;
 use crate::tensors::Layer;
 
 /// Units of the layers that each point goes through, then of those of the whole body; the last gives [`OUTPUTS`].
 pub const POINT_UNITS: [usize; 3] = [32, 32, 64];
-pub const BODY_UNITS: [usize; 2] = [128, 64];
+pub const BODY_UNITS: [usize; 2] = [256, 128];
 /// What the layers of the whole body read.
 pub const POOLED: usize = 2 * POINT_UNITS[2] + OF_BODY;
 /// Numbers that it gives.
-pub const OUTPUTS: usize = 4;
+pub const OUTPUTS: usize = 10;
 
 /// The network's weights. A clone shares them.
 #[derive(Clone)]
@@ -53,7 +53,7 @@ impl PointNetwork {
     }
 
     /// What the network says of a body. Who is seen in a mirror gets the same numbers.
-    pub fn outputs(&self, view: &AxisView) -> [f64; OUTPUTS] {
+    pub fn outputs(&self, view: &PoseView) -> [f64; OUTPUTS] {
         self.0.outputs(view).map(f64::from)
     }
 }
@@ -67,11 +67,11 @@ impl fmt::Debug for PointNetwork {
 
 impl Layers {
     wide! {
-        fn outputs(&self, view: &AxisView) -> [f32; OUTPUTS] = outputs_avx2 or outputs_portably
+        fn outputs(&self, view: &PoseView) -> [f32; OUTPUTS] = outputs_avx2 or outputs_portably
     }
 
     #[inline(always)]
-    fn outputs_portably(&self, view: &AxisView) -> [f32; OUTPUTS] {
+    fn outputs_portably(&self, view: &PoseView) -> [f32; OUTPUTS] {
         const UNITS: usize = POINT_UNITS[2];
         let (mut largest, mut sums) = ([f32::MIN; UNITS], [0.0; UNITS]);
         for point in view.of_points() {

@@ -1,11 +1,11 @@
 //! One cluster, one person: Haselich's split-merge, or evidence for one person more or fewer.
 
-use super::axis_view::away;
 use super::canopy::Canopies;
 use super::cluster::PlanGrid;
 use super::dp_means::MergeMean;
 use super::memory::Memory;
 use super::part::{POINTS_MIN, Part};
+use super::pose_view::away;
 use super::{Cluster, Point, Prior, above_floor, dp_means, evidence};
 use crate::Site;
 use crate::config::{ClusterMethod, DetectConfig, Mechanism};

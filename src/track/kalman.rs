@@ -63,14 +63,6 @@ impl Remembered for Filter {
 }
 
 impl Filter {
-    /// Moves everything by a way.
-    pub(super) fn shift(&mut self, by_m: DVec2) {
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.state.x[0] += by_m.x;
-            hypothesis.state.x[1] += by_m.y;
-        }
-    }
-
     /// A track's first state: somewhere near the first detection, at any walking velocity.
     pub fn new(numbers: &Numbers, position_m: DVec2, R: f64) -> Self {
         let (p, v) = (R, BIRTH_SPEED_MPS.powi(2));

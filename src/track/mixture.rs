@@ -83,8 +83,6 @@ struct Memory {
     taken: Vec<bool>,
     ranks: Vec<Rank>,
     beside: Vec<Beside>,
-    /// Of things, ascending.
-    owners: Vec<u64>,
 }
 
 /// Fewest first: the confirmed, those of more matches, the older.
@@ -339,16 +337,10 @@ impl MixtureTracker {
 
     /// Everybody's track, in the memory of the last frame's.
     fn tell(&mut self, time_ns: i64, step_s: f64, tracks: &mut Vec<Track>) {
-        let owners = &mut self.memory.owners;
-        owners.clear();
-        owners.extend(self.people.iter().filter_map(|person| person.attached.part_of()));
-        owners.sort_unstable();
         tracks.truncate(self.people.len());
         for (i, person) in self.people.iter_mut().enumerate() {
             let observed = tracks.get_mut(i).map(|old| std::mem::take(&mut old.observed)).unwrap_or_default();
-            let has_thing = owners.binary_search(&person.id).is_ok();
-            let track =
-                person.track(&self.numbers, has_thing, time_ns, step_s, &self.visibility.hall, observed);
+            let track = person.track(time_ns, step_s, &self.visibility.hall, observed);
             match tracks.get_mut(i) {
                 Some(old) => *old = track,
                 None => tracks.push(track),
@@ -373,7 +365,7 @@ fn pair_cost(
     detection: &Detection,
 ) -> f64 {
     let state = person.filter.state_after(numbers, after_s);
-    let apart = person.axis_m(detection) - state.position_m();
+    let apart = detection.position_m - state.position_m();
     let noise = plus(noise(numbers, detection, &expected.view), sway(numbers));
     let spread = plus(state.position_covariance(), plus(noise, round(GATE_SLACK_M.powi(2))));
     let (inverse, det) = inverted(spread);

@@ -14,7 +14,7 @@ pub mod outline;
 pub mod numbers;
 mod sway;
 mod kalman;
-mod limb_phase;
+mod stride;
 #[doc(hidden)] // For fits that need to know who is in free sight.
 pub mod visibility;
 mod height;

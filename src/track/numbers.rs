@@ -44,7 +44,7 @@ pub struct Numbers {
     /// Whether sensors, furniture and other people decide if a person can be seen.
     pub visibility: bool,
     /// Whether arms and legs tell the phase of the gait.
-    pub limb_phase: bool,
+    pub stride: bool,
     /// What outlines of usual bodies look like.
     pub usual: UsualOutline,
     /// Whether outlines are learned.
@@ -82,7 +82,7 @@ impl Numbers {
             noise_floor_m: 0.005,
             noise_share: 0.7,
             visibility: !without(Mechanism::Visibility),
-            limb_phase: !without(Mechanism::LimbPhase),
+            stride: !without(Mechanism::LimbPhase),
             usual: UsualOutline::shipped(),
             outline: !without(Mechanism::Outline),
             shape: !without(Mechanism::Shape),

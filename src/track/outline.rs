@@ -24,11 +24,6 @@ pub type LevelOutline = [f64; 4];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UsualOutline {
-    /// One standard deviation of where the axis stands, along one direction, of a body whose outline is usual, metres: what no frame
-    /// mends, for each sees the same body.
-    pub axis_sigma_m: f64,
-    /// It grows by this for each metre that an outline differs from the usual one ([`unlike_m2`]).
-    pub axis_sigma_per_m: f64,
     /// From the floor up.
     pub levels: Vec<UsualLevel>,
 }
@@ -63,12 +58,6 @@ pub fn shares(cos: f64, sin: f64) -> LevelOutline {
     [cos, sin, 1.0, 2.0 * cos * cos - 1.0]
 }
 
-/// How far an outline differs from the usual one: mean of the squares over levels and terms, m^2.
-pub fn unlike_m2(levels_m: &[LevelOutline; LEVELS]) -> f64 {
-    let squares = levels_m.as_flattened().iter().map(|m| m * m).sum::<f64>();
-    squares / (4 * LEVELS) as f64
-}
-
 /// The axis of a body when it was seen.
 #[derive(Debug, Clone, Copy)]
 pub struct Axis {
@@ -99,11 +88,6 @@ impl UsualOutline {
         Self::parse(include_str!("../../models/outline.toml")).expect("the embedded file is proven by a test")
     }
 
-    /// Variance of the axis along one direction that no frame mends, m^2: who carries something is less surely where he seems to be.
-    pub fn axis_variance_m2(&self, outline_m: &[LevelOutline; LEVELS]) -> f64 {
-        self.axis_sigma_m.powi(2) + self.axis_sigma_per_m.powi(2) * unlike_m2(outline_m)
-    }
-
     fn parse(text: &str) -> Result<Self, Error> {
         let usual: Self = toml::from_str(text).map_err(|e| Error::new(format!("usual outline: {e}")))?;
         match usual.levels.len() {
@@ -122,20 +106,10 @@ const LASTS_S: f64 = 30.0;
 /// A reach so many deviations off is believed no more than one at this limit: it may be somebody else's.
 const DEVIATIONS_MAX: f64 = 3.0;
 
-/// Within this time the axis moves to below the head.
-const CENTRED_S: f64 = 2.0;
-/// What reaches so much farther all round than a usual body is a chair's or a pram's, and the axis is not in its middle but below the
-/// head.
-const ROUND_MAX_M: f64 = 0.06;
-/// Detections of nobody's axis are farther off in the long run: who sits shows his feet ahead, which tells nothing.
-const OFFSET_MAX_M: f64 = 0.06;
-
 /// What was learned of one body.
 #[derive(Debug, Clone)]
 pub(super) struct Outline {
     levels: [Level; LEVELS],
-    /// How far ahead of where detections say, and left of it, the axis stands.
-    offset_m: DVec2,
 }
 
 /// Mean and covariance of a [`LevelOutline`].
@@ -151,40 +125,18 @@ impl Remembered for Outline {
             words.f64s(&mut level.mean_m);
             level.covariance_m2.iter_mut().for_each(|row| words.f64s(row));
         }
-        words.vec2(&mut self.offset_m);
     }
 }
 
 impl Outline {
     /// Of somebody of whom nothing was seen.
     pub(super) fn new(usual: &UsualOutline) -> Self {
-        let levels = std::array::from_fn(|level| Level::new(&usual.levels[level]));
-        Self { levels, offset_m: DVec2::ZERO }
+        Self { levels: std::array::from_fn(|level| Level::new(&usual.levels[level])) }
     }
 
     /// How it differs from the usual one.
     pub(super) fn levels_m(&self) -> [LevelOutline; LEVELS] {
         self.levels.map(|level| level.mean_m)
-    }
-
-    /// How far ahead of where detections say, and left of it, the axis stands.
-    pub(super) fn offset_m(&self) -> DVec2 {
-        self.offset_m
-    }
-
-    /// Moves the axis of what is as round as a chair or a pram to below its head; the outline is then about that axis. Returns how
-    /// far it moved, ahead and left.
-    pub(super) fn centre(&mut self, step_s: f64) -> DVec2 {
-        let is_round = self.levels.iter().any(|level| level.mean_m[2] > ROUND_MAX_M);
-        let [ahead_m, left_m, ..] = self.levels[LEVELS - 1].mean_m;
-        let told_m = if is_round { self.offset_m + DVec2::new(ahead_m, left_m) } else { DVec2::ZERO };
-        let moved_m = (told_m.clamp_length_max(OFFSET_MAX_M) - self.offset_m) * (step_s / CENTRED_S).min(1.0);
-        self.offset_m += moved_m;
-        for level in &mut self.levels {
-            level.mean_m[0] -= moved_m.x;
-            level.mean_m[1] -= moved_m.y;
-        }
-        moved_m
     }
 
     /// Time passes.
@@ -315,20 +267,6 @@ mod tests {
         outline.see(&usual, &far, &axis, 0.0, (1.75, 1.3));
         let [_, left, ..] = outline.levels_m()[2];
         assert!(left < 0.06, "{left}");
-    }
-
-    #[test]
-    fn who_sits_in_something_round_is_below_the_head() {
-        let offset_m = |round_m: f64| {
-            let mut outline =
-                watched(|level, cos, sin| if level == 4 { 0.03 * sin } else { round_m + 0.2 * cos });
-            for _ in 0..200 {
-                outline.centre(0.1);
-            }
-            outline.offset_m()
-        };
-        assert!(offset_m(0.1).distance(DVec2::Y * 0.03) < 0.01, "{:?}", offset_m(0.1));
-        assert_eq!(offset_m(0.0), DVec2::ZERO, "somebody slim");
     }
 
     #[test]

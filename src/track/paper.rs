@@ -291,7 +291,7 @@ mod tests {
             z_m: 0.9,
             time_ns: 0,
             points: 30,
-            limbs: None,
+            gait: None,
             reaches: Vec::new(),
             bands: Default::default(),
             overhead: None,

@@ -8,13 +8,13 @@ use super::gaussian::{largest_sigma, plus};
 use super::heading::Heading;
 use super::height::{HEIGHT_MEAN_M, Height};
 use super::kalman::Filter;
-use super::limb_phase::LimbPhase;
 use super::noise::{noise, sway};
 use super::numbers::Numbers;
 use super::origin::Origin;
 use super::outline::{Axis, Outline};
 use super::remembered::{Remembered, Words};
 use super::shape::LearnedShape;
+use super::stride::Stride;
 use super::visibility::{Body, BodyView, Visibility};
 use crate::detect::{Detection, Prior};
 use crate::gait::relative_speed_hz;
@@ -63,17 +63,12 @@ const SHOWN_SHARE: f64 = 0.6;
 const BOX_AVERAGE_S: f64 = 1.0;
 /// The width of a box until one was seen.
 const WIDTH_M: f64 = 0.5;
-/// How far the axis of who pushes or pulls something lies off for as long as he does, one sigma of an axis: now and then its points
-/// count as his. And of who carries something over the head, which hides it. Both beside what the outline leaves.
-const WITH_THING_M: f64 = 0.03;
-const WITH_CANOPY_M: f64 = 0.015;
-
 /// A track with everything behind it, at the time of the last frame.
 #[derive(Debug, Clone)]
 pub(super) struct Person {
     pub(super) id: u64,
     pub(super) filter: Filter,
-    limb_phase: LimbPhase,
+    stride: Stride,
     pub(super) confirmed: bool,
     /// Born so near to somebody that it may be an arm.
     on_trial: bool,
@@ -106,7 +101,7 @@ impl Remembered for Person {
     fn visit(&mut self, words: &mut impl Words) {
         words.word(&mut self.id);
         self.filter.visit(words);
-        self.limb_phase.visit(words);
+        self.stride.visit(words);
         words.bool(&mut self.confirmed);
         words.bool(&mut self.on_trial);
         words.u32(&mut self.matches_with_legs);
@@ -156,7 +151,7 @@ impl Person {
         Self {
             id,
             filter: Filter::new(numbers, position_m, variance_m2),
-            limb_phase: LimbPhase::default(),
+            stride: Stride::default(),
             confirmed: false,
             on_trial: false,
             matches_with_legs: 0,
@@ -180,7 +175,7 @@ impl Person {
 
     /// Moves filter and phase of the gait on.
     pub(super) fn predict(&mut self, numbers: &Numbers, dt_s: f64) {
-        self.limb_phase.predict(self.speed_mps(), self.height.mean_m(), dt_s);
+        self.stride.predict(self.speed_mps(), self.height.mean_m(), dt_s);
         self.filter.predict(numbers, self.height.mean_m(), dt_s);
     }
 
@@ -198,7 +193,7 @@ impl Person {
         time_ns: i64,
         step_s: f64,
     ) {
-        self.filter.correct(self.axis_m(detection), noise(numbers, detection, view));
+        self.filter.correct(detection.position_m, noise(numbers, detection, view));
         let there = self.existence * LIKELIHOOD_RATIO;
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.matches += 1;
@@ -287,12 +282,9 @@ impl Person {
         }
     }
 
-    /// The track at the frame's time, `step_s` after the last frame, of who has a thing or none; the filter stands there. `observed`
-    /// gives its memory.
+    /// The track at the frame's time, `step_s` after the last frame; the filter stands there. `observed` gives its memory.
     pub(super) fn track(
         &mut self,
-        numbers: &Numbers,
-        has_thing: bool,
         time_ns: i64,
         step_s: f64,
         hall: &Hall,
@@ -305,18 +297,12 @@ impl Person {
         observed.clone_from(&self.observed.0);
         let outline_m = self.outline.levels_m();
         let canopy = self.shape.canopy();
-        let with_thing_m = if has_thing { WITH_THING_M } else { 0.0 };
-        let with_canopy_m = if canopy.is_some() { WITH_CANOPY_M } else { 0.0 };
-        let lasting_m2 =
-            numbers.usual.axis_variance_m2(&outline_m) + with_thing_m.powi(2) + with_canopy_m.powi(2);
-        let mut covariance = state.P;
-        (0..2).for_each(|axis| covariance[axis][axis] += lasting_m2);
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
         Track {
             id: self.id,
             position_m,
             velocity_mps,
-            covariance,
+            covariance: state.P,
             heading_rad: self.heading.mean_rad,
             heading_sigma_rad: self.heading.sigma_rad(),
             heading_behind: self.heading.behind,
@@ -327,7 +313,7 @@ impl Person {
             width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m,
             canopy,
-            gait: self.limb_phase.phase(velocity_mps.length()),
+            gait: self.stride.phase(velocity_mps.length()),
             points: self.points,
             confirmed: self.confirmed
                 && !self.origin.is_furniture(time_ns)
@@ -339,16 +325,6 @@ impl Person {
             obb,
             observed,
         }
-    }
-
-    /// Where a detection of this body says that the axis stands.
-    pub(super) fn axis_m(&self, detection: &Detection) -> DVec2 {
-        let velocity_mps = self.filter.velocity_mps();
-        let ahead = match velocity_mps.length() > OUTLINE_FROM_MPS {
-            true => velocity_mps.normalize(),
-            false => DVec2::from_angle(self.heading.mean_rad),
-        };
-        detection.position_m + ahead.rotate(self.outline.offset_m())
     }
 
     /// Learns what a detection says of the body's shape and gait.
@@ -364,8 +340,8 @@ impl Person {
         let state = self.filter.state();
         let speed_mps = state.velocity_mps().length();
         self.origin.see(detection, view, state.position_m(), speed_mps, step_s);
-        if let Some(limbs) = detection.limbs.as_ref().filter(|_| numbers.limb_phase) {
-            self.limb_phase.see(limbs, speed_mps, self.height.mean_m());
+        if let Some(gait) = detection.gait.as_ref().filter(|_| numbers.stride) {
+            self.stride.see(gait);
         }
         if !view.on_step && detection.overhead.is_none() {
             self.height.see(detection.top_m, view.beams_per_m_at_top);
@@ -430,8 +406,6 @@ impl Person {
             let gap_m = visibility.gap_m(reach.sensor, detection.position_m);
             self.outline.see(&numbers.usual, reach, &axis, gap_m, body);
         }
-        let moved_m = self.outline.centre(step_s);
-        self.filter.shift(ahead.rotate(moved_m));
     }
 
     /// As wide as seen on the mean, standing on the floor; the oriented one turned with the heading.

@@ -37,7 +37,7 @@ pub fn detection(x_m: f64, time_ns: i64) -> umbracast::detect::Detection {
         full_body: true,
         top_m: 1.7,
         top_diagonal_m: 0.2,
-        limbs: None,
+        gait: None,
             reaches: Vec::new(),
             bands: Default::default(),
             overhead: None,

@@ -1,14 +1,10 @@
-//! Everything that the program learns from data, fitted anew in order: the body axis, which way bodies face, outlines, stage 3's body, the forecast's
-//! residual. Each fit runs the program with what was fitted before it, so the program is built again in between.
+//! Everything that the program learns from data, fitted anew in order: the pose of a body, outlines, stage 3's body, the forecast's residual. Each fit runs the program with what was fitted before it, so the program is built again in between.
 
 use std::fs;
 use std::path::Path;
 
 use crate::tools::{Result, Scratch, built, data, output, root, target};
 
-/// The outline's lasting spread is that of the tracker with the outline that ships, so its fit is asked again until its
-/// numbers stay, but no oftener than this.
-const OUTLINES_MAX: usize = 3;
 const OUTLINE_HEAD: &str = "# What outlines of usual bodies look like; see outline.md.\n";
 const BODY_HEAD: &str = "# The body that a ray meets, in shares of the standing height; see body.md.\n";
 
@@ -28,13 +24,12 @@ const RECORDED: [&str; 4] = [
 
 /// A fit: what it is called, and what makes its model and card from the commit that the card names, in a folder of its own.
 type Fit = (&'static str, fn(&str, &Path) -> Result<()>);
-const ALL: [Fit; 5] =
-    [("axis", axis), ("facing", facing), ("outline", outline), ("body", body), ("residual", residual)];
+const ALL: [Fit; 4] = [("pose", pose), ("outline", outline), ("body", body), ("residual", residual)];
 
 /// Fits these, or all; needs a clean tree, for the cards name its commit.
 pub fn run(names: &[&str]) -> Result<()> {
     if let Some(name) = names.iter().find(|name| !ALL.iter().any(|(known, _)| known == *name)) {
-        return Err(format!("fit: expected axis, facing, outline, body or residual, found {name:?}"));
+        return Err(format!("fit: expected pose, outline, body or residual, found {name:?}"));
     }
     let changed = output(&root(), "git", &["status", "--porcelain", "--untracked-files=no"])?;
     if !changed.is_empty() {
@@ -50,32 +45,14 @@ pub fn run(names: &[&str]) -> Result<()> {
     Ok(())
 }
 
-fn axis(commit: &str, folder: &Path) -> Result<()> {
-    of_a_body("axis", "body_axis", commit, folder)
-}
-
-fn facing(commit: &str, folder: &Path) -> Result<()> {
-    of_a_body("facing", "facing", commit, folder)
-}
-
-fn of_a_body(what: &str, name: &str, commit: &str, folder: &Path) -> Result<()> {
-    umbracast(&["train", what, "--commit", commit, "--out", text(folder)?])?;
-    ["safetensors", "md"].iter().try_for_each(|ending| {
-        let name = format!("{name}.{ending}");
-        take(&folder.join(&name), &name)
-    })
+fn pose(commit: &str, folder: &Path) -> Result<()> {
+    umbracast(&["train", "pose", "--commit", commit, "--out", text(folder)?])?;
+    ["pose.safetensors", "pose.md"].iter().try_for_each(|name| take(&folder.join(name), name))
 }
 
 fn outline(commit: &str, _: &Path) -> Result<()> {
-    let mut before = String::new();
-    for _ in 0..OUTLINES_MAX {
-        let fitted = umbracast(&["train", "outline", "--scenes", "32", "--quiet"])?;
-        write("outline.toml", &format!("{OUTLINE_HEAD}{fitted}\n"))?;
-        if fitted == before {
-            break;
-        }
-        before = fitted;
-    }
+    let fitted = umbracast(&["train", "outline", "--scenes", "32", "--quiet"])?;
+    write("outline.toml", &format!("{OUTLINE_HEAD}{fitted}\n"))?;
     name_commit("outline.md", commit)
 }
 

@@ -195,8 +195,7 @@ fn a_run_json_that_lists_every_frame_is_still_read() {
 #[test]
 fn the_networks_that_ship_are_known() {
     for (file, kind) in [
-        ("body_axis.safetensors", "looks at one body"),
-        ("facing.safetensors", "looks at one body"),
+        ("pose.safetensors", "pose of a body"),
         ("residual.safetensors", "residual network"),
         ("paper_lstm.safetensors", "LSTM"),
     ] {

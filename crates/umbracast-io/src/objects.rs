@@ -158,7 +158,7 @@ fn detection(object: &Object, after_s: f64, time_ns: i64) -> Option<Detection> {
         full_body: true,
         top_m: 2.0 * half_m.z,
         top_diagonal_m: 0.0, // Nobody says: what is listed is somebody.
-        limbs: None,
+        gait: None,
         reaches: Vec::new(),
         bands: Default::default(),
         overhead: None,

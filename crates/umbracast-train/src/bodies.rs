@@ -11,6 +11,17 @@ use umbracast_sim::body::meshes::Meshes;
 const CARRIED: [(Kind, f64); 4] =
     [(Kind::Phone, 0.15), (Kind::Pockets, 0.15), (Kind::Bag, 0.15), (Kind::Rucksack, 0.15)];
 
+/// What goes with others, or how they are and move. What is not in here nothing was fitted to: bags in both hands, a telephone
+/// before the face, a child on the arm, a trolley, a wheelchair that somebody pushes.
+const THINGS: [(Kind, f64); 6] = [
+    (Kind::Child, 0.15),
+    (Kind::Wheelchair, 0.15),
+    (Kind::Pram, 0.15),
+    (Kind::Frame, 0.15),
+    (Kind::Umbrella, 0.15),
+    (Kind::Gesturing, 0.15),
+];
+
 /// How many [`bodies`] there are.
 pub(crate) const TURNS: u64 = 4;
 
@@ -19,7 +30,21 @@ pub(crate) const TURNS: u64 = 4;
 /// # Errors
 /// None, as long as the family that ships can be read.
 pub(crate) fn bodies(turn: u64) -> Result<Bodies, Error> {
-    let shares = if turn % TURNS < 2 { vec![] } else { CARRIED.to_vec() };
+    ours_or_family_a(turn, if turn % TURNS < 2 { vec![] } else { CARRIED.to_vec() })
+}
+
+/// The same, then our own with [`THINGS`] among them, and the same of family `a`.
+///
+/// # Errors
+/// See [`bodies`].
+pub(crate) fn with_things(turn: u64) -> Result<Bodies, Error> {
+    match turn % (TURNS + 2) {
+        turn if turn < TURNS => bodies(turn),
+        turn => ours_or_family_a(turn, THINGS.to_vec()),
+    }
+}
+
+fn ours_or_family_a(turn: u64, shares: Vec<(Kind, f64)>) -> Result<Bodies, Error> {
     let bodies = Bodies::new(shares, None)?;
     if turn.is_multiple_of(2) { Ok(bodies) } else { of_family_a(bodies) }
 }

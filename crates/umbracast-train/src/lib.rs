@@ -1,6 +1,6 @@
 //! Fits what the program learns from data. Each fit gives a file, or lines for a file, and a card with their origin.
 //!
-//! Small networks have their gradients written out here: the body axis and which way a body faces (stage 1), the default forecast's residual
+//! Small networks have their gradients written out here: the pose of a body (stage 1), the default forecast's residual
 //! (stage 2). The predictor's body and the thresholds (stage 3) are found by search. The paper's LSTM needs a
 //! framework and is fitted in `train/`, a workspace of its own. Its training data and its scores need no framework
 //! and are here, so that every test run scores the weights that ship.
@@ -11,8 +11,7 @@ mod layer;
 mod bodies;
 mod point_network;
 mod sightings;
-pub mod axis;
-pub mod facing;
+pub mod pose;
 pub mod samples;
 pub mod residual;
 pub mod departures;

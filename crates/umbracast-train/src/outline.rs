@@ -5,15 +5,13 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
-use umbracast::config::{Config, Mechanism};
+use umbracast::config::Config;
 use umbracast::detect::LEVELS;
 use umbracast::gait::relative_speed_hz;
 use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Track;
-use umbracast::track::outline::{
-    Axis, LevelOutline, UsualLevel, UsualOutline, measured, shares, terms, unlike_m2,
-};
+use umbracast::track::outline::{Axis, LevelOutline, UsualLevel, UsualOutline, measured, shares, terms};
 use umbracast::track::visibility::{Body, Visibility};
 use umbracast::{Error, Health, Pipeline};
 use umbracast_eval::run::chain::{empty_frames, push};
@@ -59,22 +57,8 @@ struct Seen {
     reach_m: f64,
 }
 
-/// An error of a track's position in one frame.
-#[derive(Debug, Clone, Copy)]
-struct AxisError {
-    /// See [`unlike_m2`].
-    unlike_m2: f64,
-    /// Its square along one direction, less the variance that the filter claims.
-    beyond_m2: f64,
-}
-
 /// What was seen of one body.
-#[derive(Debug, Clone, Default)]
-struct Person {
-    seen: Vec<Seen>,
-    /// Where the tracker knows outlines.
-    errors: Vec<AxisError>,
-}
+type Person = Vec<Seen>;
 
 /// Watches so many scenes and returns the file. `scene_done` is called after each scene, from any thread.
 ///
@@ -83,27 +67,17 @@ struct Person {
 pub fn fit_outline(scenes: usize, scene_done: impl Fn(usize, usize) + Sync) -> Result<String, Error> {
     let done = AtomicUsize::new(0);
     let counted = |scene: usize| {
-        // Outlines shall not be those about an axis that they moved.
-        let mut people = watch(scene, true)?;
-        people.extend(watch(scene, false)?);
+        let people = watch(scene)?;
         scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, scenes);
         Ok::<_, Error>((CARRYING[scene % CARRYING.len()].is_none(), people))
     };
     let watched: Result<Vec<(bool, Vec<Person>)>, Error> = (0..scenes).into_par_iter().map(counted).collect();
     let watched = watched?;
-    let usual: Vec<&Seen> = watched
-        .iter()
-        .filter(|(usual, _)| *usual)
-        .flat_map(|(_, people)| people.iter().flat_map(|p| &p.seen))
-        .collect();
+    let usual: Vec<&Seen> =
+        watched.iter().filter(|(usual, _)| *usual).flat_map(|(_, people)| people.iter().flatten()).collect();
     let everybody: Vec<&Person> = watched.iter().flat_map(|(_, people)| people).collect();
     let levels = (0..LEVELS).map(|level| fit_level(level, &usual, &everybody)).collect();
-    // What no frame mends: what errors are larger than the filter of the tracker that ships says, by how unusual it takes the body.
-    let left_over = || watched.iter().flat_map(|(_, people)| people.iter().flat_map(|p| &p.errors));
-    let fit = least_squares(left_over().map(|e| ([1.0, e.unlike_m2], e.beyond_m2)), 0.0);
-    let [axis_sigma_m, axis_sigma_per_m] = fit.map(|m2| m2.max(0.0).sqrt());
-    toml::to_string(&UsualOutline { axis_sigma_m, axis_sigma_per_m, levels })
-        .map_err(|e| Error::new(format!("outline: {e}")))
+    toml::to_string(&UsualOutline { levels }).map_err(|e| Error::new(format!("outline: {e}")))
 }
 
 fn fit_level(level: usize, usual: &[&Seen], everybody: &[&Person]) -> UsualLevel {
@@ -116,7 +90,7 @@ fn fit_level(level: usize, usual: &[&Seen], everybody: &[&Person]) -> UsualLevel
     };
     let (mut people, mut errors): (Vec<LevelOutline>, [Vec<f64>; 2]) = Default::default();
     for person in everybody {
-        let own = || person.seen.iter().filter(|s| s.level == level);
+        let own = || person.iter().filter(|s| s.level == level);
         if own().count() < FRAMES_MIN {
             continue;
         }
@@ -133,13 +107,9 @@ fn fit_level(level: usize, usual: &[&Seen], everybody: &[&Person]) -> UsualLevel
     UsualLevel { near, aside, near_sigma_m, aside_sigma_m, person_sigma_m }
 }
 
-/// Everybody in a scene: without knowledge of outlines what is seen of them, with it how far off the tracker is.
-fn watch(scene: usize, without: bool) -> Result<Vec<Person>, Error> {
-    let (mut config, seed) = (Config::default(), FIRST_SEED + scene as u64);
-    if without {
-        config.track.without.push(Mechanism::Outline);
-    }
-    let usual = UsualOutline::shipped();
+/// Everybody in a scene.
+fn watch(scene: usize) -> Result<Vec<Person>, Error> {
+    let (config, seed) = (Config::default(), FIRST_SEED + scene as u64);
     let preset = [Preset::Orca03, Preset::Mixed][scene / CARRYING.len() % 2];
     let kinds = CARRYING[scene % CARRYING.len()].map(|kind| (kind, 1.0));
     let own = Bodies::new(kinds.into_iter().collect(), None)?;
@@ -171,17 +141,6 @@ fn watch(scene: usize, without: bool) -> Result<Vec<Person>, Error> {
                 });
                 let speed_mps = track.velocity_mps.length();
                 let Some(own) = own else { continue };
-                if !without {
-                    if let Some(state) = walkers[own].state_at(frame.time_ns).filter(|_| track.confirmed) {
-                        let unlike_m2 = unlike_m2(&track.outline_m);
-                        let lasting_m2 = usual.axis_variance_m2(&track.outline_m);
-                        let claimed_m2 = 0.5 * (track.covariance[0][0] + track.covariance[1][1]) - lasting_m2;
-                        let error_m2 = 0.5 * track.position_m.distance_squared(state.position_m);
-                        let errors = &mut seen.entry(own).or_default().errors;
-                        errors.push(AxisError { unlike_m2, beyond_m2: error_m2 - claimed_m2 });
-                    }
-                    continue;
-                }
                 if view.returns < FREE_SHARE * view.returns_alone || speed_mps < 0.5 {
                     continue;
                 }
@@ -199,7 +158,7 @@ fn watch(scene: usize, without: bool) -> Result<Vec<Person>, Error> {
                 for reach in &detection.reaches {
                     let gap_m = visibility.gap_m(reach.sensor, track.position_m);
                     for (i, (cos, sin, reach_m)) in measured(reach, &axis, gap_m).into_iter().enumerate() {
-                        person.seen.push(Seen {
+                        person.push(Seen {
                             level: reach.level,
                             near: i == 0,
                             cos,

@@ -1,5 +1,5 @@
-//! The networks that look at the points of one body, their gradient written out, and their fit: the same equations as
-//! `umbracast::detect::point_network`, which runs them.
+//! The network that looks at the points of one body, its gradient written out, and its fit: the same equations as
+//! `umbracast::detect::point_network`, which runs it.
 
 use std::f64::consts::PI;
 
@@ -8,14 +8,15 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use umbracast::Error;
-use umbracast::detect::axis_view::{AxisView, OF_BODY, OF_POINT, POINTS};
 use umbracast::detect::point_network::{BODY_UNITS, OUTPUTS, POINT_UNITS, POOLED};
+use umbracast::detect::pose_view::{OF_BODY, OF_POINT, POINTS, PoseView};
 
 use crate::adam::Adam;
 use crate::layer::Layer;
+use crate::pose::Truth;
 use crate::weights::to_safetensors;
 
-pub(crate) const EPOCHS: usize = 24;
+pub(crate) const EPOCHS: usize = 20;
 pub(crate) const SEED: u64 = 1;
 const BATCH: usize = 512;
 /// Samples of a batch that a thread takes at once: summed in order, so that threads do not change the sum.
@@ -43,25 +44,16 @@ const LAYERS: [(&str, usize, usize); 6] = [
 
 /// A body as it was seen, and what the network shall say of it.
 #[derive(Debug, Clone)]
-pub(crate) struct Sample<T> {
-    pub(crate) view: AxisView,
-    pub(crate) truth: T,
-}
-
-/// What a network shall say.
-pub(crate) trait Truth: Clone + Sync {
-    /// The negative log-likelihood of the truth but for a constant, and its gradient to the outputs.
-    fn loss(&self, outputs: &[f64; OUTPUTS]) -> (f64, [f64; OUTPUTS]);
-
-    /// Of a body that is so many times as large.
-    fn scaled(&self, share: f64) -> Self;
+pub(crate) struct Sample {
+    pub(crate) view: PoseView,
+    pub(crate) truth: Truth,
 }
 
 /// Fits a network with Adam on the negative log-likelihood; returns the weights file.
 ///
 /// # Errors
 /// Fewer samples than a batch.
-pub(crate) fn fit<T: Truth>(samples: &[Sample<T>]) -> Result<Vec<u8>, Error> {
+pub(crate) fn fit(samples: &[Sample]) -> Result<Vec<u8>, Error> {
     let batches = samples.len() / BATCH;
     if batches == 0 {
         return Err(Error::new(format!("training: expected {BATCH} samples, found {}", samples.len())));
@@ -73,7 +65,7 @@ pub(crate) fn fit<T: Truth>(samples: &[Sample<T>]) -> Result<Vec<u8>, Error> {
     for _ in 0..EPOCHS {
         order.shuffle(&mut rng);
         for batch in order.chunks_exact(BATCH) {
-            let batch: Vec<Sample<T>> = batch.iter().map(|&i| resized(&samples[i], &mut rng)).collect();
+            let batch: Vec<Sample> = batch.iter().map(|&i| resized(&samples[i], &mut rng)).collect();
             let gradient = network.gradient(&batch);
             let done = f64::from(adam.updates()) / (EPOCHS * batches) as f64;
             let rate = match done < RISES {
@@ -87,7 +79,7 @@ pub(crate) fn fit<T: Truth>(samples: &[Sample<T>]) -> Result<Vec<u8>, Error> {
     to_safetensors(entries.collect(), None)
 }
 
-fn resized<T: Truth>(sample: &Sample<T>, rng: &mut Pcg64) -> Sample<T> {
+fn resized(sample: &Sample, rng: &mut Pcg64) -> Sample {
     if !rng.random_bool(SCALED) {
         return sample.clone();
     }
@@ -115,7 +107,7 @@ impl Network {
     }
 
     /// Of the mean loss of a batch.
-    fn gradient<T: Truth>(&self, batch: &[Sample<T>]) -> Self {
+    fn gradient(&self, batch: &[Sample]) -> Self {
         let share = 1.0 / batch.len() as f64;
         let parts: Vec<Self> = batch
             .par_chunks(PART)
@@ -137,14 +129,14 @@ impl Network {
 
     umbracast::wide! {
         /// Adds the gradient to the weights of a pass, from that to its outputs.
-        fn add_gradient(&self, view: &AxisView, pass: &Pass, to_outputs: &[f64; OUTPUTS], gradient: &mut Self)
+        fn add_gradient(&self, view: &PoseView, pass: &Pass, to_outputs: &[f64; OUTPUTS], gradient: &mut Self)
             = add_gradient_avx2 or add_gradient_portably
     }
 
     #[inline(always)]
     fn add_gradient_portably(
         &self,
-        view: &AxisView,
+        view: &PoseView,
         pass: &Pass,
         to_outputs: &[f64; OUTPUTS],
         gradient: &mut Self,
@@ -167,11 +159,11 @@ impl Network {
     }
 
     umbracast::wide! {
-        fn pass(&self, view: &AxisView) -> Pass = pass_avx2 or pass_portably
+        fn pass(&self, view: &PoseView) -> Pass = pass_avx2 or pass_portably
     }
 
     #[inline(always)]
-    fn pass_portably(&self, view: &AxisView) -> Pass {
+    fn pass_portably(&self, view: &PoseView) -> Pass {
         let [first, second, third, fourth, fifth, head] = &self.layers;
         let mut pass = Pass {
             first: [[0.0; FIRST]; POINTS],
@@ -230,14 +222,14 @@ fn rectified<const N: usize>(given: &[f64; N], to_given: [f64; N]) -> [f64; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::Offset;
     use rand::RngExt;
     use umbracast::detect::point_network::PointNetwork;
-    use umbracast::detect::{Point, SHIFT_M, axis};
+    use umbracast::detect::pose::{UNIT_M, pose};
+    use umbracast::detect::{Point, SHIFT_M};
     use umbracast::geometry::{DVec2, DVec3};
 
     /// Somebody of some points on a disc of a radius that its height tells, before a sensor: the axis is the disc's middle.
-    fn sample(rng: &mut Pcg64) -> Sample<Offset> {
+    fn sample(rng: &mut Pcg64) -> Sample {
         let sensor_m = DVec3::new(-10.0, 0.0, 5.0);
         let middle_m = DVec2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
         let radius_m = rng.random_range(0.05..0.2);
@@ -248,11 +240,11 @@ mod tests {
                 Point { position_m, time_ns: 0, sensor: 0 }
             })
             .collect();
-        let view = AxisView::new(&mut Vec::new(), points.iter(), &[sensor_m], 0.0, SHIFT_M, None);
-        Sample { truth: Offset::of(&view, middle_m - view.base_m), view }
+        let view = PoseView::new(&mut Vec::new(), points.iter(), &[sensor_m], 0.0, SHIFT_M, None);
+        Sample { truth: Truth::standing_off(&view, middle_m - view.base_m), view }
     }
 
-    fn samples(n: usize) -> Vec<Sample<Offset>> {
+    fn samples(n: usize) -> Vec<Sample> {
         let mut rng = Pcg64::seed_from_u64(2);
         (0..n).map(|_| sample(&mut rng)).collect()
     }
@@ -262,14 +254,13 @@ mod tests {
         let all = samples(8 * BATCH + 100);
         let (training, held_out) = all.split_at(8 * BATCH);
         let model = PointNetwork::from_safetensors(&fit(training).unwrap()).unwrap();
-        let rmse_m = |of: &dyn Fn(&Sample<Offset>) -> DVec2| {
+        let rmse_m = |of: &dyn Fn(&Sample) -> DVec2| {
             let squares: f64 = held_out.iter().map(|s| of(s).length_squared()).sum();
             (squares / held_out.len() as f64).sqrt()
         };
-        let off_m =
-            |s: &Sample<Offset>| (s.view.along * s.truth.0[0] + s.view.across * s.truth.0[1]) * axis::UNIT_M;
+        let off_m = |s: &Sample| (s.view.along * s.truth.off[0] + s.view.across * s.truth.off[1]) * UNIT_M;
         let (before_m, after_m) =
-            (rmse_m(&off_m), rmse_m(&|s| axis::locate(&model, &s.view).0 - s.view.base_m - off_m(s)));
+            (rmse_m(&off_m), rmse_m(&|s| pose(&model, &s.view).position_m - s.view.base_m - off_m(s)));
         assert!(after_m < 0.5 * before_m, "{after_m} m, {before_m} m before");
     }
 

@@ -1,5 +1,4 @@
-//! Bodies as sensors see them in one frame, with where they truly stand and face: what the networks that look at one body are
-//! fitted on.
+//! Bodies as sensors see them in one frame, with their true poses: what the network that looks at one body is fitted on.
 //!
 //! Training scenes have the seeds 50,000 and on, and the scenes for the errors on the cards 130,000 and on. Layouts of one, two
 //! and three sensors; people on ORCA's ways, mixed crowds, pairs, and some of them speed-augmented.
@@ -9,9 +8,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use umbracast::config::Config;
-use umbracast::detect::axis_view::{AxisView, OF_BODY, OF_POINT, POINTS};
-use umbracast::detect::point_network::{BODY_UNITS, OUTPUTS, POINT_UNITS};
+use umbracast::detect::pose_view::PoseView;
 use umbracast::detect::{Background, Clusterer, Measurer, Prior};
+use umbracast::gait::WALKS_FROM_MPS;
 use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Tracker;
@@ -21,8 +20,7 @@ use umbracast_sim::body::{Bodies, PersonState};
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs, speed_augmented};
 use umbracast_sim::scene::Scene;
 
-use crate::bodies::bodies;
-use crate::point_network::{EPOCHS, SEED};
+use crate::bodies::with_things;
 
 /// Height of the sensors, their distance from the middle, the directions in which they stand from there, in degrees, and the
 /// scenes' seeds.
@@ -38,22 +36,29 @@ const LAYOUTS: [Layout; 7] = [
     (7.0, 13.0, &[0.0], 56_000..56_024),
 ];
 /// Scenes that are not trained on.
-const HELD_OUT: Layout = (9.0, 16.0, OPPOSITE, 130_000..130_006);
+const HELD_OUT: Layout = (9.0, 16.0, OPPOSITE, 130_000..130_036);
 /// Sensors look this much below the middle of the hall, so that their beams cover both ends.
 const BELOW_MIDDLE_DEG: f64 = 6.0;
 /// A cluster found nearer than this to a person is that person.
-const OWN_M: f64 = 0.3;
+const OWN_M: f64 = 0.5;
 /// Every so many clusters are fitted as if nothing were known of the person.
 const UNKNOWN_EVERY: usize = 6;
-const PEOPLE: usize = 12;
+/// Frames between are much alike.
+const EVERY: usize = 2;
+/// People in a scene. Of many, others hide parts.
+const FEW: usize = 12;
+const MANY: usize = 24;
 
 /// A body in one frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Seen {
-    pub(crate) view: AxisView,
+    pub(crate) view: PoseView,
     /// From the view's base to the true axis.
     pub(crate) off_m: DVec2,
-    pub(crate) heading_rad: f64,
+    /// Of who is known to stand.
+    pub(crate) heading_rad: Option<f64>,
+    /// Of the stride of who is known to walk.
+    pub(crate) phase_rad: Option<f64>,
 }
 
 /// Bodies to learn from, and others of scenes of their own. `scene_done` is called with scenes done and scenes in all, from any
@@ -65,13 +70,17 @@ pub(crate) fn watch_all(scene_done: impl Fn(usize, usize) + Sync) -> Result<[Vec
     let scenes = |(_, _, _, seeds): &Layout| (seeds.end - seeds.start) as usize;
     let (done, all) = (AtomicUsize::new(0), LAYOUTS.iter().chain([&HELD_OUT]).map(scenes).sum());
     let told = || scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, all);
-    let of_layouts: Result<Vec<Vec<Seen>>, Error> =
-        LAYOUTS.iter().map(|layout| seen_in(layout, told)).collect();
-    Ok([of_layouts?.concat(), seen_in(&HELD_OUT, told)?])
+    let mut training = Vec::new();
+    let mut before = 0;
+    for layout in &LAYOUTS {
+        training.extend(seen_in(layout, before, told)?);
+        before += scenes(layout) as u64;
+    }
+    Ok([training, seen_in(&HELD_OUT, 0, told)?])
 }
 
-/// A card's head: `what` the network computes, `command` and `commit` that made it, and on how many bodies it was fitted.
-pub(crate) fn card_head(title: &str, what: &str, command: &str, commit: &str, bodies: usize) -> String {
+/// For a card: which scenes the bodies are of.
+pub(crate) fn scenes_listed() -> String {
     let layouts: String = LAYOUTS
         .iter()
         .map(|(height_m, away_m, directions_deg, seeds)| {
@@ -83,19 +92,11 @@ pub(crate) fn card_head(title: &str, what: &str, command: &str, commit: &str, bo
             )
         })
         .collect();
-    let commit = if commit.is_empty() { "unknown" } else { commit };
     format!(
-        "# {title}\n\n\
-         From what the sensors saw of one body in one frame to {what}: up to {POINTS} points of {OF_POINT} numbers, each through \
-         {POINT_UNITS:?} units, then with {OF_BODY} numbers of the whole body through {BODY_UNITS:?} units, {OUTPUTS} outputs \
-         (`src/detect/point_network.rs`).\n\n\
-         Written by `umbracast train {command}`, commit {commit}.\n\n\
-         ## Data\n\nSimulated returns of {PEOPLE} people a scene, in turn: orca-03, mixed speed-augmented, orca-06, \
-         pairs 0.6 m apart, mixed, orca-03 speed-augmented. Six scenes have bodies of our own, the next six those of the \
-         third-party family `a`; then the same with telephones, bags, rucksacks and hands in pockets among them. No two \
-         people walk alike.\n\n\
-         {layouts}\n{bodies} bodies; {EPOCHS} epochs, Adam, negative log-likelihood, every fifth body made smaller or larger, \
-         seed {SEED}.\n\n"
+        "Simulated returns of every other frame of scenes, in turn {FEW} people of orca-03, mixed speed-augmented and orca-06, {MANY} \
+         in pairs 0.6 m apart, of mixed, of orca-03 speed-augmented. Six scenes have bodies of our own, the next six those of the third-party family \
+         `a`; then the same with telephones, bags, rucksacks and hands in pockets among them; then with children, \
+         wheelchairs, prams, walking frames, umbrellas and people who gesture. No two people walk alike.\n\n{layouts}"
     )
 }
 
@@ -104,8 +105,8 @@ pub(crate) fn held_out_name() -> String {
     format!("{} scenes of their own from seed {}", HELD_OUT.3.end - HELD_OUT.3.start, HELD_OUT.3.start)
 }
 
-/// Of every scene of a layout.
-fn seen_in(layout: &Layout, scene_done: impl Fn() + Sync) -> Result<Vec<Seen>, Error> {
+/// Of every scene of a layout, of which so many come before.
+fn seen_in(layout: &Layout, before: u64, scene_done: impl Fn() + Sync) -> Result<Vec<Seen>, Error> {
     let (height_m, away_m, directions_deg, seeds) = layout.clone();
     let mut config = Config::default();
     let one = config.site.sensors[0].clone();
@@ -123,7 +124,8 @@ fn seen_in(layout: &Layout, scene_done: impl Fn() + Sync) -> Result<Vec<Seen>, E
         .collect();
     let first = seeds.start;
     let of_scenes = seeds.into_par_iter().map(|seed| {
-        let samples = watch(crowd_of(seed - first, seed), bodies((seed - first) / CROWDS)?, seed, &config);
+        let scene = before + seed - first;
+        let samples = watch(crowd_of(scene, seed), with_things(scene / CROWDS)?, seed, &config);
         scene_done();
         samples
     });
@@ -135,18 +137,18 @@ const CROWDS: u64 = 6;
 
 /// Who walks in the scene of that number.
 fn crowd_of(scene: u64, seed: u64) -> Crowd {
-    let drawn = |preset| circle_crossing(preset, PEOPLE, 12.5, seed);
+    let drawn = |preset, people| circle_crossing(preset, people, 12.5, seed);
     match scene % CROWDS {
-        0 => drawn(Preset::Orca03),
-        1 => speed_augmented(&drawn(Preset::Mixed), seed),
-        2 => drawn(Preset::Orca06),
-        3 => pairs(PEOPLE / 2, 0.6, 12.5, seed),
-        4 => drawn(Preset::Mixed),
-        _ => speed_augmented(&drawn(Preset::Orca03), seed),
+        0 => drawn(Preset::Orca03, FEW),
+        1 => speed_augmented(&drawn(Preset::Mixed, FEW), seed),
+        2 => drawn(Preset::Orca06, FEW),
+        3 => pairs(MANY / 2, 0.6, 12.5, seed),
+        4 => drawn(Preset::Mixed, MANY),
+        _ => speed_augmented(&drawn(Preset::Orca03, MANY), seed),
     }
 }
 
-/// Every cluster of a scene that is a person's.
+/// Every cluster that is a person's, in every other frame of a scene.
 fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec<Seen>, Error> {
     let mut samples: Vec<Seen> = Vec::new();
     let mut health = Health::default();
@@ -160,6 +162,7 @@ fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec
     let mut assembler = Assembler::new(&config.site)?;
     let (mut priors, mut points, mut clusters, mut detections, mut tracks) =
         (vec![], vec![], vec![], vec![], vec![]);
+    let mut frames = 0_usize;
     while let Some(now) = scene.next_frame() {
         push(&mut assembler, &now.packets, &mut health);
         while let Some(frame) = assembler.pop() {
@@ -168,10 +171,11 @@ fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec
             clusterer.clusters(&points, &priors, &mut clusters);
             measurer.detections(&points, &clusters, &priors, &mut detections);
             tracker.update(&Views::of(&frame), &detections, &mut tracks);
-            for cluster in &clusters {
+            frames += 1;
+            for cluster in clusters.iter().filter(|_| frames.is_multiple_of(EVERY)) {
                 let known = !samples.len().is_multiple_of(UNKNOWN_EVERY);
                 let priors: &[Prior] = if known { &priors } else { &[] };
-                let view = measurer.axis_view(&points, cluster, priors);
+                let view = measurer.pose_view(&points, cluster, priors);
                 let late: i64 = cluster.iter().map(|&i| points[i as usize].time_ns - frame.time_ns).sum();
                 let time_ns = frame.time_ns + late / cluster.len() as i64;
                 let off_m = |state: &PersonState| state.position_m - view.base_m;
@@ -180,7 +184,13 @@ fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec
                     .filter_map(|walker| walker.state_at(time_ns))
                     .min_by(|a, b| off_m(a).length_squared().total_cmp(&off_m(b).length_squared()))
                     .filter(|state| off_m(state).length() < OWN_M);
-                let seen = |own: &PersonState| Seen { view, off_m: off_m(own), heading_rad: own.heading_rad };
+                let walks = |own: &PersonState| own.velocity_mps.length() > WALKS_FROM_MPS;
+                let seen = |own: &PersonState| Seen {
+                    view,
+                    off_m: off_m(own),
+                    heading_rad: (known && view.stands() && !walks(own)).then_some(own.heading_rad),
+                    phase_rad: (!view.stands() && walks(own)).then_some(own.phase_rad),
+                };
                 samples.extend(own.as_ref().map(seen));
             }
         }

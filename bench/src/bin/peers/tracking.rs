@@ -80,7 +80,7 @@ fn detection(at_m: DVec2, time_ns: i64) -> Detection {
         full_body: true,
         top_m: 1.75,
         top_diagonal_m: 0.2,
-        limbs: None,
+        gait: None,
         reaches: Vec::new(),
         bands: Default::default(),
         overhead: None,

@@ -388,10 +388,8 @@ pub struct Config {
 /// What `train` fits.
 #[derive(Debug, Subcommand)]
 pub enum Train {
-    /// Fit the model of the body axis on simulated returns; takes some minutes.
-    Axis(TrainAxis),
-    /// Fit the model of which way somebody faces who stands, on the same returns; takes some minutes.
-    Facing(TrainAxis),
+    /// Fit the network that reads the pose of a body, on simulated returns; takes some minutes.
+    Pose(TrainPose),
     /// Fit the default forecast's residual network on tracks of simulated and replayed people.
     Residual(TrainResidual),
     /// Fit what outlines of usual bodies look like, on tuning scenes; prints `models/outline.toml`.
@@ -415,9 +413,9 @@ pub struct Fitted {
     pub out: PathBuf,
 }
 
-/// `train axis` and `train facing`
+/// `train pose`
 #[derive(Debug, Args)]
-pub struct TrainAxis {
+pub struct TrainPose {
     #[command(flatten)]
     pub fitted: Fitted,
 }

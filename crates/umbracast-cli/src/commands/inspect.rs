@@ -97,12 +97,10 @@ fn look(file: &Path) -> Result<Findings, Error> {
             let kind = match (lstm, residual, PointNetwork::from_safetensors(&bytes)) {
                 (Ok(_), ..) => "weights of the paper's LSTM",
                 (_, Ok(_), _) => "weights of the default forecast's residual network",
-                (.., Ok(_)) => {
-                    "weights of a network that looks at one body: where its axis is, or which way it faces"
-                }
-                (Err(no_lstm), Err(no_residual), Err(no_axis)) => {
+                (.., Ok(_)) => "weights of the network that reads the pose of a body",
+                (Err(no_lstm), Err(no_residual), Err(no_pose)) => {
                     let story = format!(
-                        "neither the LSTM ({no_lstm}) nor the residual ({no_residual}) nor a network that looks at one body ({no_axis})"
+                        "neither the LSTM ({no_lstm}) nor the residual ({no_residual}) nor the network of the pose ({no_pose})"
                     );
                     return Err(Error::new(story).within(file.display()));
                 }

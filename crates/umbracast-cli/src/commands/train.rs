@@ -4,15 +4,14 @@ use std::path::PathBuf;
 
 use indicatif::ProgressBar;
 use umbracast::{Config, Error};
-use umbracast_train::axis::train_axis;
 use umbracast_train::body::fit_body;
 use umbracast_train::departures::{ResidualOptions, train_residual};
-use umbracast_train::facing::train_facing;
 use umbracast_train::outline::fit_outline;
+use umbracast_train::pose::train_pose;
 use umbracast_train::residual::FitOptions;
 use umbracast_train::thresholds::tune_thresholds;
 
-use crate::args::{Common, Fitted, Train, TrainAxis, TrainBody, TrainLstm, TrainResidual, TrainScenes};
+use crate::args::{Common, Fitted, Train, TrainBody, TrainLstm, TrainPose, TrainResidual, TrainScenes};
 use crate::ending::Ending;
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
@@ -21,12 +20,7 @@ use crate::{crowds, say, setup};
 /// Writes a fitted file and its card, or prints lines for the configuration.
 pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {
     setup::with_threads(common.threads, || match args {
-        Train::Axis(args) => {
-            with_card(&args.fitted, common, "axis", || of_a_body(args, common, "body_axis", train_axis))
-        }
-        Train::Facing(args) => {
-            with_card(&args.fitted, common, "facing", || of_a_body(args, common, "facing", train_facing))
-        }
+        Train::Pose(args) => with_card(&args.fitted, common, "pose", || pose(args, common)),
         Train::Residual(args) => with_card(&args.fitted, common, "residual", || residual(args, common)),
         Train::Body(args) => body(args, common),
         Train::Outline(args) => {
@@ -56,18 +50,12 @@ fn with_card(
     Ok(())
 }
 
-/// A network that looks at one body.
-fn of_a_body(
-    args: &TrainAxis,
-    common: &Common,
-    name: &str,
-    fit: impl FnOnce(&str, &(dyn Fn(usize, usize) + Sync)) -> Result<(Vec<u8>, String), Error>,
-) -> Result<String, Error> {
+fn pose(args: &TrainPose, common: &Common) -> Result<String, Error> {
     let progress = bar(0, "scenes seen", common.quiet);
-    let (model, card) = fit(args.fitted.commit.as_deref().unwrap_or_default(), &advance(&progress))?;
+    let (weights, card) = train_pose(args.fitted.commit.as_deref().unwrap_or_default(), &advance(&progress))?;
     progress.finish_and_clear();
-    setup::write(&args.fitted.out.join(format!("{name}.safetensors")), model)?;
-    setup::write(&args.fitted.out.join(format!("{name}.md")), &card)?;
+    setup::write(&args.fitted.out.join("pose.safetensors"), weights)?;
+    setup::write(&args.fitted.out.join("pose.md"), &card)?;
     Ok(card)
 }
 

@@ -47,7 +47,7 @@ fn configuration(bytes: &[u8]) -> bool {
 
 fn networks() -> Vec<Vec<u8>> {
     let residual = include_bytes!("../../../../models/residual.safetensors").to_vec();
-    vec![small_lstm(), residual, include_bytes!("../../../../models/body_axis.safetensors").to_vec()]
+    vec![small_lstm(), residual, include_bytes!("../../../../models/pose.safetensors").to_vec()]
 }
 
 /// The paper's network with few units.
@@ -88,8 +88,8 @@ fn network(bytes: &[u8]) -> bool {
         assert_eq!(steps.len(), 1);
     }
     let residual = Residual::from_safetensors(bytes).is_ok();
-    let axis = PointNetwork::from_safetensors(bytes).is_ok();
-    weights.is_ok() || residual || axis
+    let pose = PointNetwork::from_safetensors(bytes).is_ok();
+    weights.is_ok() || residual || pose
 }
 
 fn calibrations() -> Vec<Vec<u8>> {

@@ -40,6 +40,8 @@ pub struct PersonState {
     pub floor_m: f64,
     /// Standing height with shoes; of who sits, the height of the head's top.
     pub height_m: f64,
+    /// Of the stride, since the right heel touched the floor, a stride a full turn; held while standing.
+    pub phase_rad: f64,
 }
 
 /// A body drawn at random, walking along a trajectory: pose and mesh at any time.
@@ -162,9 +164,11 @@ impl Walker {
     /// The person's state, or `None` while not in the scene.
     pub fn state_at(&self, time_ns: i64) -> Option<PersonState> {
         let (position_m, velocity_mps) = self.trajectory.at(time_ns)?;
-        let heading_rad = (self.walk.at(time_ns).heading_rad + PI).rem_euclid(TAU) - PI;
+        let Instant { heading_rad, phase, .. } = self.walk.at(time_ns);
+        let heading_rad = (heading_rad + PI).rem_euclid(TAU) - PI;
         let floor_m = self.hall.as_ref().map_or(0.0, |hall| underfoot(hall, position_m, heading_rad).0);
-        Some(PersonState { position_m, velocity_mps, heading_rad, floor_m, height_m: self.height_m(time_ns) })
+        let (height_m, phase_rad) = (self.height_m(time_ns), TAU * phase);
+        Some(PersonState { position_m, velocity_mps, heading_rad, floor_m, height_m, phase_rad })
     }
 
     fn height_m(&self, time_ns: i64) -> f64 {

@@ -1,27 +1,29 @@
-//! What the sensors saw of one body, as the networks read it that find its axis and which way it faces.
+//! What the sensors saw of one body, as the network reads it that finds its pose.
 //!
 //! Sensors see the near side of a body, and legs and arms swing. Every point therefore first moves away from its own
 //! sensor by a constant, and along the person's path to the mean time of all points. [`super::point_network`] does the rest,
 //! from how the points lie in a frame along the line of sight.
 
+use std::f64::consts::PI;
+
 use super::Point;
 use crate::gait::WALKS_FROM_MPS;
 use crate::geometry::{DVec2, DVec3};
 
-/// The model looks at no more points than this.
+/// The network looks at no more points than this.
 pub const POINTS: usize = 32;
 /// Numbers of a point.
 pub const OF_POINT: usize = 5;
 /// Numbers of the whole body.
 pub const OF_BODY: usize = 7;
 
-/// Where [`AxisView::of_body`] has the height and the speed.
+/// Where [`PoseView::of_body`] has the height and the speed.
 const TOP: usize = 3;
 const SPEED: usize = 5;
 
-/// A person's points as the networks see them.
+/// A person's points as the network sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AxisView {
+pub struct PoseView {
     /// Mean of the points, each moved away from its sensor.
     pub base_m: DVec2,
     /// Unit vectors along the mean line of sight of the sensor that saw more, and across it: to the side to which the person
@@ -48,7 +50,7 @@ pub struct Seen {
     sensor: u16,
 }
 
-impl AxisView {
+impl PoseView {
     /// Looks at a person's points, who stands on a floor at `floor_m`. `velocity_mps` is the person's, where it is known;
     /// `seen` is memory.
     pub fn new<'a>(
@@ -108,6 +110,11 @@ impl AxisView {
     /// Whether its person is not known to walk.
     pub fn stands(&self) -> bool {
         f64::from(self.of_body[SPEED]) <= WALKS_FROM_MPS
+    }
+
+    /// What the mirror adds to the phase of a stride: half a turn, for left and right have changed sides.
+    pub fn phase_of_mirror_rad(&self) -> f64 {
+        if self.across.dot(self.along.perp()) < 0.0 { PI } else { 0.0 }
     }
 
     /// Somebody of the same shape who is so many times as large.
@@ -177,7 +184,7 @@ pub fn away(sensors_m: &[DVec3], point: &Point) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::{axis, facing};
+    use crate::detect::pose::{self, Pose};
 
     const SENSOR_M: DVec3 = DVec3::new(-10.0, 0.0, 8.0);
     const PERSON: [(f64, f64, f64); 5] =
@@ -188,28 +195,23 @@ mod tests {
         corners.iter().map(point).collect()
     }
 
-    fn position_m(points: &[Point], velocity_mps: DVec2) -> DVec2 {
-        let view = AxisView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
-        axis::locate(&axis::shipped(), &view).0
+    fn pose_of(points: &[Point], velocity_mps: DVec2) -> Pose {
+        let view = PoseView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
+        pose::pose(&pose::shipped(), &view)
     }
 
     #[test]
-    fn a_mirrored_person_stands_at_the_mirrored_place() {
-        let mirrored = PERSON.map(|(x, y, z)| (x, -y, z));
-        let a = position_m(&points(&PERSON), DVec2::from_angle(0.4));
-        let b = position_m(&points(&mirrored), DVec2::from_angle(-0.4));
-        assert!(a.y.abs() > 0.01, "{a}");
-        assert!((a.x - b.x).abs() < 1e-12 && (a.y + b.y).abs() < 1e-12, "{a} {b}");
-    }
-
-    #[test]
-    fn who_stands_in_a_mirror_faces_as_mirrored() {
-        let heading_rad = |points: &[Point]| {
-            let view = AxisView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, None);
-            facing::face(&facing::shipped(), &view).heading_rad
-        };
+    fn somebody_mirrored_has_a_mirrored_pose() {
+        let mirrored = points(&PERSON.map(|(x, y, z)| (x, -y, z)));
         let (a, b) =
-            (heading_rad(&points(&PERSON)), heading_rad(&points(&PERSON.map(|(x, y, z)| (x, -y, z)))));
+            (pose_of(&points(&PERSON), DVec2::from_angle(0.4)), pose_of(&mirrored, DVec2::from_angle(-0.4)));
+        assert!(a.position_m.y.abs() > 0.01, "{a:?}");
+        assert!(a.position_m.distance(b.position_m * DVec2::new(1.0, -1.0)) < 1e-12, "{a:?} {b:?}");
+        let [a_rad, b_rad] = [a, b].map(|pose| pose.gait.unwrap().phase_rad);
+        assert!(((a_rad - b_rad).abs() - PI).abs() < 1e-12, "the other foot: {a_rad} {b_rad}");
+
+        let [a, b] = [points(&PERSON), mirrored]
+            .map(|points| pose_of(&points, DVec2::ZERO).facing.unwrap().heading_rad);
         assert!((a + b).abs() < 1e-12 && a.abs() > 0.01, "{a} {b}");
     }
 
@@ -228,7 +230,7 @@ mod tests {
             })
             .collect();
         let seen_m = near.iter().map(|p| p.0).sum::<f64>() / near.len() as f64;
-        let found = position_m(&points(&near), DVec2::X);
+        let found = pose_of(&points(&near), DVec2::X).position_m;
         // A body without legs is none that the model learned from: the side is right, the place only nearly.
         assert!(seen_m < -0.06 && found.x > seen_m + 0.01 && found.length() < 0.07, "{seen_m}, {found}");
     }
@@ -249,7 +251,8 @@ mod tests {
                 }
             })
             .collect();
-        let off_m = position_m(&at_once, velocity_mps).distance(position_m(&spread, velocity_mps));
+        let [a, b] = [at_once, spread].map(|points| pose_of(&points, velocity_mps).position_m);
+        let off_m = a.distance(b);
         assert!(off_m < 1e-9, "{off_m}");
     }
 }
