@@ -33,7 +33,7 @@ const ONE_MODEL: MotionModel = MotionModel { acceleration_psd_m2ps3: 0.1, share:
 pub struct Numbers {
     /// Weighed by how well each foresees the detections.
     pub motion_models: Vec<MotionModel>,
-    /// One standard deviation of the sway to the left and ahead that the model of the body axis leaves in a detection,
+    /// One standard deviation of the sway to the left and ahead that the network of the pose leaves in a detection,
     /// measured on tuning scenes.
     pub sway_m: [f64; 2],
     /// Measurement noise that nothing mends, one axis.
@@ -102,7 +102,7 @@ impl Numbers {
         }
         if without(Mechanism::AxisNetwork) {
             // A detection claims no covariance then: what a constant shift leaves of the error of one frame
-            // (models/body_axis.md).
+            // (models/pose.md).
             numbers.noise_floor_m = 0.04;
         }
         numbers
