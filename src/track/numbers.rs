@@ -79,7 +79,7 @@ impl Numbers {
         let mut numbers = Self {
             motion_models,
             sway_m: [0.012; 2],
-            noise_floor_m: 0.005,
+            noise_floor_m: 0.01,
             noise_share: 0.7,
             visibility: !without(Mechanism::Visibility),
             stride: !without(Mechanism::LimbPhase),
