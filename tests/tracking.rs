@@ -414,15 +414,13 @@ fn the_order_of_detections_does_not_matter() {
 fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
     // One model and a walker who keeps to it: nothing but the filter's own account is tested.
     let model = MotionModel { acceleration_psd_m2ps3: 1e-6, share: 1.0, standing_mps: None };
-    let mut numbers = Numbers {
+    let numbers = Numbers {
         noise_floor_m: 0.05,
         noise_share: 0.0,
         sway_m: [0.0; 2],
         motion_models: vec![model],
         ..Numbers::new(&Config::default().track)
     };
-    // Nor does anything last here.
-    numbers.usual.axis_sigma_m = 0.0;
     let walkers = [(DVec2::new(-6.0, 2.0), DVec2::new(1.2, -0.3))];
     let (mut sum, mut n) = (0.0, 0);
     for seed in 0..200 {

@@ -146,6 +146,11 @@ pub fn strangers(book: &mut Book) -> Result<()> {
     book.score_in(EVERY_MODE, "b", crowd.into_iter().chain(["--meshes", "b"]))?;
     let third = ["--meshes", "b", "--bodies", "phone=0.17,pockets=0.17"];
     book.score_in(EVERY_MODE, "b-phones", crowd.into_iter().chain(third))?;
+    // What the network of the pose learned of, on bodies that it did not, and what nothing was fitted to on either.
+    let learned = ["--meshes", "b", "--bodies", "wheelchair=0.2,pram=0.2,frame=0.2,umbrella=0.2"];
+    book.score_in(EVERY_MODE, "b-things", crowd.into_iter().chain(learned))?;
+    let untaught = ["--meshes", "b", "--bodies", "bags=0.2,screen=0.2,carrying=0.2,trolley=0.2,pushed=0.2"];
+    book.score_in(EVERY_MODE, "b-untaught", crowd.into_iter().chain(untaught))?;
     for kind in ["bag", "phone", "child", "rucksack", "umbrella", "pram", "frame", "wheelchair"] {
         book.score_in(EVERY_MODE, kind, crowd.into_iter().chain(["--bodies", kind]))?;
     }
