@@ -47,6 +47,11 @@ pub fn plus(a: Mat2, b: Mat2) -> Mat2 {
     [[a[0][0] + b[0][0], a[0][1] + b[0][1]], [a[1][0] + b[1][0], a[1][1] + b[1][1]]]
 }
 
+/// A matrix times a number.
+pub fn scaled(a: Mat2, by: f64) -> Mat2 {
+    a.map(|row| row.map(|entry| by * entry))
+}
+
 /// The same variance along each axis.
 pub fn round(variance: f64) -> Mat2 {
     [[variance, 0.0], [0.0, variance]]

@@ -340,7 +340,7 @@ impl MixtureTracker {
         tracks.truncate(self.people.len());
         for (i, person) in self.people.iter_mut().enumerate() {
             let observed = tracks.get_mut(i).map(|old| std::mem::take(&mut old.observed)).unwrap_or_default();
-            let track = person.track(time_ns, step_s, &self.visibility.hall, observed);
+            let track = person.track(&self.numbers, time_ns, step_s, &self.visibility.hall, observed);
             match tracks.get_mut(i) {
                 Some(old) => *old = track,
                 None => tracks.push(track),

@@ -1,6 +1,6 @@
 //! How far a detection may be off, to the filter.
 
-use super::gaussian::{Mat2, plus, round};
+use super::gaussian::{Mat2, plus, round, scaled};
 use super::height::HEIGHT_MEAN_M;
 use super::numbers::Numbers;
 use super::visibility::BodyView;
@@ -29,7 +29,7 @@ pub(super) fn noise(numbers: &Numbers, detection: &Detection, view: &BodyView) -
     let hidden = low.max(few).max(covered).max(0.0);
     let claimed = detection.covariance_m2.unwrap_or_default();
     let lasting = numbers.noise_floor_m.powi(2) + (HIDDEN_NOISE_M * hidden).powi(2);
-    plus(claimed.map(|row| row.map(|c| numbers.noise_share * c)), round(lasting))
+    plus(scaled(claimed, numbers.noise_share), round(lasting))
 }
 
 /// Covariance of a swaying body about the person's way, of a phase and direction that are not known.

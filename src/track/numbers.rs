@@ -41,6 +41,8 @@ pub struct Numbers {
     /// How much of the variance that a detection claims of its position differs from frame to frame and is no sway:
     /// where the covariance agrees with the errors on tuning scenes.
     pub noise_share: f64,
+    /// How much of it lasts, for every frame sees the same body: the track's position is less sure by it.
+    pub lasting_share: f64,
     /// Whether sensors, furniture and other people decide if a person can be seen.
     pub visibility: bool,
     /// Whether arms and legs tell the phase of the gait.
@@ -79,8 +81,9 @@ impl Numbers {
         let mut numbers = Self {
             motion_models,
             sway_m: [0.012; 2],
-            noise_floor_m: 0.01,
+            noise_floor_m: 0.005,
             noise_share: 0.7,
+            lasting_share: 0.1,
             visibility: !without(Mechanism::Visibility),
             stride: !without(Mechanism::LimbPhase),
             usual: UsualOutline::shipped(),

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::attached::{Attached, Beside};
 use super::followed::{Observations, Observed, Track, WIDTH_SCALE_SIGMA, seconds};
-use super::gaussian::{largest_sigma, plus};
+use super::gaussian::{Mat2, largest_sigma, plus, scaled};
 use super::heading::Heading;
 use super::height::{HEIGHT_MEAN_M, Height};
 use super::kalman::Filter;
@@ -59,8 +59,8 @@ const FACING_BEHIND: f64 = 0.05;
 const FREE_SHARE: f64 = 0.9;
 /// A top tells of the body's height where beams meet it up to this share of that.
 const SHOWN_SHARE: f64 = 0.6;
-/// Time over which the width of a box is averaged.
-const BOX_AVERAGE_S: f64 = 1.0;
+/// Time over which the width of a box is averaged, and what detections claim.
+const AVERAGE_S: f64 = 1.0;
 /// The width of a box until one was seen.
 const WIDTH_M: f64 = 0.5;
 /// A track with everything behind it, at the time of the last frame.
@@ -82,6 +82,8 @@ pub(super) struct Person {
     origin: Origin,
     last_match_ns: i64,
     points: u32,
+    /// What detections claim of their positions' errors, averaged, m^2.
+    claimed_m2: Mat2,
     heading: Heading,
     height: Height,
     outline: Outline,
@@ -111,6 +113,7 @@ impl Remembered for Person {
         self.origin.visit(words);
         words.i64(&mut self.last_match_ns);
         words.u32(&mut self.points);
+        words.f64s(self.claimed_m2.as_flattened_mut());
         self.heading.visit(words);
         self.height.visit(words);
         self.outline.visit(words);
@@ -161,6 +164,7 @@ impl Person {
             origin: Origin::new(position_m, time_ns, false),
             last_match_ns: time_ns,
             points: 0,
+            claimed_m2: [[0.0; 2]; 2],
             heading: Heading::ANY,
             height: Height::new(HEIGHT_MEAN_M, numbers.height_sigma_m, numbers.children_share),
             outline: Outline::new(&numbers.usual),
@@ -285,6 +289,7 @@ impl Person {
     /// The track at the frame's time, `step_s` after the last frame; the filter stands there. `observed` gives its memory.
     pub(super) fn track(
         &mut self,
+        numbers: &Numbers,
         time_ns: i64,
         step_s: f64,
         hall: &Hall,
@@ -295,6 +300,9 @@ impl Person {
         self.heading.follow(&state, step_s);
         self.observed.push(time_ns, position_m, velocity_mps);
         observed.clone_from(&self.observed.0);
+        let mut covariance = state.P;
+        let lasting_m2 = scaled(self.claimed_m2, numbers.lasting_share);
+        (0..2).for_each(|row| (0..2).for_each(|column| covariance[row][column] += lasting_m2[row][column]));
         let outline_m = self.outline.levels_m();
         let canopy = self.shape.canopy();
         let (aabb, obb) = self.boxes(position_m, hall.floor_m(position_m));
@@ -302,7 +310,7 @@ impl Person {
             id: self.id,
             position_m,
             velocity_mps,
-            covariance: state.P,
+            covariance,
             heading_rad: self.heading.mean_rad,
             heading_sigma_rad: self.heading.sigma_rad(),
             heading_behind: self.heading.behind,
@@ -336,6 +344,10 @@ impl Person {
         visibility: Option<&Visibility>,
         step_s: f64,
     ) {
+        let new = (1.0 - (-step_s / AVERAGE_S).exp()).max(1.0 / f64::from(self.matches));
+        if let Some(claimed_m2) = detection.covariance_m2 {
+            self.claimed_m2 = plus(scaled(self.claimed_m2, 1.0 - new), scaled(claimed_m2, new));
+        }
         self.points = detection.points;
         let state = self.filter.state();
         let speed_mps = state.velocity_mps().length();
@@ -352,7 +364,7 @@ impl Person {
         if let Some(visibility) = visibility.filter(|_| numbers.outline) {
             self.see_outline(numbers, detection, view, visibility, step_s);
         }
-        let new = 1.0 - (-step_s / BOX_AVERAGE_S).exp();
+        let new = 1.0 - (-step_s / AVERAGE_S).exp();
         self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
         // What shows no more than the part of a body that beams meet may be a body.
         let height_m = self.height.mean_m();
