@@ -417,6 +417,7 @@ fn the_covariance_is_honest_about_noise_of_the_size_it_is_told() {
     let numbers = Numbers {
         noise_floor_m: 0.05,
         noise_share: 0.0,
+        lasting_share: 0.0,
         sway_m: [0.0; 2],
         motion_models: vec![model],
         ..Numbers::new(&Config::default().track)

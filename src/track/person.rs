@@ -432,3 +432,30 @@ impl Person {
         (aabb, Obb { center_m, half_m, site_from_box })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+    use crate::track::gaussian::round;
+
+    #[test]
+    fn no_number_of_frames_mends_what_each_of_them_has() {
+        let config = Config::default();
+        let numbers = Numbers { lasting_share: 0.25, ..Numbers::new(&config.track) };
+        let box_m = Aabb { min_m: DVec3::new(-0.2, -0.2, 0.0), max_m: DVec3::new(0.2, 0.2, 1.7) };
+        let detection = Detection { covariance_m2: Some(round(0.0016)), ..Detection::of_box(box_m) };
+        let mut person = Person::born(&numbers, 1, &detection, 0, false, false);
+        let mut track = None;
+        for k in 1..100_i64 {
+            person.predict(&numbers, STEP_S);
+            let visibility = Visibility::new(&config.site);
+            person.matched(&numbers, &detection, &BodyView::default(), &visibility, k * 100_000_000, STEP_S);
+            track = Some(person.track(&numbers, k * 100_000_000, STEP_S, &config.site.hall, VecDeque::new()));
+        }
+        let told_m2 = track.unwrap().covariance[0][0];
+        let filtered_m2 = person.filter.state().P[0][0];
+        assert!((told_m2 - filtered_m2 - 0.25 * 0.0016).abs() < 1e-9, "{told_m2} {filtered_m2}");
+        assert!(filtered_m2 < 0.5 * 0.0016, "{filtered_m2}");
+    }
+}
