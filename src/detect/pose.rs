@@ -52,8 +52,8 @@ pub(super) fn shipped() -> PointNetwork {
 }
 
 /// Reads the pose of a body. The network gives the offset from the view's base along and across, in units of [`UNIT_M`], and the
-/// logarithms of their variances; then [`facing`]'s four numbers; then the cosine and the sine of the stride's phase in the
-/// view, times its concentration (of a von Mises distribution).
+/// logarithms of their variances; then four numbers of the heading's density; then the cosine and the sine of the stride's phase
+/// in the view, times its concentration (of a von Mises distribution).
 pub fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
     let [along, across, log_variance_along, log_variance_across, a, b, c, d, cos, sin] =
         network.outputs(view);
