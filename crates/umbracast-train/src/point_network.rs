@@ -13,7 +13,7 @@ use umbracast::detect::pose_view::{OF_BODY, OF_POINT, POINTS, PoseView};
 
 use crate::adam::Adam;
 use crate::layer::Layer;
-use crate::pose::Truth;
+use crate::truth::Truth;
 use crate::weights::to_safetensors;
 
 pub(crate) const EPOCHS: usize = 20;
