@@ -74,7 +74,7 @@ pub enum ClusterMethod {
 pub enum PositionMethod {
     /// Centre of the axis-aligned box, with the adapted code's size of a person and its oriented box.
     BoxCenter,
-    /// Mean of the points, each moved away from its sensor.
+    /// Mean of the points, each moved away from its sensor. Neither phase of the gait nor which way who stands faces is read.
     ShiftedMean,
     /// The same, corrected by a model of what was seen.
     Fitted,

@@ -19,7 +19,8 @@ pub enum Mechanism {
     CountTest,
     /// Stage 1: clusters guided by where people are expected.
     GuidedAssignment,
-    /// Stage 1: the network of the body axis; plainest: points moved away from their sensor, and their mean.
+    /// Stage 1: the network of the pose; plainest: points moved away from their sensor, and their mean, no phase of the gait, and
+    /// no heading of who never walked.
     AxisNetwork,
     /// Stage 1: whether sensors can see a person.
     Visibility,

@@ -344,8 +344,9 @@ impl Person {
         visibility: Option<&Visibility>,
         step_s: f64,
     ) {
-        let new = (1.0 - (-step_s / AVERAGE_S).exp()).max(1.0 / f64::from(self.matches));
+        let new = 1.0 - (-step_s / AVERAGE_S).exp();
         if let Some(claimed_m2) = detection.covariance_m2 {
+            let new = new.max(1.0 / f64::from(self.matches));
             self.claimed_m2 = plus(scaled(self.claimed_m2, 1.0 - new), scaled(claimed_m2, new));
         }
         self.points = detection.points;
@@ -364,7 +365,6 @@ impl Person {
         if let Some(visibility) = visibility.filter(|_| numbers.outline) {
             self.see_outline(numbers, detection, view, visibility, step_s);
         }
-        let new = 1.0 - (-step_s / AVERAGE_S).exp();
         self.extent_m += (detection.aabb.size_m().truncate() - self.extent_m) * new;
         // What shows no more than the part of a body that beams meet may be a body.
         let height_m = self.height.mean_m();

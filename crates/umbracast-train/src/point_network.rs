@@ -241,7 +241,7 @@ mod tests {
             })
             .collect();
         let view = PoseView::new(&mut Vec::new(), points.iter(), &[sensor_m], 0.0, SHIFT_M, None);
-        Sample { truth: Truth::standing_off(&view, middle_m - view.base_m), view }
+        Sample { truth: Truth::at_offset(&view, middle_m - view.base_m), view }
     }
 
     fn samples(n: usize) -> Vec<Sample> {

@@ -35,12 +35,12 @@ impl Truth {
         Self {
             heading_rad: seen.heading_rad.map(in_view),
             phase_rad: seen.phase_rad.map(|phase_rad| phase_rad - view.phase_of_mirror_rad()),
-            ..Self::standing_off(view, seen.off_m)
+            ..Self::at_offset(view, seen.off_m)
         }
     }
 
     /// Of somebody of whom no more is known.
-    pub(crate) fn standing_off(view: &PoseView, off_m: DVec2) -> Self {
+    pub(crate) fn at_offset(view: &PoseView, off_m: DVec2) -> Self {
         let off = [view.along, view.across].map(|axis| off_m.dot(axis) / UNIT_M);
         Self { off, heading_rad: None, phase_rad: None }
     }
