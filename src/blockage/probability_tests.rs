@@ -44,7 +44,7 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
         width_scale_sigma: 0.05,
         outline_m: Default::default(),
         canopy: None,
-        gait: GaitPhase { phase_rad: within(3.0), concentration: 1.0 + within(1.0) },
+        gait: GaitPhase { phase_rad: within(3.0), concentration: 1.0 + within(1.0), ..GaitPhase::UNKNOWN },
         points: 30,
         confirmed: true,
         part_of: None,

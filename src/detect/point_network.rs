@@ -19,7 +19,7 @@ pub const BODY_UNITS: [usize; 2] = [256, 128];
 /// What the layers of the whole body read.
 pub const POOLED: usize = 2 * POINT_UNITS[2] + OF_BODY;
 /// Numbers that it gives.
-pub const OUTPUTS: usize = 10;
+pub const OUTPUTS: usize = 14;
 
 /// The network's weights. A clone shares them.
 #[derive(Clone)]

@@ -11,6 +11,8 @@ use crate::geometry::DVec2;
 
 /// Unit of the network's offsets.
 pub const UNIT_M: f64 = 0.05;
+/// Of what it says of the hands' swing.
+pub const SWING_UNIT: f64 = 0.1;
 /// A cluster that is no single body shall not be moved about: half a pram's length at most.
 const OFFSET_LIMIT_M: f64 = 0.5;
 /// Nor believed without end, nor be worth nothing: logarithms of variances in units.
@@ -53,13 +55,29 @@ pub(super) fn shipped() -> PointNetwork {
 
 /// Reads the pose of a body. The network gives the offset from the view's base along and across, in units of [`UNIT_M`], and the
 /// logarithms of their variances; then four numbers of the heading's density; then the cosine and the sine of the stride's phase
-/// in the view, times its concentration (of a von Mises distribution).
+/// in the view, times its concentration (of a von Mises distribution); then how far the hands swing, left and right in the view, in
+/// units of [`SWING_UNIT`], and the logarithms of their variances.
 pub fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
-    let [along, across, log_variance_along, log_variance_across, a, b, c, d, cos, sin] =
-        network.outputs(view);
+    let [
+        along,
+        across,
+        log_variance_along,
+        log_variance_across,
+        a,
+        b,
+        c,
+        d,
+        cos,
+        sin,
+        left,
+        right,
+        log_left,
+        log_right,
+    ] = network.outputs(view);
     let offset_m = (DVec2::new(along, across) * UNIT_M).clamp_length_max(OFFSET_LIMIT_M);
-    let variance_m2 = |log: f64| log.clamp(LOG_VARIANCE.0, LOG_VARIANCE.1).exp() * UNIT_M * UNIT_M;
-    let (along_m2, across_m2) = (variance_m2(log_variance_along), variance_m2(log_variance_across));
+    let bounded = |log: f64| log.clamp(LOG_VARIANCE.0, LOG_VARIANCE.1).exp();
+    let [along_m2, across_m2] =
+        [log_variance_along, log_variance_across].map(|log| bounded(log) * UNIT_M * UNIT_M);
     let (x, y) = (view.along, view.across);
     let xy = along_m2 * x.x * x.y + across_m2 * y.x * y.y;
     Pose {
@@ -72,6 +90,10 @@ pub fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
         gait: (!view.stands()).then(|| GaitPhase {
             phase_rad: f64::atan2(sin, cos) + view.phase_of_mirror_rad(),
             concentration: cos.hypot(sin),
+            hand_swing: view.sides([left, right]).map(|swing| swing * SWING_UNIT),
+            hand_swing_variance: view
+                .sides([log_left, log_right])
+                .map(|log| bounded(log) * SWING_UNIT * SWING_UNIT),
         }),
     }
 }

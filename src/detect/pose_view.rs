@@ -114,7 +114,16 @@ impl PoseView {
 
     /// What the mirror adds to the phase of a stride: half a turn, for left and right have changed sides.
     pub fn phase_of_mirror_rad(&self) -> f64 {
-        if self.across.dot(self.along.perp()) < 0.0 { PI } else { 0.0 }
+        if self.is_mirrored() { PI } else { 0.0 }
+    }
+
+    /// What is on the left and on the right of the person, as the view has it, or of the view, as the person has it.
+    pub fn sides<T: Copy>(&self, [left, right]: [T; 2]) -> [T; 2] {
+        if self.is_mirrored() { [right, left] } else { [left, right] }
+    }
+
+    fn is_mirrored(&self) -> bool {
+        self.across.dot(self.along.perp()) < 0.0
     }
 
     /// Somebody of the same shape who is so many times as large.

@@ -38,7 +38,11 @@ impl Stride {
         if speed_mps < WALKS_FROM_MPS || self.0 == DVec2::ZERO {
             return GaitPhase::UNKNOWN;
         }
-        GaitPhase { phase_rad: self.0.to_angle().rem_euclid(TAU), concentration: self.0.length() }
+        GaitPhase {
+            phase_rad: self.0.to_angle().rem_euclid(TAU),
+            concentration: self.0.length(),
+            ..GaitPhase::UNKNOWN
+        }
     }
 }
 
@@ -59,7 +63,7 @@ mod tests {
         for _ in 0..40 {
             stride.predict(SPEED_MPS, HEIGHT_M, 0.1);
             phase_rad += TAU * SPEED_MPS * 0.1 / stride_m(SPEED_MPS, HEIGHT_M);
-            stride.see(&GaitPhase { phase_rad, concentration });
+            stride.see(&GaitPhase { phase_rad, concentration, ..GaitPhase::UNKNOWN });
         }
         (stride.phase(SPEED_MPS), phase_rad)
     }

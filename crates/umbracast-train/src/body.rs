@@ -150,7 +150,11 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
         let off_m = |t: &&TrackRow| (t.x_m - p.x_m).hypot(t.y_m - p.y_m);
         let all = tracks.get(&(p.scene, p.frame))?.iter();
         let own = all.filter(|t| t.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
-        let gait = GaitPhase { phase_rad: own.gait_phase_rad, concentration: own.gait_concentration };
+        let gait = GaitPhase {
+            phase_rad: own.gait_phase_rad,
+            concentration: own.gait_concentration,
+            ..GaitPhase::UNKNOWN
+        };
         (off_m(&own) < OWN_M).then_some((gait, own.height_m))
     };
     let mut cases = Vec::new();

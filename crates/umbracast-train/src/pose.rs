@@ -42,6 +42,17 @@ fn card(network: &PointNetwork, training: &[Seen], held_out: &[Seen], commit: &s
     let off_phase_rad = |(pose, s): &(Pose, &Seen)| Some(turned(pose.gait?.phase_rad - s.phase_rad?));
     let poses = || held_out.iter().map(|s| (pose(network, &s.view), s));
     let headings: Vec<f64> = poses().filter_map(|seen| off_rad(&seen)).collect();
+    let off_swing = |(pose, s): &(Pose, &Seen)| {
+        let (gait, [left, right]) = (pose.gait?, s.hand_swing?);
+        Some([
+            (gait.hand_swing[0] - left, gait.hand_swing_variance[0]),
+            (gait.hand_swing[1] - right, gait.hand_swing_variance[1]),
+        ])
+    };
+    let swings: Vec<(f64, f64)> = poses().filter_map(|seen| off_swing(&seen)).flatten().collect();
+    let all_swings: Vec<f64> = training.iter().filter_map(|s| s.hand_swing).flatten().collect();
+    let mean_swing = mean(all_swings.iter().copied());
+    let swing_sigma = mean(all_swings.iter().map(|swing| (swing - mean_swing).powi(2))).sqrt();
     let phases: Vec<f64> = poses().filter_map(|seen| off_phase_rad(&seen)).collect();
     let within = |rad: f64, off_rad: &[f64]| mean(off_rad.iter().map(|off| f64::from(off.abs() < rad)));
     let mut off_line_deg: Vec<f64> = headings
@@ -67,7 +78,10 @@ fn card(network: &PointNetwork, training: &[Seen], held_out: &[Seen], commit: &s
          | squared error over its variance (2 if honest) | | {:.2} |\n\
          | facing: front and back are not mistaken, of {} who stand | | {:.3} |\n\
          | off the line, either way, median | | {:.1} degrees |\n| 90 % | | {:.1} degrees |\n\
-         | phase of the stride: off by an eighth at most, of {} who walk | | {:.3} |\n",
+         | phase of the stride: off by an eighth at most, of {} who walk | | {:.3} |\n\
+         | how far hands swing, shares of the height for a speed of one hip height a second: mean of all, one standard deviation | {:.3}, {:.3} | |\n\
+         | this network's error, one standard deviation | | {:.3} |\n\
+         | squared error over its variance (1 if honest) | | {:.2} |\n",
         scenes_listed(),
         training.len(),
         held_out_name(),
@@ -82,6 +96,10 @@ fn card(network: &PointNetwork, training: &[Seen], held_out: &[Seen], commit: &s
         quantile(0.9),
         phases.len(),
         within(FRAC_PI_4, &phases),
+        mean_swing,
+        swing_sigma,
+        mean(swings.iter().map(|(off, _)| off * off)).sqrt(),
+        mean(swings.iter().map(|(off, variance)| off * off / variance)),
     )
 }
 

@@ -16,7 +16,7 @@ use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Tracker;
 use umbracast::{Error, Health};
 use umbracast_eval::run::chain::{empty_frames, push};
-use umbracast_sim::body::{Bodies, PersonState};
+use umbracast_sim::body::{Bodies, PersonState, Walker};
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs, speed_augmented};
 use umbracast_sim::scene::Scene;
 
@@ -59,6 +59,8 @@ pub(crate) struct Seen {
     pub(crate) heading_rad: Option<f64>,
     /// Of the stride of who is known to walk.
     pub(crate) phase_rad: Option<f64>,
+    /// How far the left and the right hand of who is known to walk swing, as `Walker::hand_swing_at` says.
+    pub(crate) hand_swing: Option<[f64; 2]>,
 }
 
 /// Bodies to learn from, and others of scenes of their own. `scene_done` is called with scenes done and scenes in all, from any
@@ -181,15 +183,16 @@ fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec
                 let off_m = |state: &PersonState| state.position_m - view.base_m;
                 let own = walkers
                     .iter()
-                    .filter_map(|walker| walker.state_at(time_ns))
-                    .min_by(|a, b| off_m(a).length_squared().total_cmp(&off_m(b).length_squared()))
-                    .filter(|state| off_m(state).length() < OWN_M);
+                    .filter_map(|walker| Some((walker, walker.state_at(time_ns)?)))
+                    .min_by(|(_, a), (_, b)| off_m(a).length_squared().total_cmp(&off_m(b).length_squared()))
+                    .filter(|(_, state)| off_m(state).length() < OWN_M);
                 let walks = |own: &PersonState| own.velocity_mps.length() > WALKS_FROM_MPS;
-                let seen = |own: &PersonState| Seen {
+                let seen = |(walker, own): &(&Walker, PersonState)| Seen {
                     view,
                     off_m: off_m(own),
                     heading_rad: (known && view.stands() && !walks(own)).then_some(own.heading_rad),
                     phase_rad: (!view.stands() && walks(own)).then_some(own.phase_rad),
+                    hand_swing: walker.hand_swing_at(time_ns).filter(|_| !view.stands()),
                 };
                 samples.extend(own.as_ref().map(seen));
             }

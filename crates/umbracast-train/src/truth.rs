@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use umbracast::detect::point_network::OUTPUTS;
-use umbracast::detect::pose::{LOG_VARIANCE, UNIT_M};
+use umbracast::detect::pose::{LOG_VARIANCE, SWING_UNIT, UNIT_M};
 use umbracast::detect::pose_view::PoseView;
 use umbracast::geometry::DVec2;
 
@@ -23,6 +23,8 @@ pub(crate) struct Truth {
     heading_rad: Option<f64>,
     /// Of the stride, of who walks.
     phase_rad: Option<f64>,
+    /// How far the hands swing, in units of [`SWING_UNIT`].
+    hand_swing: Option<[f64; 2]>,
 }
 
 impl Truth {
@@ -35,6 +37,7 @@ impl Truth {
         Self {
             heading_rad: seen.heading_rad.map(in_view),
             phase_rad: seen.phase_rad.map(|phase_rad| phase_rad - view.phase_of_mirror_rad()),
+            hand_swing: seen.hand_swing.map(|swing| view.sides(swing).map(|swing| swing / SWING_UNIT)),
             ..Self::at_offset(view, seen.off_m)
         }
     }
@@ -42,12 +45,14 @@ impl Truth {
     /// Of somebody of whom no more is known.
     pub(crate) fn at_offset(view: &PoseView, off_m: DVec2) -> Self {
         let off = [view.along, view.across].map(|axis| off_m.dot(axis) / UNIT_M);
-        Self { off, heading_rad: None, phase_rad: None }
+        Self { off, heading_rad: None, phase_rad: None, hand_swing: None }
     }
 
     /// Of a body that is so many times as large.
     pub(crate) fn scaled(self, share: f64) -> Self {
-        Self { off: self.off.map(|units| share * units), ..self }
+        let off = self.off.map(|units| share * units);
+        // A share of a height, for a speed over another.
+        Self { off, hand_swing: self.hand_swing.map(|swing| swing.map(|units| share * units)), ..self }
     }
 
     /// The negative log-likelihood of the truth but for a constant, and its gradient to the outputs.
@@ -58,8 +63,8 @@ impl Truth {
             loss += of_part;
             to_outputs[first..first + to_part.len()].copy_from_slice(to_part);
         };
-        let [a, b, c, d, e, f, g, h, cos, sin] = *outputs;
-        let (of_offset, to_offset) = self.loss_of_offset([a, b, c, d]);
+        let [a, b, c, d, e, f, g, h, cos, sin, left, right, log_left, log_right] = *outputs;
+        let (of_offset, to_offset) = loss_of_pair(self.off, [a, b, c, d]);
         add(0, (of_offset, &to_offset));
         if let Some(rad) = self.heading_rad {
             let (of_heading, to_heading) = loss_of_angle(rad, [e, f, g, h]);
@@ -70,21 +75,26 @@ impl Truth {
             let (of_phase, to_phase) = loss_of_angle(rad, [cos, sin, 0.0, 0.0]);
             add(8, (of_phase, &to_phase[..2]));
         }
-        (loss, to_outputs)
-    }
-
-    fn loss_of_offset(&self, outputs: [f64; 4]) -> (f64, [f64; 4]) {
-        let (mut loss, mut to_outputs) = (0.0, [0.0; 4]);
-        for k in 0..2 {
-            let log_variance = outputs[k + 2].clamp(LOG_VARIANCE.0, LOG_VARIANCE.1);
-            let weight = (-log_variance).exp();
-            let error = (outputs[k] - self.off[k]).clamp(-PULL_LIMIT, PULL_LIMIT);
-            loss += 0.5 * (error * error * weight + log_variance);
-            to_outputs[k] = error * weight;
-            to_outputs[k + 2] = 0.5 * (1.0 - error * error * weight);
+        if let Some(swing) = self.hand_swing {
+            let (of_swing, to_swing) = loss_of_pair(swing, [left, right, log_left, log_right]);
+            add(10, (of_swing, &to_swing));
         }
         (loss, to_outputs)
     }
+}
+
+/// Of two numbers with independent errors: the outputs are both means, then the logarithms of both variances.
+fn loss_of_pair(truth: [f64; 2], outputs: [f64; 4]) -> (f64, [f64; 4]) {
+    let (mut loss, mut to_outputs) = (0.0, [0.0; 4]);
+    for k in 0..2 {
+        let log_variance = outputs[k + 2].clamp(LOG_VARIANCE.0, LOG_VARIANCE.1);
+        let weight = (-log_variance).exp();
+        let error = (outputs[k] - truth[k]).clamp(-PULL_LIMIT, PULL_LIMIT);
+        loss += 0.5 * (error * error * weight + log_variance);
+        to_outputs[k] = error * weight;
+        to_outputs[k + 2] = 0.5 * (1.0 - error * error * weight);
+    }
+    (loss, to_outputs)
 }
 
 /// Of a generalised von Mises distribution; zero where all angles are alike.
@@ -114,8 +124,13 @@ mod tests {
     #[test]
     fn the_slope_of_the_loss_is_that_of_finite_differences() {
         const MOVED: f64 = 1e-6;
-        let outputs = [0.3, -0.6, 0.2, -0.4, 0.4, -1.1, 0.7, 2.0, 1.3, -0.8];
-        let truth = Truth { off: [0.9, -0.2], heading_rad: Some(0.8), phase_rad: Some(2.5) };
+        let outputs = [0.3, -0.6, 0.2, -0.4, 0.4, -1.1, 0.7, 2.0, 1.3, -0.8, 0.9, 1.4, -0.3, 0.6];
+        let truth = Truth {
+            off: [0.9, -0.2],
+            heading_rad: Some(0.8),
+            phase_rad: Some(2.5),
+            hand_swing: Some([1.2, 0.1]),
+        };
         let (_, slope) = truth.loss(&outputs);
         for o in 0..OUTPUTS {
             let moved = |by: f64| {
@@ -130,10 +145,11 @@ mod tests {
 
     #[test]
     fn who_is_not_known_to_stand_or_to_walk_teaches_no_heading_and_no_phase() {
-        let (loss, slope) = Truth { off: [0.0; 2], heading_rad: None, phase_rad: None }.loss(&[0.0; OUTPUTS]);
-        assert_eq!((loss, &slope[4..]), (0.0, &[0.0; 6][..]));
+        let nothing = Truth { off: [0.0; 2], heading_rad: None, phase_rad: None, hand_swing: None };
+        let (loss, slope) = nothing.loss(&[0.0; OUTPUTS]);
+        assert_eq!((loss, &slope[4..]), (0.0, &[0.0; 10][..]));
         let (loss, _) =
-            Truth { off: [0.0; 2], heading_rad: Some(1.0), phase_rad: Some(1.0) }.loss(&[0.0; OUTPUTS]);
+            Truth { heading_rad: Some(1.0), phase_rad: Some(1.0), ..nothing }.loss(&[0.0; OUTPUTS]);
         assert!(loss.abs() < 1e-12, "{loss}");
     }
 }

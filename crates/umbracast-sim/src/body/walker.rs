@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use rand::{Rng, RngExt};
+use umbracast::gait::WALKS_FROM_MPS;
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::site::{Hall, Ue};
 
@@ -15,7 +16,7 @@ use super::meshes::Meshes;
 use super::recorded::Gait;
 use super::shape::{Shape, Surface};
 use super::sitting::Sitting;
-use super::skeleton::{Holds, PelvisPose, Pose};
+use super::skeleton::{Bone, Holds, PelvisPose, Pose};
 use super::things::Things;
 use super::walk::{self, Instant, Walk};
 use super::{carried, device, feet, gait, things};
@@ -26,6 +27,9 @@ use crate::random::stream;
 const ARM_SPAN_M: f64 = 2.0;
 /// A body climbs from one level to the next over so much of its way, before the edge and behind it.
 const CLIMB_M: f64 = 0.3;
+
+/// Hands are looked at so many times in a stride.
+const SWINGS: u32 = 8;
 
 /// Where a person is and how he stands, at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -169,6 +173,32 @@ impl Walker {
         let floor_m = self.hall.as_ref().map_or(0.0, |hall| underfoot(hall, position_m, heading_rad).0);
         let (height_m, phase_rad) = (self.height_m(time_ns), TAU * phase);
         Some(PersonState { position_m, velocity_mps, heading_rad, floor_m, height_m, phase_rad })
+    }
+
+    /// How far the left and the right hand swing to either side of their middles in the stride about a time: shares of the height for
+    /// a speed of one hip height a second, less than 0 of a hand that swings with the leg of its side. `None` of who stands, or is not
+    /// in the scene for that stride.
+    pub fn hand_swing_at(&self, time_ns: i64) -> Option<[f64; 2]> {
+        let PersonState { velocity_mps, height_m, .. } = self.state_at(time_ns)?;
+        let speed_mps = velocity_mps.length();
+        let stride_ns = 1e9 / umbracast::gait::stride_hz(speed_mps, height_m);
+        let (offset_m, _) = self.build.shoulder_m();
+        let hand_up_m = self.build.elbow_height_m() - self.build.forearm_m - 0.5 * self.build.hand_m;
+        let mut swing_m = [0.0; 2];
+        for k in 0..SWINGS {
+            let late_ns = ((f64::from(k) / f64::from(SWINGS) - 0.5) * stride_ns) as i64;
+            let (pose, state) = self.pose_at(time_ns + late_ns)?;
+            let ahead = DVec2::from_angle(state.heading_rad);
+            for (i, (bone, side)) in
+                [(Bone::ForearmLeft, 1.0), (Bone::ForearmRight, -1.0)].into_iter().enumerate()
+            {
+                let hand_m = pose.point(bone, DVec3::new(0.0, side * offset_m, hand_up_m)).truncate();
+                let wave = 2.0 / f64::from(SWINGS) * side * state.phase_rad.cos();
+                swing_m[i] += wave * ahead.dot(hand_m - state.position_m);
+            }
+        }
+        let usual_m = height_m * umbracast::gait::relative_speed_hz(speed_mps, height_m);
+        (speed_mps > WALKS_FROM_MPS).then(|| swing_m.map(|m| m / usual_m))
     }
 
     fn height_m(&self, time_ns: i64) -> f64 {
