@@ -18,8 +18,8 @@ const STRIDE: f64 = 0.98;
 /// The hip joint above the floor, share of the height.
 const HIP_SHARE: f64 = 0.53;
 /// How far hands swing, and how that differs: of who walks in the scenes that the network of the pose learns from (`models/pose.md`).
-const HAND_SWING: f64 = 0.11;
-const HAND_SWING_SIGMA: f64 = 0.05;
+pub const HAND_SWING: f64 = 0.09;
+pub const HAND_SWING_SIGMA: f64 = 0.05;
 /// From this speed over hip height (1/s) on the trunk's sway is all there.
 const FULL_SWAY_HZ: f64 = 0.5;
 
@@ -40,8 +40,8 @@ pub struct GaitPhase {
     /// How far the left and the right hand swing to either side of their middles: shares of the height for a speed of one hip
     /// height a second; 0 of a hand that is still, less of one that swings with the leg of its side.
     pub hand_swing: [f64; 2],
-    /// Variances of both.
-    pub hand_swing_variance: [f64; 2],
+    /// One standard deviation of both.
+    pub hand_swing_sigma: [f64; 2],
 }
 
 impl GaitPhase {
@@ -50,7 +50,7 @@ impl GaitPhase {
         phase_rad: 0.0,
         concentration: 0.0,
         hand_swing: [HAND_SWING; 2],
-        hand_swing_variance: [HAND_SWING_SIGMA * HAND_SWING_SIGMA; 2],
+        hand_swing_sigma: [HAND_SWING_SIGMA; 2],
     };
 }
 

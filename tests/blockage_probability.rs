@@ -31,7 +31,9 @@ fn setting(samples: usize) -> Setting {
         hand_out: 0.0,
         upper_radius: 0.01,
         fore_radius: 0.01,
-        still_share: 1.0,
+        elbow_swing: 0.0,
+        hand_ahead: 0.0,
+        hand_swing: 0.0,
         ..BodyModel::shipped().arms
     };
     let numbers = Numbers {
@@ -173,18 +175,19 @@ fn arms_that_swing_make_a_walker_seen_from_the_side_block_sooner() {
     let mut setting = setting(256);
     setting.numbers.body.arms = BodyModel::shipped().arms;
     setting.config.site.access_points[0].position_m[2] = 0.7;
-    let p_now = |still_share: f64, speed_mps: f64| {
-        let mut setting = Setting { config: setting.config.clone(), numbers: setting.numbers.clone() };
-        setting.numbers.body.arms.still_share = still_share;
+    let p_now = |hand_swing: [f64; 2], speed_mps: f64| {
+        let setting = Setting { config: setting.config.clone(), numbers: setting.numbers.clone() };
         let (mut track, forecast) = person(1, DVec2::new(4.0, 0.33), DVec2::new(0.0, -speed_mps), [0.0; 4]);
         track.heading_rad = -std::f64::consts::FRAC_PI_2;
+        track.gait = GaitPhase { hand_swing, hand_swing_sigma: [0.0; 2], ..GaitPhase::UNKNOWN };
         let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
         cast(&setting, vec![(track, forecast), user])[1].p_now
     };
-    let (swinging, some, standing) = (p_now(0.0, 1.2), p_now(0.5, 1.2), p_now(0.0, 0.0));
+    let usual = GaitPhase::UNKNOWN.hand_swing;
+    let (swinging, some, standing) = (p_now(usual, 1.2), p_now([usual[0], 0.0], 1.2), p_now(usual, 0.0));
     assert!(swinging > 0.2 && swinging < 0.9, "{swinging}");
     assert!(some > 0.3 * swinging && some < 0.7 * swinging, "{some} of {swinging}");
-    assert_eq!(standing, 0.0);
+    assert_eq!([standing, p_now([0.0; 2], 1.2)], [0.0; 2], "with a hand in each pocket");
 }
 
 #[test]

@@ -25,14 +25,22 @@ pub struct Posture {
     pub speed_mps: f64,
     /// Since the right heel touched the floor; a stride is a full turn.
     pub phase_rad: f64,
-    /// Factor on the swing of the arms: 0 for arms that hang still.
-    pub arm_swing: f64,
+    /// Factors on the swing of the arms, right and left: 0 for arms that hang still.
+    pub arm_swing: [f64; 2],
 }
 
 impl Posture {
     /// Of a usual body that stands still.
     pub fn standing(position_m: DVec2, ahead: DVec2, height_m: f64) -> Self {
-        Self { position_m, ahead, height_m, width_scale: 1.0, speed_mps: 0.0, phase_rad: 0.0, arm_swing: 0.0 }
+        Self {
+            position_m,
+            ahead,
+            height_m,
+            width_scale: 1.0,
+            speed_mps: 0.0,
+            phase_rad: 0.0,
+            arm_swing: [0.0; 2],
+        }
     }
 
     fn relative_speed_hz(&self) -> f64 {
@@ -57,7 +65,7 @@ pub fn blocks(body: &BodyModel, posture: &Posture, start_m: DVec3, end_m: DVec3)
     let along_m2 = along_m.length_squared().max(f64::MIN_POSITIVE);
     let nearest = (-start.truncate().dot(along_m) / along_m2).clamp(0.0, 1.0);
     let nearest_m = (start.truncate() + along_m * nearest).length();
-    let reach_m = reach_m(body, h, posture.width_scale, posture.speed_mps);
+    let reach_m = reach_m(body, posture);
     if nearest_m > reach_m {
         return false;
     }
@@ -99,13 +107,14 @@ pub fn blocks(body: &BodyModel, posture: &Posture, start_m: DVec3, end_m: DVec3)
 }
 
 /// No part of such a body is farther from its axis.
-pub fn reach_m(body: &BodyModel, height_m: f64, width_scale: f64, speed_mps: f64) -> f64 {
-    let arms = &body.arms;
-    let hand_ahead = relative_speed_hz(speed_mps, height_m) * (arms.hand_ahead + arms.hand_swing).abs();
+fn reach_m(body: &BodyModel, posture: &Posture) -> f64 {
+    let (arms, width_scale, [right, left]) = (&body.arms, posture.width_scale, posture.arm_swing);
+    let swing = right.abs().max(left.abs()) * posture.relative_speed_hz();
+    let hand_ahead = swing * (arms.hand_ahead + arms.hand_swing).abs();
     let out = arms.hand_out.max(arms.elbow_out).max(arms.shoulder_out);
     let radius = arms.upper_radius.max(arms.fore_radius) * width_scale;
     let arms_reach = (hand_ahead * hand_ahead + out * out).sqrt() + radius + body.sway_left + body.sway_ahead;
-    height_m
+    posture.height_m
         * body.slices.iter().fold(arms_reach, |far, slice| far.max(slice_reach(body, slice, width_scale)))
 }
 
@@ -123,7 +132,7 @@ fn slice_reach(body: &BodyModel, slice: &Slice, width_scale: f64) -> f64 {
 fn arm_blocks(arms: &Arms, posture: &Posture, speed_hz: f64, side: f64, start: DVec3, end: DVec3) -> bool {
     let h = posture.height_m;
     let wave = side * posture.phase_rad.cos();
-    let swing = posture.arm_swing * speed_hz;
+    let swing = posture.arm_swing[usize::from(side > 0.0)] * speed_hz;
     let elbow_ahead = swing * arms.elbow_swing * wave;
     let hand_ahead = swing * (arms.hand_ahead + arms.hand_swing * wave);
     let at = |ahead: f64, out: f64, up: f64| DVec3::new(ahead, side * out, up) * h;
@@ -215,7 +224,7 @@ mod tests {
 
     fn posture(phase_rad: f64) -> Posture {
         let standing = Posture::standing(DVec2::new(5.0, 0.0), DVec2::X, 1.75);
-        Posture { speed_mps: 1.0, arm_swing: 1.0, phase_rad, ..standing }
+        Posture { speed_mps: 1.0, arm_swing: [1.0; 2], phase_rad, ..standing }
     }
 
     /// A level ray across the body, `ahead_m` before its axis.
@@ -243,7 +252,7 @@ mod tests {
         let ahead: Vec<bool> = phases.map(|phase| reaches(&posture(phase))).collect();
         assert!(ahead[0] && ahead[8] && !ahead[4] && !ahead[12], "{ahead:?}");
         assert!(!reaches(&Posture { speed_mps: 0.0, ..posture(0.0) }));
-        assert!(!reaches(&Posture { arm_swing: 0.0, ..posture(0.0) }));
+        assert!(!reaches(&Posture { arm_swing: [0.0; 2], ..posture(0.0) }));
     }
 
     #[test]

@@ -62,8 +62,6 @@ pub struct Arms {
     pub hand_ahead: f64,
     /// How far the hand swings to either side of that, for the same speed.
     pub hand_swing: f64,
-    /// Share of people who walk without swinging their arms.
-    pub still_share: f64,
 }
 
 impl BodyModel {

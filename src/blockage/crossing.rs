@@ -92,16 +92,16 @@ impl Crossing {
                 }
                 self.taken += 1;
                 if self.taken == WORD {
-                    self.answer(figure, meeting.band, blocked);
+                    self.answer(figure, other.swings, meeting.band, blocked);
                 }
             }
         }
-        self.answer(figure, meeting.band, blocked);
+        self.answer(figure, other.swings, meeting.band, blocked);
     }
 
     /// Asks those that were taken.
     #[inline(always)]
-    fn answer(&mut self, figure: &Figure, band: Band, blocked: &mut [u32]) {
+    fn answer(&mut self, figure: &Figure, swings: [f64; 2], band: Band, blocked: &mut [u32]) {
         if self.taken == 0 {
             return;
         }
@@ -109,7 +109,7 @@ impl Crossing {
         let [trunk, arms] = std::mem::take(&mut self.asks);
         let mut met = if trunk != 0 { trunk & self.cross_trunk(figure, band) } else { 0 };
         if arms & !met != 0 {
-            met |= arms & self.cross_arms(figure, band);
+            met |= arms & self.cross_arms(figure, swings, band);
         }
         while met != 0 {
             let sample = self.samples[met.trailing_zeros() as usize % WORD] as usize;
@@ -133,11 +133,11 @@ impl Crossing {
     }
 
     #[inline(always)]
-    fn cross_arms(&mut self, figure: &Figure, band: Band) -> u32 {
+    fn cross_arms(&mut self, figure: &Figure, swings: [f64; 2], band: Band) -> u32 {
         self.miss = [f32::INFINITY; WORD];
         for rod in figure.rods.iter().filter(|rod| rod.is_within(band)) {
-            self.cross_rod(rod, -1.0);
-            self.cross_rod(rod, 1.0);
+            self.cross_rod(rod, swings, -1.0);
+            self.cross_rod(rod, swings, 1.0);
         }
         self.met()
     }
@@ -211,10 +211,11 @@ impl Crossing {
     /// The ray against a rod of an arm on the left (`side` 1) or the right. Arms swing against the leg of their side, and
     /// farther ahead than back because the elbow bends.
     #[inline(always)]
-    fn cross_rod(&mut self, rod: &Rod, side: f32) {
+    fn cross_rod(&mut self, rod: &Rod, swings: [f64; 2], side: f32) {
         let numbers = |joint: &Joint| {
-            let out = joint.out[usize::from(side > 0.0)];
-            [joint.ahead, joint.swing * f64::from(side), out * f64::from(side), joint.up].map(|x| x as f32)
+            let (i, side) = (usize::from(side > 0.0), f64::from(side));
+            [swings[i] * joint.ahead, swings[i] * joint.swing * side, joint.out[i] * side, joint.up]
+                .map(|x| x as f32)
         };
         let (upper, lower, radius) = (numbers(&rod.upper), numbers(&rod.lower), rod.radius as f32);
         for i in 0..self.lanes() {

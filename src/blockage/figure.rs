@@ -79,8 +79,6 @@ pub(super) struct Figure {
     pub(super) plans: Vec<Plan>,
     pub(super) sway_left: f64,
     pub(super) sway_ahead: f64,
-    /// Share of people who walk without swinging their arms.
-    pub(super) still_share: f64,
     /// What of `slices` is somebody's own: for whom it was worked out.
     outline_m: [LevelOutline; LEVELS],
     canopy: Option<Canopy>,
@@ -104,7 +102,6 @@ impl Figure {
             plans: Vec::new(),
             sway_left: body.sway_left,
             sway_ahead: body.sway_ahead,
-            still_share: body.arms.still_share,
             outline_m: Default::default(),
             canopy: None,
             of_height_m: 0.0,

@@ -35,7 +35,8 @@ impl Numbers {
             (body.arms.upper_radius, body.arms.fore_radius) = (0.0, 0.0);
         }
         if without(Mechanism::ArmSwing) {
-            body.arms.still_share = 1.0;
+            let arms = &mut body.arms;
+            (arms.elbow_swing, arms.hand_ahead, arms.hand_swing) = (0.0, 0.0, 0.0);
         }
         if without(Mechanism::TrunkSway) {
             (body.sway_left, body.sway_ahead) = (0.0, 0.0);

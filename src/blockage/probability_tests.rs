@@ -44,7 +44,12 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
         width_scale_sigma: 0.05,
         outline_m: Default::default(),
         canopy: None,
-        gait: GaitPhase { phase_rad: within(3.0), concentration: 1.0 + within(1.0), ..GaitPhase::UNKNOWN },
+        gait: GaitPhase {
+            phase_rad: within(3.0),
+            concentration: 1.0 + within(1.0),
+            hand_swing: [0.1 + within(0.1), 0.1 + within(0.1)],
+            ..GaitPhase::UNKNOWN
+        },
         points: 30,
         confirmed: true,
         part_of: None,
@@ -57,9 +62,7 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
 /// Bits of the steps at which a link is blocked in a sample: everybody asked, one ray at a time.
 fn one_by_one(sampler: &Sampler, numbers: &Numbers, ue: &Ue, ap_m: DVec3, q: usize, k: usize) -> u16 {
     let people = &sampler.people[..sampler.present];
-    let posture = |p: &Trajectories, step: usize| {
-        p.posture(&sampler.draws[&p.track], numbers.body.arms.still_share, step, k)
-    };
+    let posture = |p: &Trajectories, step: usize| p.posture(&sampler.draws[&p.track], step, k);
     let q_at = |step: usize| {
         let (ue, q) = (people[q].device_of(ue, k), posture(&people[q], step));
         ue.on_body(q.position_m, q.ahead.to_angle(), q.height_m)
@@ -81,7 +84,7 @@ fn causes(
 ) -> [u16; 2] {
     let (person, mut bits) = (&sampler.people[q], [0; 2]);
     for step in 0..MOMENTS {
-        let posture = person.posture(&sampler.draws[&person.track], numbers.body.arms.still_share, step, k);
+        let posture = person.posture(&sampler.draws[&person.track], step, k);
         let held = person.device_of(ue, k);
         let ue_m = held.on_body(posture.position_m, posture.ahead.to_angle(), posture.height_m);
         if !ue.is_on_axis() {

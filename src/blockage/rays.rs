@@ -99,6 +99,7 @@ impl Rays {
             base_m: self.to_mean_m(other, step),
             reach_m: meeting.reach_m + ROOM_M,
             plan: &figure.plans[meeting.plan as usize],
+            swings: other.swings.map(|swing| swing as f32),
             holds: meeting.holds,
             axis_m: [word_of(&gait.axis_m[0], of_step), word_of(&gait.axis_m[1], of_step)],
             own: [word_of(&gait.own[0], of_step), word_of(&gait.own[1], of_step)],
@@ -126,6 +127,8 @@ struct FromAbove<'a> {
     base_m: [f32; 2],
     reach_m: f32,
     plan: &'a Plan,
+    /// Factors on how far the arms swing, right and left.
+    swings: [f32; 2],
     holds: bool,
     axis_m: [&'a [f32; WORD]; 2],
     own: [&'a [f32; WORD]; 2],
@@ -217,8 +220,9 @@ impl FromAbove<'_> {
             let height_m = self.height_m[k];
             let arm = |side: f32| {
                 let end = |[fixed, swings, right, left]: [f32; 4]| {
-                    let out = if side > 0.0 { left } else { right };
-                    let forward = fixed * self.swing_hz[k] + swings * side * self.wave_hz[k];
+                    let i = usize::from(side > 0.0);
+                    let (out, swing) = ([right, left][i], self.swings[i]);
+                    let forward = swing * (fixed * self.swing_hz[k] + swings * side * self.wave_hz[k]);
                     ahead[k] * forward + aside[k] * side * out
                 };
                 let [a, b, c] = [end(plan.joints[0]), end(plan.joints[1]), end(plan.joints[2])];

@@ -12,7 +12,7 @@ use super::phases::Phases;
 use super::spread::Spread;
 use super::steps::{heading_at, position_at};
 use crate::forecast::Forecast;
-use crate::gait::{self, FOREMOST_RAD, GaitPhase, LEFTMOST_RAD, WALKS_FROM_MPS, sway_share};
+use crate::gait::{self, FOREMOST_RAD, GaitPhase, HAND_SWING, LEFTMOST_RAD, WALKS_FROM_MPS, sway_share};
 use crate::geometry::DVec2;
 use crate::site::{Hall, Ue};
 use crate::track::Track;
@@ -67,6 +67,9 @@ pub(crate) struct Trajectories {
     pub(crate) device_m: [Vec<f32>; 3],
     speed_mps: Vec<f32>,
     phase: Option<GaitPhase>,
+    /// Factors on how far arms swing on the mean, right and left; samples have that, and a share `swing_by` more or less at most.
+    pub(super) swings: [f64; 2],
+    swing_by: f64,
     /// Phases of even shares, in their order.
     even_rad: Vec<f32>,
     pub(super) gait: Gait,
@@ -112,6 +115,8 @@ impl Trajectories {
         self.track = track.id;
         self.part_of = track.part_of;
         self.phase = Some(track.gait);
+        let [left, right] = track.gait.hand_swing.map(|swing| swing / HAND_SWING);
+        (self.swings, self.swing_by) = ([right, left], swing_by(&track.gait));
         self.mean_m = std::array::from_fn(|s| position_at(track, forecast, s));
         self.ahead = std::array::from_fn(|s| DVec2::from_angle(heading_at(track, forecast, s)));
         self.start(draws, &root(&forecast.coupling.state));
@@ -253,7 +258,9 @@ impl Trajectories {
         self.heights_m = [least_m, largest(&self.height_m)].map(f64::from);
         self.per_height = self.heights_m.map(|height_m| 1.0 / height_m);
         let (height_m, width) = (self.heights_m[1], f64::from(largest(&self.width_scale)).max(1.0));
-        let fastest_hz = body::relative_speed_hz(f64::from(largest(&self.speed_mps)), height_m);
+        // Arms that swing farther are as those of somebody who is faster.
+        let swing = self.swings[0].abs().max(self.swings[1].abs()) * (1.0 + self.swing_by);
+        let fastest_hz = swing * body::relative_speed_hz(f64::from(largest(&self.speed_mps)), height_m);
         self.top = figure.top();
         self.reach_of_m.clear();
         let arms: [f64; RODS] = std::array::from_fn(|i| {
@@ -283,14 +290,13 @@ impl Trajectories {
         for by_sample in [&mut gait.swing_hz, &mut gait.sway_m, &mut gait.step[0], &mut gait.phase[0]] {
             by_sample.resize(n, 0.0);
         }
-        let still_share = figure.still_share as f32;
         let (speed_mps, height_m) = (&self.speed_mps[..n], &self.height_m[..n]);
         let (swing_hz, sway_m) = (&mut gait.swing_hz[..n], &mut gait.sway_m[..n]);
         let (step_rad, arm_swing) = (&mut gait.step[0][..n], &draws.arm_swing[..n]);
         for k in 0..n {
             let (speed_mps, height_m) = (f64::from(speed_mps[k]), f64::from(height_m[k]));
             let speed_hz = body::relative_speed_hz(speed_mps, height_m);
-            swing_hz[k] = if arm_swing[k] < still_share { 0.0 } else { speed_hz as f32 };
+            swing_hz[k] = (speed_hz * swing_of(self.swing_by, arm_swing[k])) as f32;
             sway_m[k] = (sway_share(speed_hz) * height_m) as f32;
             step_rad[k] = (gait::stride_hz(speed_mps, height_m) * RAD_OF_STRIDES) as f32;
         }
@@ -353,6 +359,19 @@ impl Gait {
     }
 }
 
+/// How much arms may swing more or less than on the mean, as a share: evenly up to so much, so that the standard deviation is right.
+fn swing_by(gait: &GaitPhase) -> f64 {
+    let [left, right] = gait.hand_swing.map(|swing| swing.max(0.5 * HAND_SWING));
+    let [left_sigma, right_sigma] = gait.hand_swing_sigma;
+    (3.0_f64.sqrt() * (left_sigma + right_sigma) / (left + right)).min(1.0)
+}
+
+/// The factor on the mean swing of a sample, by its even draw.
+#[inline(always)]
+fn swing_of(swing_by: f64, even: f32) -> f64 {
+    1.0 + swing_by * (2.0 * f64::from(even) - 1.0)
+}
+
 #[inline(always)]
 fn renew(values: &mut Vec<f32>, new: impl Iterator<Item = f32>) {
     values.clear();
@@ -380,7 +399,7 @@ fn root<const N: usize>(a: &[[f64; N]; N]) -> [[f64; N]; N] {
 #[cfg(test)]
 impl Trajectories {
     /// How a sample stands or walks at a step, for bodies that are asked one by one.
-    pub(super) fn posture(&self, draws: &Draws, still_share: f64, step: usize, k: usize) -> body::Posture {
+    pub(super) fn posture(&self, draws: &Draws, step: usize, k: usize) -> body::Posture {
         let (speed_mps, height_m) = (f64::from(self.speed_mps[k]), f64::from(self.height_m[k]));
         let phases = Phases::new(&self.phase.unwrap_or(GaitPhase::UNKNOWN));
         let walked_rad = gait::stride_hz(speed_mps, height_m) * RAD_OF_STRIDES * step as f64;
@@ -392,7 +411,7 @@ impl Trajectories {
             width_scale: f64::from(self.width_scale[k]),
             speed_mps,
             phase_rad: phases.at(f64::from(draws.phase[k])) + walked_rad,
-            arm_swing: if f64::from(draws.arm_swing[k]) < still_share { 0.0 } else { 1.0 },
+            arm_swing: self.swings.map(|swing| swing * swing_of(self.swing_by, draws.arm_swing[k])),
         }
     }
 }

@@ -30,7 +30,7 @@ pub enum Mechanism {
     StandingModel,
     /// Stage 1: the sway of the body followed; plainest: more noise.
     Sway,
-    /// Stage 1: the phase of the gait from arms and legs; plainest: any phase.
+    /// Stage 1: the phase of the gait and how far each hand swings; plainest: any phase, and hands that swing as most do.
     LimbPhase,
     /// Stage 1: how tall a person is; plainest: as tall as adults on the mean.
     Height,

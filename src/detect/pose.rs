@@ -17,6 +17,8 @@ pub const SWING_UNIT: f64 = 0.1;
 const OFFSET_LIMIT_M: f64 = 0.5;
 /// Nor believed without end, nor be worth nothing: logarithms of variances in units.
 pub const LOG_VARIANCE: (f64, f64) = (-5.0, 4.0);
+/// The same of how far hands swing: many are quite still, and whoever is sure of that learns nothing else.
+pub const SWING_LOG_VARIANCE: (f64, f64) = (-2.0, 4.0);
 
 /// Steps to the likeliest heading.
 const NEWTON_STEPS: usize = 4;
@@ -75,9 +77,10 @@ pub fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
         log_right,
     ] = network.outputs(view);
     let offset_m = (DVec2::new(along, across) * UNIT_M).clamp_length_max(OFFSET_LIMIT_M);
-    let bounded = |log: f64| log.clamp(LOG_VARIANCE.0, LOG_VARIANCE.1).exp();
-    let [along_m2, across_m2] =
-        [log_variance_along, log_variance_across].map(|log| bounded(log) * UNIT_M * UNIT_M);
+    let [along_m2, across_m2] = [log_variance_along, log_variance_across]
+        .map(|log| log.clamp(LOG_VARIANCE.0, LOG_VARIANCE.1).exp() * UNIT_M * UNIT_M);
+    let swing_sigma =
+        |log: f64| (0.5 * log.clamp(SWING_LOG_VARIANCE.0, SWING_LOG_VARIANCE.1)).exp() * SWING_UNIT;
     let (x, y) = (view.along, view.across);
     let xy = along_m2 * x.x * x.y + across_m2 * y.x * y.y;
     Pose {
@@ -91,9 +94,7 @@ pub fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
             phase_rad: f64::atan2(sin, cos) + view.phase_of_mirror_rad(),
             concentration: cos.hypot(sin),
             hand_swing: view.sides([left, right]).map(|swing| swing * SWING_UNIT),
-            hand_swing_variance: view
-                .sides([log_left, log_right])
-                .map(|log| bounded(log) * SWING_UNIT * SWING_UNIT),
+            hand_swing_sigma: view.sides([log_left, log_right]).map(swing_sigma),
         }),
     }
 }

@@ -321,7 +321,7 @@ impl Person {
             width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m,
             canopy,
-            gait: self.stride.phase(velocity_mps.length()),
+            gait: self.stride.gait(velocity_mps.length()),
             points: self.points,
             confirmed: self.confirmed
                 && !self.origin.is_furniture(time_ns)

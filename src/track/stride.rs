@@ -3,19 +3,45 @@
 use std::f64::consts::TAU;
 
 use super::remembered::{Remembered, Words};
-use crate::gait::{GaitPhase, WALKS_FROM_MPS, stride_hz};
+use crate::gait::{GaitPhase, HAND_SWING, HAND_SWING_SIGMA, WALKS_FROM_MPS, stride_hz};
 use crate::geometry::DVec2;
 
 /// People of one height and speed do not keep one pace: so fast the phase spreads.
 const PACE_RAD2PS: f64 = 0.15;
+/// Frames follow each other faster than hands swing: as many in a row count as one.
+const FRAMES_ALIKE: f64 = 4.0;
+/// A hand that swings is put to something, or let go, within about this time.
+const LASTS_S: f64 = 30.0;
 
-/// A von Mises distribution of the phase: its cosine and sine times the concentration, which add up over frames.
+/// How somebody walks.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Stride(DVec2);
+pub(super) struct Stride {
+    /// A von Mises distribution of the phase: its cosine and sine times the concentration, which add up over frames.
+    phase: DVec2,
+    /// Of the left and the right hand.
+    hands: [Swing; 2],
+}
+
+/// How far a hand swings, and the variance of that: see [`GaitPhase::hand_swing`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Swing {
+    mean: f64,
+    variance: f64,
+}
+
+impl Default for Swing {
+    fn default() -> Self {
+        Self { mean: HAND_SWING, variance: HAND_SWING_SIGMA.powi(2) }
+    }
+}
 
 impl Remembered for Stride {
     fn visit(&mut self, words: &mut impl Words) {
-        words.vec2(&mut self.0);
+        words.vec2(&mut self.phase);
+        for hand in &mut self.hands {
+            words.f64(&mut hand.mean);
+            words.f64(&mut hand.variance);
+        }
     }
 }
 
@@ -24,24 +50,34 @@ impl Stride {
     pub(super) fn predict(&mut self, speed_mps: f64, height_m: f64, dt_s: f64) {
         if dt_s > 0.0 {
             let walked = DVec2::from_angle(TAU * stride_hz(speed_mps, height_m) * dt_s);
-            self.0 = self.0.rotate(walked) / (1.0 + self.0.length() * PACE_RAD2PS * dt_s);
+            self.phase = self.phase.rotate(walked) / (1.0 + self.phase.length() * PACE_RAD2PS * dt_s);
+            let spread = HAND_SWING_SIGMA.powi(2);
+            for hand in &mut self.hands {
+                hand.variance = (hand.variance + spread * dt_s / LASTS_S).min(spread);
+            }
         }
     }
 
     /// Takes what a frame tells.
     pub(super) fn see(&mut self, gait: &GaitPhase) {
-        self.0 += DVec2::from_angle(gait.phase_rad) * gait.concentration;
+        self.phase += DVec2::from_angle(gait.phase_rad) * gait.concentration;
+        for (i, hand) in self.hands.iter_mut().enumerate() {
+            let gain = hand.variance / (hand.variance + FRAMES_ALIKE * gait.hand_swing_sigma[i].powi(2));
+            hand.mean += gain * (gait.hand_swing[i] - hand.mean);
+            hand.variance *= 1.0 - gain;
+        }
     }
 
-    /// The phase of somebody who walks so fast.
-    pub(super) fn phase(&self, speed_mps: f64) -> GaitPhase {
-        if speed_mps < WALKS_FROM_MPS || self.0 == DVec2::ZERO {
+    /// The gait of somebody who walks so fast.
+    pub(super) fn gait(&self, speed_mps: f64) -> GaitPhase {
+        if speed_mps < WALKS_FROM_MPS {
             return GaitPhase::UNKNOWN;
         }
         GaitPhase {
-            phase_rad: self.0.to_angle().rem_euclid(TAU),
-            concentration: self.0.length(),
-            ..GaitPhase::UNKNOWN
+            phase_rad: self.phase.to_angle().rem_euclid(TAU),
+            concentration: self.phase.length(),
+            hand_swing: self.hands.map(|hand| hand.mean),
+            hand_swing_sigma: self.hands.map(|hand| hand.variance.sqrt()),
         }
     }
 }
@@ -65,7 +101,7 @@ mod tests {
             phase_rad += TAU * SPEED_MPS * 0.1 / stride_m(SPEED_MPS, HEIGHT_M);
             stride.see(&GaitPhase { phase_rad, concentration, ..GaitPhase::UNKNOWN });
         }
-        (stride.phase(SPEED_MPS), phase_rad)
+        (stride.gait(SPEED_MPS), phase_rad)
     }
 
     #[test]
@@ -73,18 +109,33 @@ mod tests {
         let (gait, phase_rad) = walked(2.0);
         let off_rad = (gait.phase_rad - phase_rad + PI).rem_euclid(TAU) - PI;
         assert!(off_rad.abs() < 1e-9 && (4.0..30.0).contains(&gait.concentration), "{off_rad} {gait:?}");
-        assert_eq!(walked(0.0).0, GaitPhase::UNKNOWN);
+        assert_eq!(walked(0.0).0.concentration, 0.0);
     }
 
     #[test]
     fn the_phase_of_who_walks_out_of_sight_is_forgotten() {
-        let mut stride = Stride(DVec2::new(20.0, 0.0));
+        let mut stride = Stride { phase: DVec2::new(20.0, 0.0), ..Stride::default() };
         stride.predict(SPEED_MPS, HEIGHT_M, 10.0);
-        assert!(stride.phase(SPEED_MPS).concentration < 0.7, "{stride:?}");
+        assert!(stride.gait(SPEED_MPS).concentration < 0.7, "{stride:?}");
     }
 
     #[test]
     fn who_stands_has_no_phase() {
-        assert_eq!(Stride(DVec2::new(20.0, 0.0)).phase(0.1), GaitPhase::UNKNOWN);
+        let stride = Stride { phase: DVec2::new(20.0, 0.0), ..Stride::default() };
+        assert_eq!(stride.gait(0.1), GaitPhase::UNKNOWN);
+    }
+    #[test]
+    fn a_hand_that_is_still_is_learned_beside_one_that_swings_and_forgotten_in_the_end() {
+        let mut stride = Stride::default();
+        let seen = GaitPhase { hand_swing: [0.0, 0.12], hand_swing_sigma: [0.04; 2], ..GaitPhase::UNKNOWN };
+        for _ in 0..50 {
+            stride.predict(SPEED_MPS, HEIGHT_M, 0.1);
+            stride.see(&seen);
+        }
+        let gait = stride.gait(SPEED_MPS);
+        assert!(gait.hand_swing[0] < 0.02 && gait.hand_swing[1] > 0.1, "{gait:?}");
+        assert!(gait.hand_swing_sigma[0] < 0.4 * HAND_SWING_SIGMA, "{gait:?}");
+        (0..1000).for_each(|_| stride.predict(SPEED_MPS, HEIGHT_M, 0.1));
+        assert_eq!(stride.gait(SPEED_MPS).hand_swing_sigma, [HAND_SWING_SIGMA; 2]);
     }
 }

@@ -435,6 +435,12 @@ impl Message for Track {
         self.canopy = canopy.map(Canopy::of_numbers);
         f.f64("gait_phase_rad", &mut self.gait.phase_rad);
         f.f64("gait_concentration", &mut self.gait.concentration);
+        let [left, right] = &mut self.gait.hand_swing;
+        f.f64("hand_swing_left", left);
+        f.f64("hand_swing_right", right);
+        let [left, right] = &mut self.gait.hand_swing_sigma;
+        f.f64("hand_swing_left_sigma", left);
+        f.f64("hand_swing_right_sigma", right);
         f.u32("points", &mut self.points);
         f.bool("confirmed", &mut self.confirmed);
         self.part_of = maybe(f, "is_part", self.part_of, |f, id| f.u64("part_of", id));

@@ -235,6 +235,10 @@ fn track(row: &TrackRow, site: &Site) -> Track {
     track.canopy = row.canopy();
     put(&mut track.gait.phase_rad, row.gait_phase_rad);
     put(&mut track.gait.concentration, row.gait_concentration);
+    for i in 0..2 {
+        put(&mut track.gait.hand_swing[i], row.hand_swing[i]);
+        put(&mut track.gait.hand_swing_sigma[i], row.hand_swing_sigma[i]);
+    }
     (track.points, track.confirmed, track.part_of) = (row.points, row.confirmed, row.part_of);
     track.stand_up(site.hall.floor_m(track.position_m));
     track

@@ -8,6 +8,7 @@ use umbracast::blockage::Chance;
 use umbracast::decide::Action;
 use umbracast::detect::Detection;
 use umbracast::detect::LEVELS;
+use umbracast::gait::GaitPhase;
 use umbracast::geometry::{Aabb, Obb};
 use umbracast::radio::{Binding, Surface};
 use umbracast::track::{Canopy, Track};
@@ -101,6 +102,8 @@ pub struct TrackRow {
     pub canopy_m: [Option<f64>; 5],
     pub gait_phase_rad: f64,
     pub gait_concentration: f64,
+    pub hand_swing: [f64; 2],
+    pub hand_swing_sigma: [f64; 2],
     pub points: u32,
     pub confirmed: bool,
     /// Whose thing this is, a track; null for people.
@@ -114,6 +117,16 @@ pub struct TrackRow {
 }
 
 impl TrackRow {
+    /// How it walks.
+    pub fn gait(&self) -> GaitPhase {
+        GaitPhase {
+            phase_rad: self.gait_phase_rad,
+            concentration: self.gait_concentration,
+            hand_swing: self.hand_swing,
+            hand_swing_sigma: self.hand_swing_sigma,
+        }
+    }
+
     /// What is carried over the head, if all its numbers are there.
     pub fn canopy(&self) -> Option<Canopy> {
         let numbers = self.canopy_m.map(|m| m.unwrap_or(f64::NAN));
@@ -395,6 +408,8 @@ pub fn of_track(frame: u64, time_ns: i64, track: &Track) -> TrackRow {
         canopy_m: track.canopy.map_or([None; 5], |canopy| canopy.numbers().map(Some)),
         gait_phase_rad: track.gait.phase_rad,
         gait_concentration: track.gait.concentration,
+        hand_swing: track.gait.hand_swing,
+        hand_swing_sigma: track.gait.hand_swing_sigma,
         points: track.points,
         confirmed: track.confirmed,
         part_of: track.part_of,

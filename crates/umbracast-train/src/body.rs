@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use umbracast::blockage::body::{self, Posture};
 use umbracast::blockage::probability::Phases;
 use umbracast::blockage::{BodyModel, Numbers};
-use umbracast::gait::GaitPhase;
+use umbracast::gait::{GaitPhase, HAND_SWING};
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::track::WIDTH_SCALE_SIGMA;
 use umbracast::{Config, Error};
@@ -33,8 +33,8 @@ struct Case {
     access_point: u32,
     start_m: DVec3,
     ue_m: DVec3,
-    /// With how high the floor is that each stands on.
-    near: Vec<(PeopleRow, Phases, f64)>,
+    /// With how far the right and the left arm swing, beside usual ones, and how high the floor is that each stands on.
+    near: Vec<(PeopleRow, Phases, [f64; 2], f64)>,
     blocked: bool,
 }
 
@@ -89,15 +89,10 @@ fn toml(body: &mut BodyModel) -> String {
         )
     });
     let slices: String = slices.collect();
-    let still_share = body.arms.still_share;
     let others = fields(body).into_iter().filter(|(name, _)| !name.starts_with("slice"));
     let others: Vec<String> = others.map(|(name, value)| format!("{name} = {value:.4}\n")).collect();
     let (sways, arms) = others.split_at(SWAYS);
-    format!(
-        "slices = [\n{slices}]\n{}\n[arms]\n{}still_share = {still_share:?}\n",
-        sways.concat(),
-        arms.concat()
-    )
+    format!("slices = [\n{slices}]\n{}\n[arms]\n{}", sways.concat(), arms.concat())
 }
 
 /// How many of the fields that are no slice's are the trunk's.
@@ -150,12 +145,7 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
         let off_m = |t: &&TrackRow| (t.x_m - p.x_m).hypot(t.y_m - p.y_m);
         let all = tracks.get(&(p.scene, p.frame))?.iter();
         let own = all.filter(|t| t.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
-        let gait = GaitPhase {
-            phase_rad: own.gait_phase_rad,
-            concentration: own.gait_concentration,
-            ..GaitPhase::UNKNOWN
-        };
-        (off_m(&own) < OWN_M).then_some((gait, own.height_m))
+        (off_m(&own) < OWN_M).then_some((own.gait(), own.height_m))
     };
     let mut cases = Vec::new();
     for link in tables::read::<PeopleLinkRow>(directory, &names)? {
@@ -174,9 +164,10 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
         let with_phase = |p: &PeopleRow| {
             let (gait, height_m) = known(p).unwrap_or((GaitPhase::UNKNOWN, p.height_m));
             let floor_m = config.site.hall.floor_m(DVec2::new(p.x_m, p.y_m));
-            (PeopleRow { height_m, ..*p }, Phases::new(&gait), floor_m)
+            let [left, right] = gait.hand_swing.map(|swing| swing / HAND_SWING);
+            (PeopleRow { height_m, ..*p }, Phases::new(&gait), [right, left], floor_m)
         };
-        let near: Vec<(PeopleRow, Phases, f64)> = all.iter().filter(near).map(with_phase).collect();
+        let near: Vec<_> = all.iter().filter(near).map(with_phase).collect();
         if !near.is_empty() {
             cases.push(Case { access_point: link.access_point, start_m, ue_m, near, blocked: link.blocked });
         }
@@ -187,7 +178,7 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
 /// Chance that the link is blocked.
 fn probability(body: &BodyModel, numbers: &Numbers, case: &Case) -> f64 {
     let hits = (0..POSTURES).filter(|&k| {
-        case.near.iter().any(|(p, phases, floor_m)| {
+        case.near.iter().any(|(p, phases, arm_swing, floor_m)| {
             let down = DVec3::NEG_Z * *floor_m;
             let share = ((k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person)).fract();
             let posture = Posture {
@@ -196,7 +187,7 @@ fn probability(body: &BodyModel, numbers: &Numbers, case: &Case) -> f64 {
                         * NORMAL[(k + p.person as usize) % POSTURES],
                 speed_mps: p.vx_mps.hypot(p.vy_mps),
                 phase_rad: phases.at(share),
-                arm_swing: 1.0,
+                arm_swing: *arm_swing,
                 ..Posture::standing(DVec2::new(p.x_m, p.y_m), DVec2::from_angle(p.heading_rad), p.height_m)
             };
             body::blocks(body, &posture, case.start_m + down, case.ue_m + down)

@@ -43,11 +43,8 @@ fn card(network: &PointNetwork, training: &[Seen], held_out: &[Seen], commit: &s
     let poses = || held_out.iter().map(|s| (pose(network, &s.view), s));
     let headings: Vec<f64> = poses().filter_map(|seen| off_rad(&seen)).collect();
     let off_swing = |(pose, s): &(Pose, &Seen)| {
-        let (gait, [left, right]) = (pose.gait?, s.hand_swing?);
-        Some([
-            (gait.hand_swing[0] - left, gait.hand_swing_variance[0]),
-            (gait.hand_swing[1] - right, gait.hand_swing_variance[1]),
-        ])
+        let (gait, swing) = (pose.gait?, s.hand_swing?);
+        Some([0, 1].map(|i| (gait.hand_swing[i] - swing[i], gait.hand_swing_sigma[i])))
     };
     let swings: Vec<(f64, f64)> = poses().filter_map(|seen| off_swing(&seen)).flatten().collect();
     let all_swings: Vec<f64> = training.iter().filter_map(|s| s.hand_swing).flatten().collect();
@@ -99,7 +96,7 @@ fn card(network: &PointNetwork, training: &[Seen], held_out: &[Seen], commit: &s
         mean_swing,
         swing_sigma,
         mean(swings.iter().map(|(off, _)| off * off)).sqrt(),
-        mean(swings.iter().map(|(off, variance)| off * off / variance)),
+        mean(swings.iter().map(|(off, sigma)| (off / sigma).powi(2))),
     )
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use umbracast::detect::point_network::OUTPUTS;
-use umbracast::detect::pose::{LOG_VARIANCE, SWING_UNIT, UNIT_M};
+use umbracast::detect::pose::{LOG_VARIANCE, SWING_LOG_VARIANCE, SWING_UNIT, UNIT_M};
 use umbracast::detect::pose_view::PoseView;
 use umbracast::geometry::DVec2;
 
@@ -64,7 +64,7 @@ impl Truth {
             to_outputs[first..first + to_part.len()].copy_from_slice(to_part);
         };
         let [a, b, c, d, e, f, g, h, cos, sin, left, right, log_left, log_right] = *outputs;
-        let (of_offset, to_offset) = loss_of_pair(self.off, [a, b, c, d]);
+        let (of_offset, to_offset) = loss_of_pair(self.off, [a, b, c, d], LOG_VARIANCE);
         add(0, (of_offset, &to_offset));
         if let Some(rad) = self.heading_rad {
             let (of_heading, to_heading) = loss_of_angle(rad, [e, f, g, h]);
@@ -76,18 +76,19 @@ impl Truth {
             add(8, (of_phase, &to_phase[..2]));
         }
         if let Some(swing) = self.hand_swing {
-            let (of_swing, to_swing) = loss_of_pair(swing, [left, right, log_left, log_right]);
+            let (of_swing, to_swing) =
+                loss_of_pair(swing, [left, right, log_left, log_right], SWING_LOG_VARIANCE);
             add(10, (of_swing, &to_swing));
         }
         (loss, to_outputs)
     }
 }
 
-/// Of two numbers with independent errors: the outputs are both means, then the logarithms of both variances.
-fn loss_of_pair(truth: [f64; 2], outputs: [f64; 4]) -> (f64, [f64; 4]) {
+/// Of two numbers with independent errors: the outputs are both means, then the logarithms of both variances, which have bounds.
+fn loss_of_pair(truth: [f64; 2], outputs: [f64; 4], (least, most): (f64, f64)) -> (f64, [f64; 4]) {
     let (mut loss, mut to_outputs) = (0.0, [0.0; 4]);
     for k in 0..2 {
-        let log_variance = outputs[k + 2].clamp(LOG_VARIANCE.0, LOG_VARIANCE.1);
+        let log_variance = outputs[k + 2].clamp(least, most);
         let weight = (-log_variance).exp();
         let error = (outputs[k] - truth[k]).clamp(-PULL_LIMIT, PULL_LIMIT);
         loss += 0.5 * (error * error * weight + log_variance);

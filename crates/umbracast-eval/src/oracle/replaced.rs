@@ -273,11 +273,7 @@ fn track_of(row: &TrackRow) -> Track {
         width_scale_sigma: row.width_scale_sigma,
         outline_m: row.outline_m,
         canopy: row.canopy(),
-        gait: GaitPhase {
-            phase_rad: row.gait_phase_rad,
-            concentration: row.gait_concentration,
-            ..GaitPhase::UNKNOWN
-        },
+        gait: row.gait(),
         points: row.points,
         confirmed: row.confirmed,
         part_of: row.part_of,

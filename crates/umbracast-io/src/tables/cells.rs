@@ -223,6 +223,14 @@ impl Row for TrackRow {
         }
         see(plain("gait_phase_rad"), Cell::F64(&mut self.gait_phase_rad));
         see(plain("gait_concentration"), Cell::F64(&mut self.gait_concentration));
+        for (name, swing) in ["hand_swing_left", "hand_swing_right"].into_iter().zip(&mut self.hand_swing) {
+            see(plain(name), Cell::F64(swing));
+        }
+        for (name, sigma) in
+            ["hand_swing_left_sigma", "hand_swing_right_sigma"].into_iter().zip(&mut self.hand_swing_sigma)
+        {
+            see(plain(name), Cell::F64(sigma));
+        }
         see(plain("points"), Cell::U32(&mut self.points));
         see(plain("confirmed"), Cell::Bool(&mut self.confirmed));
         see(plain("part_of"), Cell::MaybeU64(&mut self.part_of));

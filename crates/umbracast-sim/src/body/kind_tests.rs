@@ -195,6 +195,29 @@ fn who_gestures_reaches_out_while_standing_and_lets_the_hands_hang_while_walking
 }
 
 #[test]
+fn hands_swing_with_the_walk_and_hang_still_of_who_gestures_or_has_them_in_pockets() {
+    let swings = |kind: Kind| -> Vec<f64> {
+        let of = |seed| walker(kind, seed).hand_swing_at(20_000_000 * 100).unwrap();
+        (0..20).flat_map(of).collect()
+    };
+    let mean = |all: Vec<f64>| all.iter().sum::<f64>() / all.len() as f64;
+    let plain = swings(Kind::Plain);
+    assert!(plain.iter().all(|swing| (0.0..0.3).contains(swing)), "{plain:.2?}");
+    assert!((0.07..0.16).contains(&mean(plain)));
+    for kind in [Kind::Gesturing, Kind::Pockets, Kind::Wheelchair] {
+        let still = swings(kind);
+        assert!(still.iter().all(|swing| swing.abs() < 0.03), "{kind:?} {still:.2?}");
+    }
+    let [left, right]: [Vec<f64>; 2] = [0, 1].map(|side| {
+        (0..20).map(|seed| walker(Kind::Phone, seed).hand_swing_at(2_000_000_000).unwrap()[side]).collect()
+    });
+    assert!(
+        left.iter().zip(&right).all(|(l, r)| l.abs().min(r.abs()) < 0.03 && l.max(*r) > 0.03),
+        "{left:.2?} {right:.2?}"
+    );
+}
+
+#[test]
 fn a_child_is_small_and_takes_short_steps() {
     for seed in 0..30 {
         let (child, adult) = (walker(Kind::Child, seed), walker(Kind::Plain, seed));
