@@ -26,13 +26,13 @@ const FULL_SWAY_HZ: f64 = 0.5;
 /// How somebody walks: where in the stride, a von Mises distribution, and how far each hand swings.
 ///
 /// ```
-/// use umbracast::track::GaitPhase;
+/// use umbracast::track::Gait;
 ///
 /// // Who stands has none.
-/// assert_eq!(GaitPhase::UNKNOWN.concentration, 0.0);
+/// assert_eq!(Gait::UNKNOWN.concentration, 0.0);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GaitPhase {
+pub struct Gait {
     /// Since the right heel touched the floor; a stride is a full turn.
     pub phase_rad: f64,
     /// 0: nothing is known. From 2 on about one over the variance.
@@ -44,7 +44,7 @@ pub struct GaitPhase {
     pub hand_swing_sigma: [f64; 2],
 }
 
-impl GaitPhase {
+impl Gait {
     /// Any phase, and hands of whom nothing is known.
     pub const UNKNOWN: Self = Self {
         phase_rad: 0.0,
@@ -52,6 +52,12 @@ impl GaitPhase {
         hand_swing: [HAND_SWING; 2],
         hand_swing_sigma: [HAND_SWING_SIGMA; 2],
     };
+}
+
+impl Default for Gait {
+    fn default() -> Self {
+        Self::UNKNOWN
+    }
 }
 
 /// Speed over the height of the hips.

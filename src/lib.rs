@@ -42,7 +42,7 @@ pub mod lidar;
 pub mod config;
 #[doc(hidden)] // For who calls the stages one by one, as `Pipeline` does.
 pub mod mounting;
-#[doc(hidden)] // What walking bodies have in common, for tracks, casts and their scores; users meet `track::GaitPhase`.
+#[doc(hidden)] // What walking bodies have in common, for tracks, casts and their scores; users meet `track::Gait`.
 pub mod gait;
 pub mod detect;
 pub mod track;

@@ -4,7 +4,7 @@ use umbracast::blockage::body_model::{Arms, BodyModel, Slice};
 use umbracast::blockage::{Blockage, Caster, Numbers};
 use umbracast::config::BlockageConfig;
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
-use umbracast::gait::GaitPhase;
+use umbracast::gait::Gait;
 use umbracast::geometry::{Aabb, DVec2, DVec3, Obb};
 use umbracast::track::{Observed, Track};
 use umbracast::{Config, STEP_S, STEPS};
@@ -68,7 +68,7 @@ fn person(id: u64, position_m: DVec2, velocity_mps: DVec2, variance: [f64; 4]) -
         width_scale_sigma: 0.0,
         outline_m: Default::default(),
         canopy: None,
-        gait: GaitPhase::UNKNOWN,
+        gait: Gait::UNKNOWN,
         points: 30,
         confirmed: true,
         part_of: None,
@@ -179,11 +179,11 @@ fn arms_that_swing_make_a_walker_seen_from_the_side_block_sooner() {
         let setting = Setting { config: setting.config.clone(), numbers: setting.numbers.clone() };
         let (mut track, forecast) = person(1, DVec2::new(4.0, 0.33), DVec2::new(0.0, -speed_mps), [0.0; 4]);
         track.heading_rad = -std::f64::consts::FRAC_PI_2;
-        track.gait = GaitPhase { hand_swing, hand_swing_sigma: [0.0; 2], ..GaitPhase::UNKNOWN };
+        track.gait = Gait { hand_swing, hand_swing_sigma: [0.0; 2], ..Gait::UNKNOWN };
         let user = person(2, DVec2::new(8.0, 0.0), DVec2::ZERO, [0.0; 4]);
         cast(&setting, vec![(track, forecast), user])[1].p_now
     };
-    let usual = GaitPhase::UNKNOWN.hand_swing;
+    let usual = Gait::UNKNOWN.hand_swing;
     let (swinging, some, standing) = (p_now(usual, 1.2), p_now([usual[0], 0.0], 1.2), p_now(usual, 0.0));
     assert!(swinging > 0.2 && swinging < 0.9, "{swinging}");
     assert!(some > 0.3 * swinging && some < 0.7 * swinging, "{some} of {swinging}");

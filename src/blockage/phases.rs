@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::gait::GaitPhase;
+use crate::gait::Gait;
 
 /// Quantiles of the phase of a gait.
 #[derive(Debug, Clone)]
@@ -16,7 +16,7 @@ const PHASES: usize = 48;
 
 impl Phases {
     /// Of a von Mises distribution.
-    pub fn new(gait: &GaitPhase) -> Self {
+    pub fn new(gait: &Gait) -> Self {
         let width_rad = TAU / PHASES as f64;
         let densities: [f64; PHASES] = std::array::from_fn(|i| {
             let off_rad = (i as f64 + 0.5) * width_rad - PI;

@@ -7,7 +7,7 @@ use crate::blockage::body::blocks;
 use crate::blockage::counts::quantiles_s;
 use crate::blockage::{Caster, Chance};
 use crate::forecast::constant_velocity;
-use crate::gait::GaitPhase;
+use crate::gait::Gait;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 use crate::site::{AccessPoint, Pillar, Radio};
 use crate::track::Canopy;
@@ -44,11 +44,11 @@ fn somebody(id: u64, random: &mut Pcg64) -> Track {
         width_scale_sigma: 0.05,
         outline_m: Default::default(),
         canopy: None,
-        gait: GaitPhase {
+        gait: Gait {
             phase_rad: within(3.0),
             concentration: 1.0 + within(1.0),
             hand_swing: [0.1 + within(0.1), 0.1 + within(0.1)],
-            ..GaitPhase::UNKNOWN
+            ..Gait::UNKNOWN
         },
         points: 30,
         confirmed: true,

@@ -12,7 +12,7 @@ use super::phases::Phases;
 use super::spread::Spread;
 use super::steps::{heading_at, position_at};
 use crate::forecast::Forecast;
-use crate::gait::{self, FOREMOST_RAD, GaitPhase, HAND_SWING, LEFTMOST_RAD, WALKS_FROM_MPS, sway_share};
+use crate::gait::{self, FOREMOST_RAD, Gait, HAND_SWING, LEFTMOST_RAD, WALKS_FROM_MPS, sway_share};
 use crate::geometry::DVec2;
 use crate::site::{Hall, Ue};
 use crate::track::Track;
@@ -66,13 +66,13 @@ pub(crate) struct Trajectories {
     /// By sample: how far ahead of the axis, left of it, and above its mean height the device is. Empty where it is on the axis.
     pub(crate) device_m: [Vec<f32>; 3],
     speed_mps: Vec<f32>,
-    phase: Option<GaitPhase>,
+    of_track: Gait,
     /// Factors on how far arms swing on the mean, right and left; samples have that, and a share `swing_by` more or less at most.
     pub(super) swings: [f64; 2],
     swing_by: f64,
     /// Phases of even shares, in their order.
     even_rad: Vec<f32>,
-    pub(super) gait: Gait,
+    pub(super) gait: Walking,
     /// Of this person's outline.
     figure: Option<Figure>,
     /// Offset and drift of each sample at the step that is drawn.
@@ -81,7 +81,7 @@ pub(crate) struct Trajectories {
 
 /// How samples walk.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Gait {
+pub(super) struct Walking {
     /// By step and sample: the swaying axis of the trunk, from the step's mean.
     pub(super) axis_m: [Vec<f32>; 2],
     /// By step and sample: the unit vector that the trunk faces.
@@ -114,7 +114,7 @@ impl Trajectories {
         self.asked = numbers.samples;
         self.track = track.id;
         self.part_of = track.part_of;
-        self.phase = Some(track.gait);
+        self.of_track = track.gait;
         let [left, right] = track.gait.hand_swing.map(|swing| swing / HAND_SWING);
         (self.swings, self.swing_by) = ([right, left], swing_by(&track.gait));
         self.mean_m = std::array::from_fn(|s| position_at(track, forecast, s));
@@ -305,7 +305,7 @@ impl Trajectories {
         cos_sin(&mut gait.turn);
         // The shares of the phases are those of as many even ones, in any order.
         let asked = self.asked;
-        let phases = Phases::new(&self.phase.unwrap_or(GaitPhase::UNKNOWN));
+        let phases = Phases::new(&self.of_track);
         self.even_rad.clear();
         self.even_rad.extend(phases.even(asked).map(|rad| rad as f32));
         for (phase_rad, share) in gait.phase[0].iter_mut().zip(&draws.phase) {
@@ -322,7 +322,7 @@ impl Trajectories {
 /// Of the phase in a step, for each stride a second.
 const RAD_OF_STRIDES: f64 = std::f64::consts::TAU * STEP_S;
 
-impl Gait {
+impl Walking {
     /// One step of all samples; their phases go on to the next.
     #[inline(always)]
     fn walk_step(&mut self, figure: &Figure, step: usize, ahead: DVec2, [off_x, off_y]: [&[f32]; 2]) {
@@ -360,7 +360,7 @@ impl Gait {
 }
 
 /// How much arms may swing more or less than on the mean, as a share: evenly up to so much, so that the standard deviation is right.
-fn swing_by(gait: &GaitPhase) -> f64 {
+fn swing_by(gait: &Gait) -> f64 {
     let [left, right] = gait.hand_swing.map(|swing| swing.max(0.5 * HAND_SWING));
     let [left_sigma, right_sigma] = gait.hand_swing_sigma;
     (3.0_f64.sqrt() * (left_sigma + right_sigma) / (left + right)).min(1.0)
@@ -401,7 +401,7 @@ impl Trajectories {
     /// How a sample stands or walks at a step, for bodies that are asked one by one.
     pub(super) fn posture(&self, draws: &Draws, step: usize, k: usize) -> body::Posture {
         let (speed_mps, height_m) = (f64::from(self.speed_mps[k]), f64::from(self.height_m[k]));
-        let phases = Phases::new(&self.phase.unwrap_or(GaitPhase::UNKNOWN));
+        let phases = Phases::new(&self.of_track);
         let walked_rad = gait::stride_hz(speed_mps, height_m) * RAD_OF_STRIDES * step as f64;
         let off_m = [0, 1].map(|i| f64::from(self.off_m[i][step * self.samples + k]));
         body::Posture {

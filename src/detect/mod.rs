@@ -50,7 +50,7 @@ pub use pose::Facing;
 pub use shape::{BANDS, Moments, Shape};
 pub use split_merge::Clusterer;
 
-use crate::gait::GaitPhase;
+use crate::gait::Gait;
 use crate::geometry::{Aabb, DVec2, DVec3, Obb};
 use crate::site::Hall;
 
@@ -138,7 +138,7 @@ pub struct Detection {
     /// Which way somebody known faces who stands.
     pub facing: Option<Facing>,
     /// Where in the stride somebody known is who walks.
-    pub gait: Option<GaitPhase>,
+    pub gait: Option<Gait>,
     /// How far the body of somebody known reaches, by sensor and level.
     pub reaches: Vec<Reach>,
     /// How the points lie about the position, band by band, along the site's axes.

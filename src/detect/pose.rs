@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use super::point_network::PointNetwork;
 use super::pose_view::PoseView;
-use crate::gait::GaitPhase;
+use crate::gait::Gait;
 use crate::geometry::DVec2;
 
 /// Unit of the network's offsets.
@@ -35,7 +35,7 @@ pub struct Pose {
     /// Of who stands.
     pub facing: Option<Facing>,
     /// Of who walks.
-    pub gait: Option<GaitPhase>,
+    pub gait: Option<Gait>,
 }
 
 /// Which way a body faces, as one frame tells.
@@ -90,7 +90,7 @@ pub fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
             [xy, along_m2 * x.y * x.y + across_m2 * y.y * y.y],
         ],
         facing: view.stands().then(|| facing([a, b, c, d], view)),
-        gait: (!view.stands()).then(|| GaitPhase {
+        gait: (!view.stands()).then(|| Gait {
             phase_rad: f64::atan2(sin, cos) + view.phase_of_mirror_rad(),
             concentration: cos.hypot(sin),
             hand_swing: view.sides([left, right]).map(|swing| swing * SWING_UNIT),

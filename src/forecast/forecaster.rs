@@ -219,7 +219,7 @@ pub(super) mod tests {
             width_scale_sigma: 0.0,
             outline_m: Default::default(),
             canopy: None,
-            gait: crate::gait::GaitPhase::UNKNOWN,
+            gait: crate::gait::Gait::UNKNOWN,
             points: 30,
             confirmed: true,
             part_of: None,

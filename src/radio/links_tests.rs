@@ -29,7 +29,7 @@ pub(in crate::radio) fn somebody(id: u64, position_m: DVec2, velocity_mps: DVec2
         width_scale_sigma: 0.02,
         outline_m: Default::default(),
         canopy: None,
-        gait: crate::gait::GaitPhase::UNKNOWN,
+        gait: crate::gait::Gait::UNKNOWN,
         points: 30,
         confirmed: true,
         part_of: None,

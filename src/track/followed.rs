@@ -6,7 +6,7 @@ use super::outline::LevelOutline;
 use super::remembered::{Remembered, Words};
 use super::shape::Canopy;
 use crate::detect::LEVELS;
-use crate::gait::GaitPhase;
+use crate::gait::Gait;
 use crate::geometry::{Aabb, DVec2, Obb};
 
 /// Positions of the observation window: 10 frames (paper, section V-B).
@@ -57,7 +57,7 @@ pub struct Track {
     /// What is carried over the head, such as an umbrella.
     pub canopy: Option<Canopy>,
     /// Where in the stride, as arms and legs tell it.
-    pub gait: GaitPhase,
+    pub gait: Gait,
     /// Points of this frame's detection; 0 while it coasts.
     pub points: u32,
     /// False until the track has been seen often enough to be believed, while it has been out of sight so long that its

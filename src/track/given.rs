@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::followed::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
 use super::height::HEIGHT_MEAN_M;
 use crate::STEP_NS;
-use crate::gait::{GaitPhase, WALKS_FROM_MPS};
+use crate::gait::{Gait, WALKS_FROM_MPS};
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 /// What is taken of a position and a velocity of which nobody says how sure they are, one standard deviation of an axis: a good
@@ -54,7 +54,7 @@ impl Track {
             width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m: Default::default(),
             canopy: None,
-            gait: GaitPhase::UNKNOWN,
+            gait: Gait::UNKNOWN,
             points: 0,
             confirmed: true,
             part_of: None,

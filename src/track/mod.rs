@@ -30,7 +30,7 @@ mod given;
 mod mixture;
 mod paper;
 
-pub use crate::gait::GaitPhase;
+pub use crate::gait::Gait;
 pub use followed::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
 #[doc(hidden)] // For tracks that come over a wire, where stages are processes.
 pub use given::Windows;

@@ -11,7 +11,7 @@ use super::gaussian::State;
 use super::heading::Heading;
 use super::remembered::{PEOPLE_MAX, Remembered, Words};
 use crate::detect::Detection;
-use crate::gait::GaitPhase;
+use crate::gait::Gait;
 use crate::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 
 /// Added to the variances of position and velocity in each step, however long.
@@ -267,7 +267,7 @@ impl Person {
             width_scale_sigma: WIDTH_SCALE_SIGMA,
             outline_m: Default::default(),
             canopy: None,
-            gait: GaitPhase::UNKNOWN,
+            gait: Gait::UNKNOWN,
             points: self.points,
             confirmed: true,
             part_of: None,

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::remembered::{Remembered, Words};
-use crate::gait::{GaitPhase, HAND_SWING, HAND_SWING_SIGMA, WALKS_FROM_MPS, stride_hz};
+use crate::gait::{Gait, HAND_SWING, HAND_SWING_SIGMA, WALKS_FROM_MPS, stride_hz};
 use crate::geometry::DVec2;
 
 /// People of one height and speed do not keep one pace: so fast the phase spreads.
@@ -22,7 +22,7 @@ pub(super) struct Stride {
     hands: [Swing; 2],
 }
 
-/// How far a hand swings, and the variance of that: see [`GaitPhase::hand_swing`].
+/// How far a hand swings, and the variance of that: see [`Gait::hand_swing`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Swing {
     mean: f64,
@@ -59,7 +59,7 @@ impl Stride {
     }
 
     /// Takes what a frame tells.
-    pub(super) fn see(&mut self, gait: &GaitPhase) {
+    pub(super) fn see(&mut self, gait: &Gait) {
         self.phase += DVec2::from_angle(gait.phase_rad) * gait.concentration;
         for (i, hand) in self.hands.iter_mut().enumerate() {
             let gain = hand.variance / (hand.variance + FRAMES_ALIKE * gait.hand_swing_sigma[i].powi(2));
@@ -69,11 +69,11 @@ impl Stride {
     }
 
     /// The gait of somebody who walks so fast.
-    pub(super) fn gait(&self, speed_mps: f64) -> GaitPhase {
+    pub(super) fn gait(&self, speed_mps: f64) -> Gait {
         if speed_mps < WALKS_FROM_MPS {
-            return GaitPhase::UNKNOWN;
+            return Gait::UNKNOWN;
         }
-        GaitPhase {
+        Gait {
             phase_rad: self.phase.to_angle().rem_euclid(TAU),
             concentration: self.phase.length(),
             hand_swing: self.hands.map(|hand| hand.mean),
@@ -93,13 +93,13 @@ mod tests {
     const HEIGHT_M: f64 = 1.7;
 
     /// After a walk of 4 s of which each frame tells the phase with this concentration: what is known, and the truth.
-    fn walked(concentration: f64) -> (GaitPhase, f64) {
+    fn walked(concentration: f64) -> (Gait, f64) {
         let mut stride = Stride::default();
         let mut phase_rad: f64 = 0.0;
         for _ in 0..40 {
             stride.predict(SPEED_MPS, HEIGHT_M, 0.1);
             phase_rad += TAU * SPEED_MPS * 0.1 / stride_m(SPEED_MPS, HEIGHT_M);
-            stride.see(&GaitPhase { phase_rad, concentration, ..GaitPhase::UNKNOWN });
+            stride.see(&Gait { phase_rad, concentration, ..Gait::UNKNOWN });
         }
         (stride.gait(SPEED_MPS), phase_rad)
     }
@@ -122,12 +122,12 @@ mod tests {
     #[test]
     fn who_stands_has_no_phase() {
         let stride = Stride { phase: DVec2::new(20.0, 0.0), ..Stride::default() };
-        assert_eq!(stride.gait(0.1), GaitPhase::UNKNOWN);
+        assert_eq!(stride.gait(0.1), Gait::UNKNOWN);
     }
     #[test]
     fn a_hand_that_is_still_is_learned_beside_one_that_swings_and_forgotten_in_the_end() {
         let mut stride = Stride::default();
-        let seen = GaitPhase { hand_swing: [0.0, 0.12], hand_swing_sigma: [0.04; 2], ..GaitPhase::UNKNOWN };
+        let seen = Gait { hand_swing: [0.0, 0.12], hand_swing_sigma: [0.04; 2], ..Gait::UNKNOWN };
         for _ in 0..50 {
             stride.predict(SPEED_MPS, HEIGHT_M, 0.1);
             stride.see(&seen);

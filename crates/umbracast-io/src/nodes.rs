@@ -8,7 +8,7 @@ use umbracast::detect::{Moments, Point, Prior, Shape};
 use umbracast::forecast::{Coupling, Forecast, Gaussian2};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb, Pose};
 use umbracast::lidar::{Fan, SECTORS, View};
-use umbracast::track::{Canopy, GaitPhase, Observed, Track};
+use umbracast::track::{Canopy, Gait, Observed, Track};
 
 use crate::fields::{Fields, Message, index, matrix, maybe, schema, vec2, vec3};
 use crate::messages::Schema;
@@ -407,7 +407,7 @@ impl Message for Track {
             width_scale_sigma: 0.0,
             outline_m: Default::default(),
             canopy: None,
-            gait: GaitPhase::UNKNOWN,
+            gait: Gait::UNKNOWN,
             points: 0,
             confirmed: false,
             part_of: None,

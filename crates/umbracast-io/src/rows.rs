@@ -8,7 +8,7 @@ use umbracast::blockage::Chance;
 use umbracast::decide::Action;
 use umbracast::detect::Detection;
 use umbracast::detect::LEVELS;
-use umbracast::gait::GaitPhase;
+use umbracast::gait::Gait;
 use umbracast::geometry::{Aabb, Obb};
 use umbracast::radio::{Binding, Surface};
 use umbracast::track::{Canopy, Track};
@@ -118,8 +118,8 @@ pub struct TrackRow {
 
 impl TrackRow {
     /// How it walks.
-    pub fn gait(&self) -> GaitPhase {
-        GaitPhase {
+    pub fn gait(&self) -> Gait {
+        Gait {
             phase_rad: self.gait_phase_rad,
             concentration: self.gait_concentration,
             hand_swing: self.hand_swing,

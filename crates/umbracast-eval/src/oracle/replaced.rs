@@ -7,7 +7,7 @@ use umbracast::blockage::Caster;
 use umbracast::config::{BlockageConfig, BlockageMethod, BoxKind};
 use umbracast::forecast::constant_velocity::ACCELERATION_PSD_M2PS3;
 use umbracast::forecast::{Coupling, Forecast, Gaussian2, Weights, constant_velocity};
-use umbracast::gait::{GaitPhase, WALKS_FROM_MPS};
+use umbracast::gait::{Gait, WALKS_FROM_MPS};
 use umbracast::geometry::{Aabb, DMat3, DVec2, DVec3, Obb};
 use umbracast::site::Hall;
 use umbracast::track::{OBSERVED, Observed, Track, WIDTH_SCALE_SIGMA};
@@ -211,7 +211,7 @@ pub fn true_track(truth: &TruthIndex, row: &PeopleRow, (aabb, obb): (Aabb, Obb))
         width_scale_sigma: WIDTH_SCALE_SIGMA,
         outline_m: Default::default(),
         canopy: None,
-        gait: GaitPhase::UNKNOWN,
+        gait: Gait::UNKNOWN,
         points: row.returns,
         confirmed: true,
         part_of: None,
