@@ -63,7 +63,7 @@ fn card(network: &PointNetwork, training: &[Seen], held_out: &[Seen], commit: &s
     format!(
         "# Network of the pose of a body\n\n\
          From what the sensors saw of one body in one frame to where its axis stands, with the error's covariance, which way it \
-         faces if it stands, and where in the stride it is if it walks: up to {POINTS} points of {OF_POINT} numbers, each through \
+         faces if it stands, where in the stride it is and how far each hand swings if it walks: up to {POINTS} points of {OF_POINT} numbers, each through \
          {POINT_UNITS:?} units, then with {OF_BODY} numbers of the whole body through {BODY_UNITS:?} units, {OUTPUTS} outputs \
          (`src/detect/pose.rs`).\n\n\
          Written by `umbracast train pose`, commit {commit}.\n\n\
@@ -76,7 +76,7 @@ fn card(network: &PointNetwork, training: &[Seen], held_out: &[Seen], commit: &s
          | facing: front and back are not mistaken, of {} who stand | | {:.3} |\n\
          | off the line, either way, median | | {:.1} degrees |\n| 90 % | | {:.1} degrees |\n\
          | phase of the stride: off by an eighth at most, of {} who walk | | {:.3} |\n\
-         | how far hands swing, shares of the height for a speed of one hip height a second: mean of all, one standard deviation | {:.3}, {:.3} | |\n\
+         | how far hands swing: mean of all, one standard deviation | {:.3}, {:.3} | |\n\
          | this network's error, one standard deviation | | {:.3} |\n\
          | squared error over its variance (1 if honest) | | {:.2} |\n",
         scenes_listed(),
