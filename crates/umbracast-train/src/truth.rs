@@ -93,7 +93,10 @@ fn loss_of_pair(truth: [f64; 2], outputs: [f64; 4], (least, most): (f64, f64)) -
         let error = (outputs[k] - truth[k]).clamp(-PULL_LIMIT, PULL_LIMIT);
         loss += 0.5 * (error * error * weight + log_variance);
         to_outputs[k] = error * weight;
-        to_outputs[k + 2] = 0.5 * (1.0 - error * error * weight);
+        let to_log_variance = 0.5 * (1.0 - error * error * weight);
+        // What lies beyond a bound already is not moved farther: the layers below would grow without end for nothing.
+        let leaves = if to_log_variance > 0.0 { outputs[k + 2] < least } else { outputs[k + 2] > most };
+        to_outputs[k + 2] = if leaves { 0.0 } else { to_log_variance };
     }
     (loss, to_outputs)
 }
@@ -142,6 +145,17 @@ mod tests {
             let expected = (moved(MOVED) - moved(-MOVED)) / (2.0 * MOVED);
             assert!((slope[o] - expected).abs() < 1e-6, "{o}: {}, expected {expected}", slope[o]);
         }
+    }
+
+    /// Of still hands the network was sure without end, and learned nothing else any more.
+    #[test]
+    fn a_variance_at_its_bound_is_not_pushed_beyond_it() {
+        let slope = |error: f64, log_variance: f64| {
+            loss_of_pair([0.0; 2], [error, error, log_variance, log_variance], SWING_LOG_VARIANCE).1[2]
+        };
+        let (least, most) = SWING_LOG_VARIANCE;
+        assert_eq!([slope(0.0, least - 0.1), slope(1e3, most + 0.1)], [0.0; 2]);
+        assert!(slope(0.0, least + 0.1) > 0.0 && slope(2.0, least - 0.1) < 0.0);
     }
 
     #[test]
