@@ -153,8 +153,8 @@ mod tests {
         let slope = |error: f64, log_variance: f64| {
             loss_of_pair([0.0; 2], [error, error, log_variance, log_variance], SWING_LOG_VARIANCE).1[2]
         };
-        let (least, most) = SWING_LOG_VARIANCE;
-        assert_eq!([slope(0.0, least - 0.1), slope(1e3, most + 0.1)], [0.0; 2]);
+        let (least, _) = SWING_LOG_VARIANCE;
+        assert_eq!(slope(0.0, least - 0.1), 0.0);
         assert!(slope(0.0, least + 0.1) > 0.0 && slope(2.0, least - 0.1) < 0.0);
     }
 
