@@ -18,7 +18,7 @@ const STRIDE: f64 = 0.98;
 /// The hip joint above the floor, share of the height.
 const HIP_SHARE: f64 = 0.53;
 /// How far hands swing, and how that differs: of who walks in the scenes that the network of the pose learns from (`models/pose.md`).
-pub const HAND_SWING: f64 = 0.09;
+pub const HAND_SWING: f64 = 0.065;
 pub const HAND_SWING_SIGMA: f64 = 0.05;
 /// From this speed over hip height (1/s) on the trunk's sway is all there.
 const FULL_SWAY_HZ: f64 = 0.5;

@@ -9,7 +9,7 @@ use crate::geometry::DVec2;
 /// People of one height and speed do not keep one pace: so fast the phase spreads.
 const PACE_RAD2PS: f64 = 0.15;
 /// Frames follow each other faster than hands swing: as many in a row count as one.
-const FRAMES_ALIKE: f64 = 4.0;
+const FRAMES_ALIKE: f64 = 10.0;
 /// A hand that swings is put to something, or let go, within about this time.
 const LASTS_S: f64 = 30.0;
 
@@ -61,10 +61,16 @@ impl Stride {
     /// Takes what a frame tells.
     pub(super) fn see(&mut self, gait: &Gait) {
         self.phase += DVec2::from_angle(gait.phase_rad) * gait.concentration;
+        // What the network says of a frame already holds what is usual, which counts once.
+        let usual = HAND_SWING_SIGMA.powi(-2);
         for (i, hand) in self.hands.iter_mut().enumerate() {
-            let gain = hand.variance / (hand.variance + FRAMES_ALIKE * gait.hand_swing_sigma[i].powi(2));
-            hand.mean += gain * (gait.hand_swing[i] - hand.mean);
-            hand.variance *= 1.0 - gain;
+            let told = gait.hand_swing_sigma[i].powi(-2);
+            let (known, new) = (1.0 / hand.variance, (told - usual) / FRAMES_ALIKE);
+            if new > 0.0 {
+                let seen = (told * gait.hand_swing[i] - usual * HAND_SWING) / (told - usual);
+                hand.mean += new / (known + new) * (seen - hand.mean);
+                hand.variance = 1.0 / (known + new);
+            }
         }
     }
 
@@ -127,14 +133,17 @@ mod tests {
     #[test]
     fn a_hand_that_is_still_is_learned_beside_one_that_swings_and_forgotten_in_the_end() {
         let mut stride = Stride::default();
-        let seen = Gait { hand_swing: [0.0, 0.12], hand_swing_sigma: [0.04; 2], ..Gait::UNKNOWN };
+        // A frame that is as unsure as everybody differs tells nothing.
+        let seen = Gait { hand_swing: [0.02, 0.10], hand_swing_sigma: [0.03; 2], ..Gait::UNKNOWN };
+        stride.see(&Gait { hand_swing: [0.2; 2], ..Gait::UNKNOWN });
+        assert_eq!(stride, Stride::default());
         for _ in 0..50 {
             stride.predict(SPEED_MPS, HEIGHT_M, 0.1);
             stride.see(&seen);
         }
         let gait = stride.gait(SPEED_MPS);
-        assert!(gait.hand_swing[0] < 0.02 && gait.hand_swing[1] > 0.1, "{gait:?}");
-        assert!(gait.hand_swing_sigma[0] < 0.4 * HAND_SWING_SIGMA, "{gait:?}");
+        assert!(gait.hand_swing[0] < 0.015 && gait.hand_swing[1] > 0.1, "{gait:?}");
+        assert!(gait.hand_swing_sigma[0] < 0.5 * HAND_SWING_SIGMA, "{gait:?}");
         (0..1000).for_each(|_| stride.predict(SPEED_MPS, HEIGHT_M, 0.1));
         assert_eq!(stride.gait(SPEED_MPS).hand_swing_sigma, [HAND_SWING_SIGMA; 2]);
     }
