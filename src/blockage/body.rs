@@ -224,7 +224,8 @@ mod tests {
 
     fn posture(phase_rad: f64) -> Posture {
         let standing = Posture::standing(DVec2::new(5.0, 0.0), DVec2::X, 1.75);
-        Posture { speed_mps: 1.0, arm_swing: [1.0; 2], phase_rad, ..standing }
+        // His hands swing freely: the usual swing is of everybody, hands in pockets among them.
+        Posture { speed_mps: 1.0, arm_swing: [1.5; 2], phase_rad, ..standing }
     }
 
     /// A level ray across the body, `ahead_m` before its axis.
