@@ -137,7 +137,7 @@ pub struct Detection {
     pub overhead: Option<Overhead>,
     /// Which way somebody known faces who stands.
     pub facing: Option<Facing>,
-    /// Where in the stride somebody known is who walks.
+    /// Where in the stride somebody known is who walks, and how far each hand swings.
     pub gait: Option<Gait>,
     /// How far the body of somebody known reaches, by sensor and level.
     pub reaches: Vec<Reach>,

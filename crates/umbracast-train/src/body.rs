@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use umbracast::blockage::body::{self, Posture};
 use umbracast::blockage::probability::Phases;
 use umbracast::blockage::{BodyModel, Numbers};
-use umbracast::gait::{Gait, HAND_SWING};
+use umbracast::gait::Gait;
 use umbracast::geometry::{DVec2, DVec3};
 use umbracast::track::WIDTH_SCALE_SIGMA;
 use umbracast::{Config, Error};
@@ -164,8 +164,7 @@ fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, 
         let with_phase = |p: &PeopleRow| {
             let (gait, height_m) = known(p).unwrap_or((Gait::UNKNOWN, p.height_m));
             let floor_m = config.site.hall.floor_m(DVec2::new(p.x_m, p.y_m));
-            let [left, right] = gait.hand_swing.map(|swing| swing / HAND_SWING);
-            (PeopleRow { height_m, ..*p }, Phases::new(&gait), [right, left], floor_m)
+            (PeopleRow { height_m, ..*p }, Phases::new(&gait), gait.arm_swing(), floor_m)
         };
         let near: Vec<_> = all.iter().filter(near).map(with_phase).collect();
         if !near.is_empty() {

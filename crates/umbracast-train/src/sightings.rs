@@ -192,7 +192,7 @@ fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec
                     off_m: off_m(own),
                     heading_rad: (known && view.stands() && !walks(own)).then_some(own.heading_rad),
                     phase_rad: (!view.stands() && walks(own)).then_some(own.phase_rad),
-                    hand_swing: walker.hand_swing_at(time_ns).filter(|_| !view.stands()),
+                    hand_swing: (!view.stands()).then(|| walker.hand_swing_at(time_ns)).flatten(),
                 };
                 samples.extend(own.as_ref().map(seen));
             }

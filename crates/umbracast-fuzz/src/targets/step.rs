@@ -299,6 +299,7 @@ pub(super) fn is_finite(track: &Track) -> bool {
     let sizes = [track.height_m, track.height_sigma_m, track.width_scale, track.width_scale_sigma];
     track.position_m.is_finite()
         && track.velocity_mps.is_finite()
+        && track.gait.hand_swing.iter().chain(&track.gait.hand_swing_sigma).all(|value| value.is_finite())
         && track.covariance.as_flattened().iter().chain(&angles).chain(&sizes).all(|value| value.is_finite())
         && track.aabb.min_m.is_finite()
         && track.aabb.max_m.is_finite()

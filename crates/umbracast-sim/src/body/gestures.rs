@@ -76,7 +76,7 @@ impl Gestures {
 }
 
 /// From the shoulder to the middle of the hand.
-fn arm_m(build: &Build) -> f64 {
+pub fn arm_m(build: &Build) -> f64 {
     build.shoulder_m().1 - build.elbow_height_m() + build.forearm_m + 0.5 * build.hand_m
 }
 

@@ -197,7 +197,7 @@ fn who_gestures_reaches_out_while_standing_and_lets_the_hands_hang_while_walking
 #[test]
 fn hands_swing_with_the_walk_and_hang_still_of_who_gestures_or_has_them_in_pockets() {
     let swings = |kind: Kind| -> Vec<f64> {
-        let of = |seed| walker(kind, seed).hand_swing_at(20_000_000 * 100).unwrap();
+        let of = |seed| walker(kind, seed).hand_swing_at(2_000_000_000).unwrap();
         (0..20).flat_map(of).collect()
     };
     let mean = |all: Vec<f64>| all.iter().sum::<f64>() / all.len() as f64;

@@ -9,7 +9,7 @@ use umbracast::geometry::{DVec2, DVec3};
 use umbracast::site::{Hall, Ue};
 
 use super::build::Build;
-use super::gestures::Gestures;
+use super::gestures::{Gestures, arm_m};
 use super::individual::Individual;
 use super::kind::Kind;
 use super::meshes::Meshes;
@@ -27,7 +27,6 @@ use crate::random::stream;
 const ARM_SPAN_M: f64 = 2.0;
 /// A body climbs from one level to the next over so much of its way, before the edge and behind it.
 const CLIMB_M: f64 = 0.3;
-
 /// Hands are looked at so many times in a stride.
 const SWINGS: u32 = 8;
 
@@ -182,8 +181,8 @@ impl Walker {
         let PersonState { velocity_mps, height_m, .. } = self.state_at(time_ns)?;
         let speed_mps = velocity_mps.length();
         let stride_ns = 1e9 / umbracast::gait::stride_hz(speed_mps, height_m);
-        let (offset_m, _) = self.build.shoulder_m();
-        let hand_up_m = self.build.elbow_height_m() - self.build.forearm_m - 0.5 * self.build.hand_m;
+        let (offset_m, level_m) = self.build.shoulder_m();
+        let hand_up_m = level_m - arm_m(&self.build);
         let mut swing_m = [0.0; 2];
         for k in 0..SWINGS {
             let late_ns = ((f64::from(k) / f64::from(SWINGS) - 0.5) * stride_ns) as i64;
