@@ -86,6 +86,12 @@ impl BodyModel {
             }
             bottom = *top;
         }
+        let Arms { upper_radius, fore_radius, .. } = model.arms;
+        if !(upper_radius >= 0.0 && fore_radius >= 0.0) {
+            return Err(Error::new(format!(
+                "model of the body: arms: expected radii of 0 and more, found {upper_radius} and {fore_radius}"
+            )));
+        }
         Ok(model)
     }
 }

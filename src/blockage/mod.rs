@@ -23,8 +23,7 @@ mod things;
 mod causes;
 mod counts;
 pub(crate) mod asker;
-#[doc(hidden)] // Phases of a gait, for the fit of the body.
-pub mod probability;
+pub(crate) mod probability;
 mod caster;
 
 #[doc(hidden)] // For its fit.

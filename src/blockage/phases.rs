@@ -6,7 +6,7 @@ use crate::gait::Gait;
 
 /// Quantiles of the phase of a gait.
 #[derive(Debug, Clone)]
-pub struct Phases {
+pub(super) struct Phases {
     first_rad: f64,
     /// Share of the phases up to each of so many equal steps of a turn, the first from opposite the likeliest phase.
     shares: [f64; PHASES],
@@ -16,7 +16,7 @@ const PHASES: usize = 48;
 
 impl Phases {
     /// Of a von Mises distribution.
-    pub fn new(gait: &Gait) -> Self {
+    pub(super) fn new(gait: &Gait) -> Self {
         let width_rad = TAU / PHASES as f64;
         let densities: [f64; PHASES] = std::array::from_fn(|i| {
             let off_rad = (i as f64 + 0.5) * width_rad - PI;
@@ -32,7 +32,8 @@ impl Phases {
     }
 
     /// The phase below which a share of them lies.
-    pub fn at(&self, share: f64) -> f64 {
+    #[cfg(test)]
+    pub(super) fn at(&self, share: f64) -> f64 {
         let i = self.shares.partition_point(|&up_to| up_to < share).min(PHASES - 1);
         self.within(i, share)
     }

@@ -11,8 +11,6 @@ use super::draws::{Draws, Quantiles};
 use super::figure::Figure;
 use super::lanes::WORD;
 use super::numbers::Numbers;
-#[doc(hidden)] // For the fit of the body.
-pub use super::phases::Phases;
 use super::trajectories::{MOMENTS, Trajectories};
 use crate::Site;
 use crate::elementary::wide;

@@ -8,12 +8,6 @@ use crate::tools::{Result, Scratch, built, data, output, root, target};
 const OUTLINE_HEAD: &str = "# What outlines of usual bodies look like; see outline.md.\n";
 const BODY_HEAD: &str = "# The body that a ray meets, in shares of the standing height; see body.md.\n";
 
-/// Tuning scenes that the body is fitted on: the words of `simulate`.
-const BODY_SCENES: [&[&str]; 3] = [
-    &["--preset", "orca-03", "--scenes", "4", "--seed", "136000"],
-    &["--preset", "orca-03", "--scenes", "4", "--seed", "136050", "--meshes", "a"],
-    &["--preset", "mixed", "--scenes", "4", "--seed", "136100"],
-];
 /// Recorded people from whom the residual learns.
 const RECORDED: [&str; 4] = [
     "pedpy/traj_UNI_CORR_500_01.txt",
@@ -56,16 +50,8 @@ fn outline(commit: &str, _: &Path) -> Result<()> {
     name_commit("outline.md", commit)
 }
 
-fn body(commit: &str, folder: &Path) -> Result<()> {
-    let mut words = vec!["train".to_owned(), "body".to_owned(), "--quiet".to_owned()];
-    for (i, scenes) in BODY_SCENES.iter().enumerate() {
-        let [simulated, run] = ["simulated", "run"].map(|what| folder.join(format!("{what}-{i}")));
-        let [simulated, run] = [text(&simulated)?, text(&run)?];
-        umbracast(&[&["simulate", "--quiet", "--out", simulated], *scenes].concat())?;
-        umbracast(&["run", "--quiet", "--mode", "default", simulated, "--out", run])?;
-        words.extend([simulated.to_owned(), run.to_owned()]);
-    }
-    let fitted = umbracast(&words.iter().map(String::as_str).collect::<Vec<_>>())?;
+fn body(commit: &str, _: &Path) -> Result<()> {
+    let fitted = umbracast(&["train", "body", "--scenes", "30", "--quiet"])?;
     write("body.toml", &format!("{BODY_HEAD}{fitted}\n"))?;
     name_commit("body.md", commit)
 }

@@ -1,83 +1,96 @@
-//! Fits the predictor's body on recorded tuning scenes: the few numbers with which the true blockages are most
-//! likely, at people's true positions and headings, with height and gait as the tracker knows them. The fit moves one
-//! number at a time as long as it helps.
+//! Fits stage 3's body on tuning scenes: the few numbers with which stage 3 says the truth of links most surely, of tracks as
+//! stages 1 and 2 know them, with their errors and what they claim of them. The fit moves one number at a time as long as it
+//! helps.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
-use umbracast::blockage::body::{self, Posture};
-use umbracast::blockage::probability::Phases;
-use umbracast::blockage::{BodyModel, Numbers};
-use umbracast::gait::Gait;
-use umbracast::geometry::{DVec2, DVec3};
-use umbracast::track::WIDTH_SCALE_SIGMA;
-use umbracast::{Config, Error};
-use umbracast_io::rows::{PeopleLinkRow, PeopleRow, TrackRow};
-use umbracast_io::tables;
+use umbracast::blockage::{BodyModel, Caster, Numbers};
+use umbracast::forecast::Forecast;
+use umbracast::lidar::Assembler;
+use umbracast::track::Track;
+use umbracast::{Config, Error, Health, Pipeline};
+use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast_eval::score::instances::{Instance, instances};
+use umbracast_eval::score::matching::match_scene;
+use umbracast_eval::score::scene::{SceneRun, SceneTruth, TruthIndex, note_truth};
+use umbracast_io::rows;
+use umbracast_sim::body::Bodies;
+use umbracast_sim::body::kind::Kind;
+use umbracast_sim::crowd::{Preset, circle_crossing};
+use umbracast_sim::scene::Scene;
 
+use crate::bodies::{TURNS, bodies};
+
+/// Tuning seeds only (docs/CONVENTIONS.md).
+const FIRST_SEED: u64 = 136_000;
+const PRESETS: [Preset; 2] = [Preset::Orca03, Preset::Mixed];
+const PEOPLE: usize = 10;
+const CIRCLE_M: f64 = 12.5;
 /// Every so many frames; what lies between looks alike.
-const EVERY: u64 = 3;
-/// Who is farther than this from the segment, seen from above, is left out.
-const NEAR_M: f64 = 0.6;
-/// A track nearer than this is the person's.
-const OWN_M: f64 = 0.3;
-/// Postures tried of each body: phases of the gait, widths.
-const POSTURES: usize = 12;
-/// Middles of 12 equal shares of a standard normal distribution, mixed against the phases.
-const NORMAL: [f64; POSTURES] =
-    [0.10, -1.73, 0.55, -0.32, 1.15, -0.81, -0.10, 1.73, -0.55, 0.32, -1.15, 0.81];
+const EVERY: u64 = 4;
+/// Windows that count beside now: 300 ms.
+const WINDOW: usize = 3;
+/// Where the fit begins, a share of the height, and where it ends.
+const FIRST_STEP: f64 = 0.008;
+const LAST_STEP: f64 = 0.001;
+/// A round in which the loss falls by less is the last.
+const WORTH: f64 = 1e-4;
 
-/// One link in one frame: the ray, those near it, and whether it was blocked.
-struct Case {
-    access_point: u32,
-    start_m: DVec3,
-    ue_m: DVec3,
-    /// With how far the right and the left arm swing, beside usual ones, and how high the floor is that each stands on.
-    near: Vec<(PeopleRow, Phases, [f64; 2], f64)>,
-    blocked: bool,
+/// What stages 1 and 2 know in one frame, and what is true of each link that stage 3 tells: blocked now, and within the window.
+/// `None` where that does not count.
+struct Moment {
+    tracks: Vec<Track>,
+    forecasts: Vec<Forecast>,
+    truth: Vec<Option<[bool; 2]>>,
 }
 
-/// Fits the body on recordings, each a folder that `simulate` wrote and one that `run` made of it; returns the tables
-/// for `models/body.toml`. `told` is called with each improvement.
+/// Fits the body on so many scenes and returns the file. `scene_done` is called after each scene, from any thread.
 ///
 /// # Errors
-/// A table that cannot be read, or recordings in which nobody comes near a link.
-pub fn fit_body(recordings: &[(PathBuf, PathBuf)], mut told: impl FnMut(&str)) -> Result<String, Error> {
+/// A setting that cannot work.
+pub fn fit_body(scenes: usize, scene_done: impl Fn(usize, usize) + Sync) -> Result<String, Error> {
     let config = Config::default();
-    let mut cases = Vec::new();
-    for (simulated, run) in recordings {
-        cases.extend(cases_of(simulated, run, &config)?);
-    }
-    if cases.is_empty() {
-        return Err(Error::new("training: expected links with somebody near them, found none"));
-    }
-    let numbers = Numbers::new(&config.blockage);
-    let mut best = numbers.body.clone();
-    let mut least = loss(&best, &numbers, &cases);
-    let start = f1(&best, &numbers, &cases);
-    told(&format!("{} links, {least:.5}; F1 by access point {start:.4?}", cases.len()));
-    let count = fields(&mut best).len();
-    let mut steps = vec![0.008; count];
-    while steps.iter().any(|&step| step > 0.001) {
-        for i in 0..count {
-            let mut moved = false;
-            for change in [steps[i], -steps[i]] {
-                let mut trial = best.clone();
-                *fields(&mut trial)[i].1 += change;
-                let value = loss(&trial, &numbers, &cases);
-                if value < least {
-                    (best, least, moved) = (trial, value, true);
-                    let (name, field) = &fields(&mut best)[i];
-                    told(&format!("{least:.5} {name} = {field:.4}"));
-                    break;
-                }
-            }
-            steps[i] *= if moved { 1.5 } else { 0.5 };
+    let done = AtomicUsize::new(0);
+    let counted = |scene: usize| {
+        let moments = watch(scene, &config);
+        scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, scenes);
+        moments
+    };
+    let seen: Vec<Vec<Moment>> = (0..scenes).into_par_iter().map(counted).collect::<Result<_, _>>()?;
+    let mut best = BodyModel::shipped();
+    let mut least = loss(&best, &config, &seen);
+    loop {
+        let before = least;
+        least = turn_all(&mut best, least, |body| loss(body, &config, &seen));
+        if before - least < WORTH {
+            return Ok(toml(&mut best));
         }
     }
-    told(&format!("F1 by access point {:.4?}", f1(&best, &numbers, &cases)));
-    Ok(toml(&mut best))
+}
+
+/// Moves one number after another, by ever smaller steps, as long as that lowers the loss; returns the least.
+fn turn_all(best: &mut BodyModel, mut least: f64, loss: impl Fn(&BodyModel) -> f64) -> f64 {
+    let mut steps = vec![FIRST_STEP; fields(best).len()];
+    while steps.iter().any(|&step| step > LAST_STEP) {
+        for (i, step) in steps.iter_mut().enumerate() {
+            let trials = [*step, -*step].into_iter().filter_map(|change| moved(best, i, change));
+            let better = trials.map(|trial| (loss(&trial), trial)).find(|(value, _)| *value < least);
+            *step *= if better.is_some() { 1.5 } else { 0.5 };
+            if let Some((value, trial)) = better {
+                (*best, least) = (trial, value);
+            }
+        }
+    }
+    least
+}
+
+/// With one number changed; `None` where that is no body.
+fn moved(body: &BodyModel, i: usize, change: f64) -> Option<BodyModel> {
+    let mut trial = body.clone();
+    *fields(&mut trial)[i].1 += change;
+    BodyModel::parse(&toml(&mut trial)).is_ok().then_some(trial)
 }
 
 /// The numbers as `models/body.toml` has them.
@@ -130,93 +143,77 @@ fn fields(body: &mut BodyModel) -> Vec<(String, &mut f64)> {
     all
 }
 
-fn cases_of(directory: &Path, run: &Path, config: &Config) -> Result<Vec<Case>, Error> {
-    let names: Vec<String> = config.site.access_points.iter().map(|ap| ap.name.clone()).collect();
-    let mut people: BTreeMap<(u32, u64), Vec<PeopleRow>> = BTreeMap::new();
-    for row in tables::read::<PeopleRow>(directory, &names)? {
-        people.entry((row.scene, row.frame)).or_default().push(row);
+/// [`bodies`] in turn, and then our own of whom half gesture.
+fn who_walks(turn: u64) -> Result<Bodies, Error> {
+    match turn % (TURNS + 1) {
+        TURNS => Bodies::new(vec![(Kind::Gesturing, 0.5)], None),
+        turn => bodies(turn),
     }
-    let mut tracks: BTreeMap<(u32, u64), Vec<TrackRow>> = BTreeMap::new();
-    for row in tables::read::<TrackRow>(run, &names)? {
-        tracks.entry((row.scene, row.frame)).or_default().push(row);
-    }
-    // Of the nearest track.
-    let known = |p: &PeopleRow| {
-        let off_m = |t: &&TrackRow| (t.x_m - p.x_m).hypot(t.y_m - p.y_m);
-        let all = tracks.get(&(p.scene, p.frame))?.iter();
-        let own = all.filter(|t| t.confirmed).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
-        (off_m(&own) < OWN_M).then_some((own.gait(), own.height_m))
-    };
-    let mut cases = Vec::new();
-    for link in tables::read::<PeopleLinkRow>(directory, &names)? {
-        let Some(all) = people.get(&(link.scene, link.frame)).filter(|_| link.frame % EVERY == 0) else {
-            continue;
-        };
-        let Some(own) = all.iter().find(|p| p.person == link.person) else { continue };
-        let start_m = config.site.access_points[link.access_point as usize].position();
-        let ue_m = config.site.ue_m(DVec2::new(own.x_m, own.y_m), own.heading_rad, own.height_m);
-        let (from, to) = (start_m.truncate(), ue_m.truncate());
-        let near = |p: &&PeopleRow| {
-            let at = DVec2::new(p.x_m, p.y_m);
-            let t = ((at - from).dot(to - from) / to.distance_squared(from)).clamp(0.0, 1.0);
-            p.person != own.person && at.distance(from.lerp(to, t)) < NEAR_M
-        };
-        let with_phase = |p: &PeopleRow| {
-            let (gait, height_m) = known(p).unwrap_or((Gait::UNKNOWN, p.height_m));
-            let floor_m = config.site.hall.floor_m(DVec2::new(p.x_m, p.y_m));
-            (PeopleRow { height_m, ..*p }, Phases::new(&gait), gait.arm_swing(), floor_m)
-        };
-        let near: Vec<_> = all.iter().filter(near).map(with_phase).collect();
-        if !near.is_empty() {
-            cases.push(Case { access_point: link.access_point, start_m, ue_m, near, blocked: link.blocked });
-        }
-    }
-    Ok(cases)
 }
 
-/// Chance that the link is blocked.
-fn probability(body: &BodyModel, numbers: &Numbers, case: &Case) -> f64 {
-    let hits = (0..POSTURES).filter(|&k| {
-        case.near.iter().any(|(p, phases, arm_swing, floor_m)| {
-            let down = DVec3::NEG_Z * *floor_m;
-            let share = ((k as f64 + 0.5) / POSTURES as f64 + 0.37 * f64::from(p.person)).fract();
-            let posture = Posture {
-                width_scale: 1.0
-                    + WIDTH_SCALE_SIGMA.hypot(numbers.width_sigma)
-                        * NORMAL[(k + p.person as usize) % POSTURES],
-                speed_mps: p.vx_mps.hypot(p.vy_mps),
-                phase_rad: phases.at(share),
-                arm_swing: *arm_swing,
-                ..Posture::standing(DVec2::new(p.x_m, p.y_m), DVec2::from_angle(p.heading_rad), p.height_m)
-            };
-            body::blocks(body, &posture, case.start_m + down, case.ue_m + down)
-        })
+/// A scene's moments.
+fn watch(scene: usize, config: &Config) -> Result<Vec<Moment>, Error> {
+    let (turn, seed) = (scene as u64, FIRST_SEED + scene as u64);
+    let preset = PRESETS[(turn / (TURNS + 1)) as usize % PRESETS.len()];
+    let crowd = circle_crossing(preset, PEOPLE, CIRCLE_M, seed);
+    let mut scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&who_walks(turn)?);
+    let mut pipeline = Pipeline::new(config, None)?;
+    empty_frames(&config.site, seed)?.iter().for_each(|frame| pipeline.learn_empty(frame));
+    let (mut assembler, mut health) = (Assembler::new(&config.site)?, Health::default());
+    let (mut truth, mut run, mut moments) = (SceneTruth::default(), SceneRun::default(), Vec::new());
+    while let Some(now) = scene.next_frame() {
+        note_truth(0, &now, &mut truth);
+        push(&mut assembler, &now.packets, &mut health);
+        while let Some(frame) = assembler.pop() {
+            let outcome = pipeline.step(&frame);
+            rows::of_outcome(0, outcome, &mut run.tracks, &mut run.links);
+            if outcome.frame % EVERY == 0 {
+                let links = outcome.blockages.iter().map(|b| (outcome.frame, b.access_point as u32, b.track));
+                moments.push((
+                    outcome.tracks.to_vec(),
+                    outcome.forecasts.to_vec(),
+                    links.collect::<Vec<_>>(),
+                ));
+            }
+        }
+    }
+    let matching = match_scene(&truth.people, &run.tracks);
+    let of_link = |i: &Instance| {
+        let track = matching.get(&(i.frame, i.person))?;
+        Some(((i.frame, i.access_point, *track), [i.blocked_now, i.blocked_within(WINDOW)]))
+    };
+    let known: BTreeMap<_, _> = instances(&TruthIndex::new(&truth)).iter().filter_map(of_link).collect();
+    let with_truth = moments.into_iter().map(|(tracks, forecasts, links)| {
+        let truth = links.iter().map(|link| known.get(link).copied()).collect();
+        Moment { tracks, forecasts, truth }
     });
-    hits.count() as f64 / POSTURES as f64
+    Ok(with_truth.collect())
 }
 
-/// Mean negative logarithm of what was said of the truth; nothing is said to be certain.
-fn loss(body: &BodyModel, numbers: &Numbers, cases: &[Case]) -> f64 {
-    let of = |case: &Case| {
-        let p = 0.01 + 0.98 * probability(body, numbers, case);
-        -(if case.blocked { p } else { 1.0 - p }).ln()
+/// Mean negative logarithm of what stage 3 says of the truth; nothing is said to be certain.
+fn loss(body: &BodyModel, config: &Config, seen: &[Vec<Moment>]) -> f64 {
+    let numbers = Numbers { body: body.clone(), ..Numbers::new(&config.blockage) };
+    let of = |p: f64, blocked: bool| {
+        let p = 0.01 + 0.98 * p;
+        -(if blocked { p } else { 1.0 - p }).ln()
     };
-    let losses: Vec<f64> = cases.par_iter().map(of).collect();
-    losses.iter().sum::<f64>() / cases.len() as f64
-}
-
-/// At one half, for each access point.
-fn f1(body: &BodyModel, numbers: &Numbers, cases: &[Case]) -> Vec<f64> {
-    let mut counts: BTreeMap<u32, [u64; 2]> = BTreeMap::new();
-    for case in cases {
-        let count = counts.entry(case.access_point).or_default();
-        match (probability(body, numbers, case) >= 0.5, case.blocked) {
-            (true, true) => count[0] += 1,
-            (false, false) => {}
-            _ => count[1] += 1,
+    let of_scene = |moments: &Vec<Moment>| {
+        let mut caster = Caster::with_numbers(&config.blockage, numbers.clone(), &config.site);
+        let (mut sum, mut count, mut blockages) = (0.0, 0.0, Vec::new());
+        for Moment { tracks, forecasts, truth } in moments {
+            caster.cast(tracks, forecasts, &mut blockages);
+            for (b, [now, within]) in
+                blockages.iter().zip(truth).filter_map(|(b, truth)| Some((b, (*truth)?)))
+            {
+                sum += of(b.p_now, now) + of(b.p[WINDOW - 1], within);
+                count += 2.0;
+            }
         }
-    }
-    counts.values().map(|[hits, errors]| 2.0 * *hits as f64 / (2 * hits + errors) as f64).collect()
+        [sum, count]
+    };
+    let sums: Vec<[f64; 2]> = seen.par_iter().map(of_scene).collect();
+    let [sum, count] = [0, 1].map(|i| sums.iter().map(|of| of[i]).sum::<f64>());
+    sum / count
 }
 
 #[cfg(test)]

@@ -394,8 +394,8 @@ pub enum Train {
     Residual(TrainResidual),
     /// Fit what outlines of usual bodies look like, on tuning scenes; prints `models/outline.toml`.
     Outline(TrainScenes),
-    /// Fit stage 3's model of a body on recorded tuning scenes.
-    Body(TrainBody),
+    /// Fit stage 3's model of a body, on tuning scenes; prints `models/body.toml`.
+    Body(TrainScenes),
     /// Fit the probability at which a link is called blocked, on tuning scenes.
     Thresholds(TrainScenes),
     /// Print the command that builds and runs the program in `train/`, which fits the paper's LSTM.
@@ -444,16 +444,7 @@ pub struct TrainResidual {
     pub fitted: Fitted,
 }
 
-/// `train body`
-#[derive(Debug, Args)]
-pub struct TrainBody {
-    /// Pairs of folders: one that `simulate` wrote with tuning seeds (100000 to 199999), and one that `run` made from
-    /// it.
-    #[arg(required = true, value_names = ["SIMULATED", "RUN"], num_args = 2..)]
-    pub recordings: Vec<PathBuf>,
-}
-
-/// `train outline`, `train thresholds`
+/// `train body`, `train outline`, `train thresholds`
 #[derive(Debug, Args)]
 pub struct TrainScenes {
     /// Number of scenes, of several crowds in turn.

@@ -1,7 +1,5 @@
 //! `train`: fits what the program learns from data.
 
-use std::path::PathBuf;
-
 use indicatif::ProgressBar;
 use umbracast::{Config, Error};
 use umbracast_train::body::fit_body;
@@ -11,7 +9,7 @@ use umbracast_train::pose::train_pose;
 use umbracast_train::residual::FitOptions;
 use umbracast_train::thresholds::tune_thresholds;
 
-use crate::args::{Common, Fitted, Train, TrainBody, TrainLstm, TrainPose, TrainResidual, TrainScenes};
+use crate::args::{Common, Fitted, Train, TrainLstm, TrainPose, TrainResidual, TrainScenes};
 use crate::ending::Ending;
 use crate::progress::bar;
 use crate::run_json::{RunJson, Stopwatch};
@@ -22,7 +20,7 @@ pub fn run(args: &Train, common: &Common) -> Result<Ending, Error> {
     setup::with_threads(common.threads, || match args {
         Train::Pose(args) => with_card(&args.fitted, common, "pose", || pose(args, common)),
         Train::Residual(args) => with_card(&args.fitted, common, "residual", || residual(args, common)),
-        Train::Body(args) => body(args, common),
+        Train::Body(args) => printed(args, "scenes seen", common, |scenes, done| fit_body(scenes, done)),
         Train::Outline(args) => {
             printed(args, "scenes seen", common, |scenes, done| fit_outline(scenes, done))
         }
@@ -76,24 +74,6 @@ fn residual(args: &TrainResidual, common: &Common) -> Result<String, Error> {
     setup::write(&args.fitted.out.join("residual.safetensors"), weights)?;
     setup::write(&args.fitted.out.join("residual.md"), &card)?;
     Ok(card)
-}
-
-fn body(args: &TrainBody, common: &Common) -> Result<(), Error> {
-    let recordings: Vec<(PathBuf, PathBuf)> =
-        args.recordings.chunks_exact(2).map(|pair| (pair[0].clone(), pair[1].clone())).collect();
-    if args.recordings.len() != 2 * recordings.len() {
-        let found = args.recordings.len();
-        return Err(Error::new(format!(
-            "train body: expected folders in pairs, SIMULATED and RUN, found {found}"
-        )));
-    }
-    let improved = |story: &str| {
-        if !common.quiet {
-            eprintln!("{story}");
-        }
-    };
-    say::text(&fit_body(&recordings, improved)?);
-    Ok(())
 }
 
 /// A fit on scenes whose result is printed, for the source or the configuration.
