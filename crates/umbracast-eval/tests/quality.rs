@@ -26,19 +26,18 @@ struct Bounds {
     ece: f64,
 }
 
-// Measured, on people of whom no two walk alike: F1 0.938, 0.938 and 0.809, onset F1 0.859, 0.869 and 0.622, MOTA 0.993, 0.993
-// and 0.947, ECE 0.011, 0.014 and 0.031. The same program gives the same figures to the digit, so the room below them is for
-// changes of late digits alone: a hundredth of F1, twice that of onsets, which are fewer. Since tracks learn how far hands swing, the
-// onsets of the first four scenes score 0.826 (0.859 before) and those of forty others 0.859 (0.856), the calibration of pairs 0.035.
+// Measured, on people of whom no two walk alike: F1 0.941, 0.942 and 0.841, onset F1 0.851, 0.883 and 0.654, MOTA 0.993, 0.993
+// and 0.957, ECE 0.009, 0.013 and 0.035. The same program gives the same figures to the digit, so the room below them is for
+// changes of late digits alone: a hundredth of F1, twice that of onsets, which are fewer.
 const BOUNDS: [Bounds; 3] = [
-    Bounds { preset: Preset::Orca03, site: "", f1: 0.928, onset_f1: 0.806, mota: 0.989, ece: 0.014 },
-    Bounds { preset: Preset::Mixed, site: "", f1: 0.931, onset_f1: 0.854, mota: 0.989, ece: 0.017 },
+    Bounds { preset: Preset::Orca03, site: "", f1: 0.931, onset_f1: 0.839, mota: 0.989, ece: 0.012 },
+    Bounds { preset: Preset::Mixed, site: "", f1: 0.932, onset_f1: 0.863, mota: 0.989, ece: 0.016 },
     Bounds {
         preset: Preset::Pairs,
         site: include_str!("../../../config/sites/height-6.toml"),
-        f1: 0.798,
-        onset_f1: 0.602,
-        mota: 0.943,
+        f1: 0.831,
+        onset_f1: 0.634,
+        mota: 0.953,
         ece: 0.038,
     },
 ];
@@ -69,8 +68,8 @@ fn no_crowd_scores_below_its_bounds() {
 
 #[test]
 fn who_pushes_something_or_carries_it_over_the_head_is_followed_no_surer_than_right() {
-    // Measured: 2.9 and 1.9; without a part of the spread of their own 4.1 and 2.4.
-    for (kind, nees_max) in [(Kind::Frame, 3.1), (Kind::Umbrella, 2.2)] {
+    // Measured: 2.0 and 1.8; without a part of the spread of their own 4.1 and 2.4.
+    for (kind, nees_max) in [(Kind::Frame, 2.2), (Kind::Umbrella, 2.0)] {
         let group = scores(Preset::Orca03, "", Bodies::new(vec![(kind, 1.0)], []).unwrap(), 100_100);
         let nees = group.modes[0].position_nees.value.unwrap();
         println!("{kind:?}: NEES {nees:.3}, at most {nees_max}");
