@@ -52,12 +52,6 @@ impl Gait {
         hand_swing: [HAND_SWING; 2],
         hand_swing_sigma: [HAND_SWING_SIGMA; 2],
     };
-
-    /// Factors on how far usual arms swing, right and left: as bodies that rays meet have them.
-    pub fn arm_swing(&self) -> [f64; 2] {
-        let [left, right] = self.hand_swing.map(|swing| swing / HAND_SWING);
-        [right, left]
-    }
 }
 
 impl Default for Gait {

@@ -197,7 +197,9 @@ fn more_body_never_blocks_less() {
 
 #[test]
 fn doubt_makes_what_is_sure_less_sure() {
-    let config = one_access_point();
+    let mut config = one_access_point();
+    // Chances of some hundredths are asked: as many samples as usual tell them to a hundredth.
+    config.blockage.samples = 1024;
     let with_doubt = |aside_m: f64, sigma_m: f64| {
         let [asked, mut other] = two(aside_m, 0.0);
         (0..2).for_each(|i| other.covariance[i][i] = sigma_m * sigma_m);
@@ -207,7 +209,7 @@ fn doubt_makes_what_is_sure_less_sure() {
     let sigmas_m = [0.01, 0.1, 0.2, 0.4, 0.8];
     let [hidden, clear] = [0.0, 1.2].map(|aside_m| sigmas_m.map(|sigma_m| with_doubt(aside_m, sigma_m)));
     assert!(hidden.is_sorted_by(|a, b| a >= b) && hidden[0] > 0.99 && hidden[4] < 0.7, "{hidden:?}");
-    assert!(clear.is_sorted() && clear[0] < 0.01 && clear[4] > 0.04, "{clear:?}");
+    assert!(clear.is_sorted() && clear[0] < 0.01 && clear[4] > 0.05, "{clear:?}");
 }
 
 #[test]

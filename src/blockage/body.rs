@@ -53,7 +53,8 @@ pub(super) fn relative_speed_hz(speed_mps: f64, height_m: f64) -> f64 {
     gait::relative_speed_hz(speed_mps, height_m).min(FASTEST_HZ)
 }
 
-/// True when the segment meets the body, which stands at z = 0; touching counts.
+/// True when the segment meets the body, which stands at z = 0; touching counts. Tests hold stage 3, which asks many samples at a time,
+/// to this.
 pub fn blocks(body: &BodyModel, posture: &Posture, start_m: DVec3, end_m: DVec3) -> bool {
     let local = |v: DVec3| {
         let from_axis = v.truncate() - posture.position_m;

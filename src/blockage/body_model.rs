@@ -107,6 +107,14 @@ mod tests {
     }
 
     #[test]
+    fn arms_thinner_than_nothing_are_refused() {
+        let mut model = BodyModel::shipped();
+        model.arms.fore_radius = -0.01;
+        let message = BodyModel::parse(&toml::to_string(&model).unwrap()).unwrap_err().to_string();
+        assert!(message.contains("radii of 0 and more") && message.contains("-0.01"), "{message}");
+    }
+
+    #[test]
     fn slices_that_do_not_rise_are_refused() {
         let (text, tops) = (include_str!("../../models/body.toml"), BodyModel::shipped().slices);
         let text = text.replacen(&format!("top = {:.3}", tops[2].top), "top = 0.1", 1);

@@ -115,7 +115,8 @@ impl Trajectories {
         self.track = track.id;
         self.part_of = track.part_of;
         self.of_track = track.gait;
-        (self.swings, self.swing_by) = (track.gait.arm_swing(), swing_by(&track.gait));
+        let [left, right] = track.gait.hand_swing.map(|swing| swing / HAND_SWING);
+        (self.swings, self.swing_by) = ([right, left], swing_by(&track.gait));
         self.mean_m = std::array::from_fn(|s| position_at(track, forecast, s));
         self.ahead = std::array::from_fn(|s| DVec2::from_angle(heading_at(track, forecast, s)));
         self.start(draws, &root(&forecast.coupling.state));

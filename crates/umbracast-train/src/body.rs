@@ -8,10 +8,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use umbracast::blockage::{BodyModel, Caster, Numbers};
 use umbracast::forecast::Forecast;
-use umbracast::lidar::Assembler;
+use umbracast::lidar::Frame;
 use umbracast::track::Track;
-use umbracast::{Config, Error, Health, Pipeline};
-use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast::{Config, Error, Outcome};
 use umbracast_eval::score::instances::{Instance, instances};
 use umbracast_eval::score::matching::match_scene;
 use umbracast_eval::score::scene::{SceneRun, SceneTruth, TruthIndex, note_truth};
@@ -22,6 +21,7 @@ use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 
 use crate::bodies::{TURNS, bodies};
+use crate::stages;
 
 /// Tuning seeds only (docs/CONVENTIONS.md).
 const FIRST_SEED: u64 = 136_000;
@@ -156,27 +156,16 @@ fn watch(scene: usize, config: &Config) -> Result<Vec<Moment>, Error> {
     let (turn, seed) = (scene as u64, FIRST_SEED + scene as u64);
     let preset = PRESETS[(turn / (TURNS + 1)) as usize % PRESETS.len()];
     let crowd = circle_crossing(preset, PEOPLE, CIRCLE_M, seed);
-    let mut scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&who_walks(turn)?);
-    let mut pipeline = Pipeline::new(config, None)?;
-    empty_frames(&config.site, seed)?.iter().for_each(|frame| pipeline.learn_empty(frame));
-    let (mut assembler, mut health) = (Assembler::new(&config.site)?, Health::default());
+    let scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&who_walks(turn)?);
     let (mut truth, mut run, mut moments) = (SceneTruth::default(), SceneRun::default(), Vec::new());
-    while let Some(now) = scene.next_frame() {
-        note_truth(0, &now, &mut truth);
-        push(&mut assembler, &now.packets, &mut health);
-        while let Some(frame) = assembler.pop() {
-            let outcome = pipeline.step(&frame);
-            rows::of_outcome(0, outcome, &mut run.tracks, &mut run.links);
-            if outcome.frame % EVERY == 0 {
-                let links = outcome.blockages.iter().map(|b| (outcome.frame, b.access_point as u32, b.track));
-                moments.push((
-                    outcome.tracks.to_vec(),
-                    outcome.forecasts.to_vec(),
-                    links.collect::<Vec<_>>(),
-                ));
-            }
+    let see = |_: &Frame, outcome: &Outcome| {
+        rows::of_outcome(0, outcome, &mut run.tracks, &mut run.links);
+        if outcome.frame.is_multiple_of(EVERY) {
+            let links = outcome.blockages.iter().map(|b| (outcome.frame, b.access_point as u32, b.track));
+            moments.push((outcome.tracks.clone(), outcome.forecasts.clone(), links.collect::<Vec<_>>()));
         }
-    }
+    };
+    stages::run(scene, config, seed, |now| note_truth(0, now, &mut truth), see)?;
     let matching = match_scene(&truth.people, &run.tracks);
     let of_link = |i: &Instance| {
         let track = matching.get(&(i.frame, i.person))?;

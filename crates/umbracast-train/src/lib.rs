@@ -9,6 +9,7 @@ pub mod adam;
 pub mod weights;
 mod layer;
 mod bodies;
+mod stages;
 mod sightings;
 mod truth;
 mod point_network;

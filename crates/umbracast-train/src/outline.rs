@@ -9,18 +9,18 @@ use umbracast::config::Config;
 use umbracast::detect::LEVELS;
 use umbracast::gait::relative_speed_hz;
 use umbracast::geometry::DVec2;
-use umbracast::lidar::{Assembler, Views};
+use umbracast::lidar::{Frame, Views};
 use umbracast::track::Track;
 use umbracast::track::outline::{Axis, LevelOutline, UsualLevel, UsualOutline, measured, shares, terms};
 use umbracast::track::visibility::{Body, Visibility};
-use umbracast::{Error, Health, Pipeline};
-use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast::{Error, Outcome};
 use umbracast_sim::body::Bodies;
 use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::{Preset, circle_crossing};
 use umbracast_sim::scene::Scene;
 
 use crate::bodies::of_family_a;
+use crate::stages;
 
 /// Tuning seeds only (docs/CONVENTIONS.md).
 const FIRST_SEED: u64 = 135_000;
@@ -115,63 +115,56 @@ fn watch(scene: usize) -> Result<Vec<Person>, Error> {
     let own = Bodies::new(kinds.into_iter().collect(), None)?;
     let bodies = if scene % CARRYING.len() == OF_FAMILY_A { of_family_a(own)? } else { own };
     let crowd = circle_crossing(preset, 10, 12.5, seed);
-    let mut scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&bodies);
+    let scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&bodies);
     let walkers = scene.walkers().to_vec();
     let mut visibility = Visibility::new(&config.site);
-    let mut pipeline = Pipeline::new(&config, None)?;
-    empty_frames(&config.site, seed)?.iter().for_each(|frame| pipeline.learn_empty(frame));
-    let (mut assembler, mut health) = (Assembler::new(&config.site)?, Health::default());
     let mut seen: BTreeMap<usize, Person> = BTreeMap::new();
-    while let Some(now) = scene.next_frame() {
-        push(&mut assembler, &now.packets, &mut health);
-        while let Some(frame) = assembler.pop() {
-            let outcome = pipeline.step(&frame);
-            let body = |t: &Track| {
-                let floor_m = config.site.hall.floor_m(t.position_m);
-                Body { position_m: t.position_m, floor_m, height_m: t.height_m }
+    let see = |frame: &Frame, outcome: &Outcome| {
+        let body = |t: &Track| {
+            let floor_m = config.site.hall.floor_m(t.position_m);
+            Body { position_m: t.position_m, floor_m, height_m: t.height_m }
+        };
+        let bodies: Vec<Body> = outcome.tracks.iter().map(body).collect();
+        visibility.look(&Views::of(frame), &bodies);
+        for (track, body) in outcome.tracks.iter().zip(&bodies).filter(|(track, _)| track.points > 0) {
+            let view = visibility.view(body);
+            let own = walkers.iter().position(|walker| {
+                walker
+                    .state_at(frame.time_ns)
+                    .is_some_and(|s| s.position_m.distance(track.position_m) < OWN_M)
+            });
+            let speed_mps = track.velocity_mps.length();
+            let Some(own) = own else { continue };
+            if view.returns < FREE_SHARE * view.returns_alone || speed_mps < 0.5 {
+                continue;
+            }
+            let ago_s = |time_ns: i64| (frame.time_ns - time_ns) as f64 * 1e-9;
+            let detections = outcome.detections.iter().filter(|d| d.full_body && d.points == track.points);
+            let at_m = |time_ns: i64| track.position_m - track.velocity_mps * ago_s(time_ns);
+            let off = |d: &&umbracast::detect::Detection| d.position_m.distance(at_m(d.time_ns));
+            let Some(detection) = detections.min_by(|a, b| off(a).total_cmp(&off(b))) else { continue };
+            let axis = Axis {
+                from_detection_m: at_m(detection.time_ns) - detection.position_m,
+                ahead: DVec2::from_angle(track.heading_rad),
             };
-            let bodies: Vec<Body> = outcome.tracks.iter().map(body).collect();
-            visibility.look(&Views::of(&frame), &bodies);
-            for (track, body) in outcome.tracks.iter().zip(&bodies).filter(|(track, _)| track.points > 0) {
-                let view = visibility.view(body);
-                let own = walkers.iter().position(|walker| {
-                    walker
-                        .state_at(frame.time_ns)
-                        .is_some_and(|s| s.position_m.distance(track.position_m) < OWN_M)
-                });
-                let speed_mps = track.velocity_mps.length();
-                let Some(own) = own else { continue };
-                if view.returns < FREE_SHARE * view.returns_alone || speed_mps < 0.5 {
-                    continue;
-                }
-                let ago_s = |time_ns: i64| (frame.time_ns - time_ns) as f64 * 1e-9;
-                let detections =
-                    outcome.detections.iter().filter(|d| d.full_body && d.points == track.points);
-                let at_m = |time_ns: i64| track.position_m - track.velocity_mps * ago_s(time_ns);
-                let off = |d: &&umbracast::detect::Detection| d.position_m.distance(at_m(d.time_ns));
-                let Some(detection) = detections.min_by(|a, b| off(a).total_cmp(&off(b))) else { continue };
-                let axis = Axis {
-                    from_detection_m: at_m(detection.time_ns) - detection.position_m,
-                    ahead: DVec2::from_angle(track.heading_rad),
-                };
-                let person = seen.entry(own).or_default();
-                for reach in &detection.reaches {
-                    let gap_m = visibility.gap_m(reach.sensor, track.position_m);
-                    for (i, (cos, sin, reach_m)) in measured(reach, &axis, gap_m).into_iter().enumerate() {
-                        person.push(Seen {
-                            level: reach.level,
-                            near: i == 0,
-                            cos,
-                            sin,
-                            speed_hz: relative_speed_hz(speed_mps, track.height_m),
-                            height_m: track.height_m,
-                            reach_m,
-                        });
-                    }
+            let person = seen.entry(own).or_default();
+            for reach in &detection.reaches {
+                let gap_m = visibility.gap_m(reach.sensor, track.position_m);
+                for (i, (cos, sin, reach_m)) in measured(reach, &axis, gap_m).into_iter().enumerate() {
+                    person.push(Seen {
+                        level: reach.level,
+                        near: i == 0,
+                        cos,
+                        sin,
+                        speed_hz: relative_speed_hz(speed_mps, track.height_m),
+                        height_m: track.height_m,
+                        reach_m,
+                    });
                 }
             }
         }
-    }
+    };
+    stages::run(scene, &config, seed, |_| {}, see)?;
     Ok(seen.into_values().collect())
 }
 
