@@ -1,4 +1,4 @@
-//! The body that a ray meets, as numbers: fitted to walking meshes by `umbracast train body` and shipped as
+//! The body that a ray meets, as numbers: fitted by `umbracast train body` to which links walking meshes blocked, and shipped as
 //! `models/body.toml`; data and scores are in the card beside it.
 
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Everything that the program learns from data, fitted anew in order: the pose of a body, outlines, stage 3's body, the forecast's residual. Each fit runs the program with what was fitted before it, so the program is built again in between.
+//! Everything that the program learns from data, fitted anew in order: the pose of a body, outlines, the forecast's residual, stage 3's body. Each fit runs the program with what was fitted before it, so the program is built again in between.
 
 use std::fs;
 use std::path::Path;
@@ -18,12 +18,12 @@ const RECORDED: [&str; 4] = [
 
 /// A fit: what it is called, and what makes its model and card from the commit that the card names, in a folder of its own.
 type Fit = (&'static str, fn(&str, &Path) -> Result<()>);
-const ALL: [Fit; 4] = [("pose", pose), ("outline", outline), ("body", body), ("residual", residual)];
+const ALL: [Fit; 4] = [("pose", pose), ("outline", outline), ("residual", residual), ("body", body)];
 
 /// Fits these, or all; needs a clean tree, for the cards name its commit.
 pub fn run(names: &[&str]) -> Result<()> {
     if let Some(name) = names.iter().find(|name| !ALL.iter().any(|(known, _)| known == *name)) {
-        return Err(format!("fit: expected pose, outline, body or residual, found {name:?}"));
+        return Err(format!("fit: expected pose, outline, residual or body, found {name:?}"));
     }
     let changed = output(&root(), "git", &["status", "--porcelain", "--untracked-files=no"])?;
     if !changed.is_empty() {
@@ -50,12 +50,6 @@ fn outline(commit: &str, _: &Path) -> Result<()> {
     name_commit("outline.md", commit)
 }
 
-fn body(commit: &str, _: &Path) -> Result<()> {
-    let fitted = umbracast(&["train", "body", "--scenes", "30", "--quiet"])?;
-    write("body.toml", &format!("{BODY_HEAD}{fitted}\n"))?;
-    name_commit("body.md", commit)
-}
-
 fn residual(commit: &str, folder: &Path) -> Result<()> {
     let data =
         data().ok_or("fit residual: expected the folder of the real data in UMBRACAST_DATA, found none")?;
@@ -65,6 +59,12 @@ fn residual(commit: &str, folder: &Path) -> Result<()> {
     words.extend(recorded.iter().map(String::as_str));
     umbracast(&words)?;
     ["residual.safetensors", "residual.md"].iter().try_for_each(|name| take(&folder.join(name), name))
+}
+
+fn body(commit: &str, _: &Path) -> Result<()> {
+    let fitted = umbracast(&["train", "body", "--scenes", "30", "--quiet"])?;
+    write("body.toml", &format!("{BODY_HEAD}{fitted}\n"))?;
+    name_commit("body.md", commit)
 }
 
 /// What the command prints, built from the models as they are now.

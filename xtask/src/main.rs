@@ -19,7 +19,7 @@ cargo xtask quote             cut every block of figures in README.md and docs/ 
 cargo xtask answers           whether the program answers what record/answers.txt keeps of it
     --write                       keep what it answers now: records of before are then of an earlier program
 cargo xtask same-tables REV   whether a git revision and the working tree write the same tables, byte for byte
-cargo xtask fit [NAME...]     fit anew what the program learns from data, in order: axis, outline, body, residual; about an hour on two cores
+cargo xtask fit [NAME...]     fit anew what the program learns from data, in order: pose, outline, residual, body; about half an hour on two cores
 cargo xtask structure         files and imports as a picture, docs/structure.svg, and in words
     --check                       write nothing; fail where the picture is stale or files of src/ use one another in a circle";
 

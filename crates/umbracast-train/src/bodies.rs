@@ -11,8 +11,8 @@ use umbracast_sim::body::meshes::Meshes;
 const CARRIED: [(Kind, f64); 4] =
     [(Kind::Phone, 0.15), (Kind::Pockets, 0.15), (Kind::Bag, 0.15), (Kind::Rucksack, 0.15)];
 
-/// What goes with others, or how they are and move. What is not in here nothing was fitted to: bags in both hands, a telephone
-/// before the face, a child on the arm, a trolley, a wheelchair that somebody pushes.
+/// What goes with others, or how they are and move. Nothing was fitted to bags in both hands, a child on the arm, a trolley and a
+/// wheelchair that somebody pushes, and outlines alone to a telephone before the face.
 const THINGS: [(Kind, f64); 6] = [
     (Kind::Child, 0.15),
     (Kind::Wheelchair, 0.15),
