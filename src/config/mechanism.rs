@@ -21,7 +21,7 @@ pub enum Mechanism {
     GuidedAssignment,
     /// Stage 1: the network of the pose; plainest: points moved away from their sensor, and their mean, no phase of the gait, and
     /// no heading of who never walked.
-    AxisNetwork,
+    Pose,
     /// Stage 1: whether sensors can see a person.
     Visibility,
     /// Stage 1: several motion models; plainest: one density of white acceleration for all.
@@ -31,7 +31,7 @@ pub enum Mechanism {
     /// Stage 1: the sway of the body followed; plainest: more noise.
     Sway,
     /// Stage 1: the phase of the gait and how far each hand swings; plainest: any phase, and hands that swing as most do.
-    LimbPhase,
+    Stride,
     /// Stage 1: how tall a person is; plainest: as tall as adults on the mean.
     Height,
     /// Stage 1: the outline of each body, learned by watching; plainest: a usual one.
@@ -64,12 +64,12 @@ impl Mechanism {
         Self::RangeModel,
         Self::CountTest,
         Self::GuidedAssignment,
-        Self::AxisNetwork,
+        Self::Pose,
         Self::Visibility,
         Self::MotionModels,
         Self::StandingModel,
         Self::Sway,
-        Self::LimbPhase,
+        Self::Stride,
         Self::Height,
         Self::Outline,
         Self::Shape,
@@ -97,12 +97,12 @@ impl Mechanism {
             Self::RangeModel | Self::CountTest | Self::Residual => &[],
             Self::GuidedAssignment => &["detect"],
             Self::ChildrenAndSeated => &["detect", "track"],
-            Self::AxisNetwork
+            Self::Pose
             | Self::Visibility
             | Self::MotionModels
             | Self::StandingModel
             | Self::Sway
-            | Self::LimbPhase
+            | Self::Stride
             | Self::Height
             | Self::Outline
             | Self::Shape
@@ -115,19 +115,19 @@ impl Mechanism {
     /// As tables and files call it.
     ///
     /// ```
-    /// assert_eq!(umbracast::config::Mechanism::LimbPhase.name(), "limb-phase");
+    /// assert_eq!(umbracast::config::Mechanism::Stride.name(), "stride");
     /// ```
     pub fn name(self) -> &'static str {
         match self {
             Self::RangeModel => "range-model",
             Self::CountTest => "count-test",
             Self::GuidedAssignment => "guided-assignment",
-            Self::AxisNetwork => "axis-network",
+            Self::Pose => "pose",
             Self::Visibility => "visibility",
             Self::MotionModels => "motion-models",
             Self::StandingModel => "standing-model",
             Self::Sway => "sway",
-            Self::LimbPhase => "limb-phase",
+            Self::Stride => "stride",
             Self::Height => "height",
             Self::Outline => "outline",
             Self::Shape => "shape",

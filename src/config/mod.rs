@@ -240,7 +240,7 @@ impl Config {
         match mechanism {
             Mechanism::RangeModel => detect.background = BackgroundMethod::Voxels,
             Mechanism::CountTest => detect.clusters = ClusterMethod::Haselich,
-            Mechanism::AxisNetwork => {
+            Mechanism::Pose => {
                 detect.position = PositionMethod::ShiftedMean;
                 track.without.push(mechanism);
             }

@@ -85,7 +85,7 @@ impl Numbers {
             noise_share: 0.7,
             lasting_share: 0.1,
             visibility: !without(Mechanism::Visibility),
-            stride: !without(Mechanism::LimbPhase),
+            stride: !without(Mechanism::Stride),
             usual: UsualOutline::shipped(),
             outline: !without(Mechanism::Outline),
             shape: !without(Mechanism::Shape),
@@ -103,7 +103,7 @@ impl Numbers {
         if without(Mechanism::Height) || without(Mechanism::ChildrenAndSeated) {
             numbers.children_share = 0.0;
         }
-        if without(Mechanism::AxisNetwork) {
+        if without(Mechanism::Pose) {
             // A detection claims no covariance then: what a constant shift leaves of the error of one frame
             // (models/pose.md).
             numbers.noise_floor_m = 0.04;

@@ -11,6 +11,7 @@ use umbracast::forecast::Forecast;
 use umbracast::lidar::Frame;
 use umbracast::track::Track;
 use umbracast::{Config, Error, Outcome};
+use umbracast_eval::run::chain::CIRCLE_M;
 use umbracast_eval::score::instances::{Instance, instances};
 use umbracast_eval::score::matching::match_scene;
 use umbracast_eval::score::scene::{SceneRun, SceneTruth, TruthIndex, note_truth};
@@ -27,7 +28,6 @@ use crate::stages;
 const FIRST_SEED: u64 = 136_000;
 const PRESETS: [Preset; 2] = [Preset::Orca03, Preset::Mixed];
 const PEOPLE: usize = 10;
-const CIRCLE_M: f64 = 12.5;
 /// Every so many frames; what lies between looks alike.
 const EVERY: u64 = 4;
 /// Windows that count beside now: 300 ms.

@@ -14,6 +14,7 @@ use umbracast::track::Track;
 use umbracast::track::outline::{Axis, LevelOutline, UsualLevel, UsualOutline, measured, shares, terms};
 use umbracast::track::visibility::{Body, Visibility};
 use umbracast::{Error, Outcome};
+use umbracast_eval::run::chain::CIRCLE_M;
 use umbracast_sim::body::Bodies;
 use umbracast_sim::body::kind::Kind;
 use umbracast_sim::crowd::{Preset, circle_crossing};
@@ -24,6 +25,7 @@ use crate::stages;
 
 /// Tuning seeds only (docs/CONVENTIONS.md).
 const FIRST_SEED: u64 = 135_000;
+const PEOPLE: usize = 10;
 /// A track nearer than this to a person is that person's.
 const OWN_M: f64 = 0.3;
 /// Less of a body in free sight is not looked at.
@@ -114,7 +116,7 @@ fn watch(scene: usize) -> Result<Vec<Person>, Error> {
     let kinds = CARRYING[scene % CARRYING.len()].map(|kind| (kind, 1.0));
     let own = Bodies::new(kinds.into_iter().collect(), None)?;
     let bodies = if scene % CARRYING.len() == OF_FAMILY_A { of_family_a(own)? } else { own };
-    let crowd = circle_crossing(preset, 10, 12.5, seed);
+    let crowd = circle_crossing(preset, PEOPLE, CIRCLE_M, seed);
     let scene = Scene::new(crowd, &config.site, seed)?.with_bodies(&bodies);
     let walkers = scene.walkers().to_vec();
     let mut visibility = Visibility::new(&config.site);

@@ -11,7 +11,7 @@ use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Frame};
 use umbracast::track::Track;
 use umbracast::{Config, Error, Health, Pipeline, STEP_S, STEPS};
-use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast_eval::run::chain::{CIRCLE_M, empty_frames, push};
 use umbracast_eval::score::matching::match_scene;
 use umbracast_eval::score::scene::{SceneTruth, TruthIndex, note_truth};
 use umbracast_io::rows;
@@ -50,7 +50,6 @@ pub fn drawn_scenes(
     people: usize,
     seeds: std::ops::Range<u64>,
 ) -> Vec<SampleScene> {
-    const CIRCLE_M: f64 = umbracast_eval::run::chain::CIRCLE_M;
     let scene = |seed: u64| {
         let (preset, augmented) = presets[seed as usize % presets.len()];
         let crowd = match preset {

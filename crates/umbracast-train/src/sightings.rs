@@ -15,28 +15,39 @@ use umbracast::geometry::DVec2;
 use umbracast::lidar::{Assembler, Views};
 use umbracast::track::Tracker;
 use umbracast::{Error, Health};
-use umbracast_eval::run::chain::{empty_frames, push};
+use umbracast_eval::run::chain::{CIRCLE_M, empty_frames, push};
 use umbracast_sim::body::{Bodies, PersonState, Walker};
 use umbracast_sim::crowd::{Crowd, Preset, circle_crossing, pairs, speed_augmented};
 use umbracast_sim::scene::Scene;
 
 use crate::bodies::with_things;
 
-/// Height of the sensors, their distance from the middle, the directions in which they stand from there, in degrees, and the
-/// scenes' seeds.
-type Layout = (f64, f64, &'static [f64], Range<u64>);
+/// Where sensors hang, and the scenes that they see.
+struct Layout {
+    height_m: f64,
+    /// From the middle.
+    away_m: f64,
+    /// In which directions from there they hang.
+    directions_deg: &'static [f64],
+    seeds: Range<u64>,
+}
+
+const fn layout(height_m: f64, away_m: f64, directions_deg: &'static [f64], seeds: Range<u64>) -> Layout {
+    Layout { height_m, away_m, directions_deg, seeds }
+}
+
 const OPPOSITE: &[f64] = &[0.0, 180.0];
 const LAYOUTS: [Layout; 7] = [
-    (9.0, 16.0, OPPOSITE, 50_000..50_036),
-    (6.0, 12.5, OPPOSITE, 51_000..51_024),
-    (4.0, 13.0, OPPOSITE, 52_000..52_012),
-    (7.5, 14.0, OPPOSITE, 53_000..53_012),
-    (5.0, 12.0, &[0.0, 90.0], 54_000..54_024),
-    (3.0, 14.0, &[0.0, 120.0, 240.0], 55_000..55_024),
-    (7.0, 13.0, &[0.0], 56_000..56_024),
+    layout(9.0, 16.0, OPPOSITE, 50_000..50_036),
+    layout(6.0, 12.5, OPPOSITE, 51_000..51_024),
+    layout(4.0, 13.0, OPPOSITE, 52_000..52_012),
+    layout(7.5, 14.0, OPPOSITE, 53_000..53_012),
+    layout(5.0, 12.0, &[0.0, 90.0], 54_000..54_024),
+    layout(3.0, 14.0, &[0.0, 120.0, 240.0], 55_000..55_024),
+    layout(7.0, 13.0, &[0.0], 56_000..56_024),
 ];
 /// Scenes that are not trained on.
-const HELD_OUT: Layout = (9.0, 16.0, OPPOSITE, 130_000..130_036);
+const HELD_OUT: Layout = layout(9.0, 16.0, OPPOSITE, 130_000..130_036);
 /// Sensors look this much below the middle of the hall, so that their beams cover both ends.
 const BELOW_MIDDLE_DEG: f64 = 6.0;
 /// A cluster found nearer than this to a person is that person.
@@ -69,7 +80,7 @@ pub(crate) struct Seen {
 /// # Errors
 /// A layout that nothing can be simulated of.
 pub(crate) fn watch_all(scene_done: impl Fn(usize, usize) + Sync) -> Result<[Vec<Seen>; 2], Error> {
-    let scenes = |(_, _, _, seeds): &Layout| (seeds.end - seeds.start) as usize;
+    let scenes = |layout: &Layout| (layout.seeds.end - layout.seeds.start) as usize;
     let (done, all) = (AtomicUsize::new(0), LAYOUTS.iter().chain([&HELD_OUT]).map(scenes).sum());
     let told = || scene_done(done.fetch_add(1, Ordering::Relaxed) + 1, all);
     let mut training = Vec::new();
@@ -85,7 +96,7 @@ pub(crate) fn watch_all(scene_done: impl Fn(usize, usize) + Sync) -> Result<[Vec
 pub(crate) fn scenes_listed() -> String {
     let layouts: String = LAYOUTS
         .iter()
-        .map(|(height_m, away_m, directions_deg, seeds)| {
+        .map(|Layout { height_m, away_m, directions_deg, seeds }| {
             format!(
                 "- {} scenes from seed {}, HDL-32E {height_m} m high, {away_m} m from the middle, in the directions \
                  {directions_deg:?}\n",
@@ -104,12 +115,16 @@ pub(crate) fn scenes_listed() -> String {
 
 /// What the errors on a card are of.
 pub(crate) fn held_out_name() -> String {
-    format!("{} scenes of their own from seed {}", HELD_OUT.3.end - HELD_OUT.3.start, HELD_OUT.3.start)
+    format!(
+        "{} scenes of their own from seed {}",
+        HELD_OUT.seeds.end - HELD_OUT.seeds.start,
+        HELD_OUT.seeds.start
+    )
 }
 
 /// Of every scene of a layout, of which so many come before.
 fn seen_in(layout: &Layout, before: u64, scene_done: impl Fn() + Sync) -> Result<Vec<Seen>, Error> {
-    let (height_m, away_m, directions_deg, seeds) = layout.clone();
+    let &Layout { height_m, away_m, directions_deg, ref seeds } = layout;
     let mut config = Config::default();
     let one = config.site.sensors[0].clone();
     config.site.sensors = directions_deg
@@ -125,7 +140,7 @@ fn seen_in(layout: &Layout, before: u64, scene_done: impl Fn() + Sync) -> Result
         })
         .collect();
     let first = seeds.start;
-    let of_scenes = seeds.into_par_iter().map(|seed| {
+    let of_scenes = seeds.clone().into_par_iter().map(|seed| {
         let scene = before + seed - first;
         let samples = watch(crowd_of(scene, seed), with_things(scene / CROWDS)?, seed, &config);
         scene_done();
@@ -139,12 +154,12 @@ const CROWDS: u64 = 6;
 
 /// Who walks in the scene of that number.
 fn crowd_of(scene: u64, seed: u64) -> Crowd {
-    let drawn = |preset, people| circle_crossing(preset, people, 12.5, seed);
+    let drawn = |preset, people| circle_crossing(preset, people, CIRCLE_M, seed);
     match scene % CROWDS {
         0 => drawn(Preset::Orca03, FEW),
         1 => speed_augmented(&drawn(Preset::Mixed, FEW), seed),
         2 => drawn(Preset::Orca06, FEW),
-        3 => pairs(MANY / 2, 0.6, 12.5, seed),
+        3 => pairs(MANY / 2, 0.6, CIRCLE_M, seed),
         4 => drawn(Preset::Mixed, MANY),
         _ => speed_augmented(&drawn(Preset::Orca03, MANY), seed),
     }
@@ -180,23 +195,27 @@ fn watch(crowd: Crowd, bodies: Bodies, seed: u64, config: &Config) -> Result<Vec
                 let view = measurer.pose_view(&points, cluster, priors);
                 let late: i64 = cluster.iter().map(|&i| points[i as usize].time_ns - frame.time_ns).sum();
                 let time_ns = frame.time_ns + late / cluster.len() as i64;
-                let off_m = |state: &PersonState| state.position_m - view.base_m;
-                let own = walkers
-                    .iter()
-                    .filter_map(|walker| Some((walker, walker.state_at(time_ns)?)))
-                    .min_by(|(_, a), (_, b)| off_m(a).length_squared().total_cmp(&off_m(b).length_squared()))
-                    .filter(|(_, state)| off_m(state).length() < OWN_M);
-                let walks = |own: &PersonState| own.velocity_mps.length() > WALKS_FROM_MPS;
-                let seen = |(walker, own): &(&Walker, PersonState)| Seen {
-                    view,
-                    off_m: off_m(own),
-                    heading_rad: (known && view.stands() && !walks(own)).then_some(own.heading_rad),
-                    phase_rad: (!view.stands() && walks(own)).then_some(own.phase_rad),
-                    hand_swing: (!view.stands()).then(|| walker.hand_swing_at(time_ns)).flatten(),
-                };
-                samples.extend(own.as_ref().map(seen));
+                samples.extend(seen_of(&walkers, time_ns, view, known));
             }
         }
     }
     Ok(samples)
+}
+
+/// The view with the pose of whom it is of at that time, where it is anybody's; `known` where his track was.
+fn seen_of(walkers: &[Walker], time_ns: i64, view: PoseView, known: bool) -> Option<Seen> {
+    let off_m = |state: &PersonState| state.position_m - view.base_m;
+    let (walker, own) = walkers
+        .iter()
+        .filter_map(|walker| Some((walker, walker.state_at(time_ns)?)))
+        .min_by(|(_, a), (_, b)| off_m(a).length_squared().total_cmp(&off_m(b).length_squared()))
+        .filter(|(_, state)| off_m(state).length() < OWN_M)?;
+    let walks = own.velocity_mps.length() > WALKS_FROM_MPS;
+    Some(Seen {
+        view,
+        off_m: off_m(&own),
+        heading_rad: (known && view.stands() && !walks).then_some(own.heading_rad),
+        phase_rad: (!view.stands() && walks).then_some(own.phase_rad),
+        hand_swing: (!view.stands()).then(|| walker.hand_swing_at(time_ns)).flatten(),
+    })
 }

@@ -322,7 +322,7 @@ mod tests {
             config: Config::default(),
             source: Source::Scenes(spec.scenes),
         };
-        let found = ablate(&data, &[Mechanism::AxisNetwork], || Duration::ZERO, || {}).unwrap();
+        let found = ablate(&data, &[Mechanism::Pose], || Duration::ZERO, || {}).unwrap();
         assert_eq!((found.scenes, found.rows.len()), (3, 2));
         let position = Figure::ALL.iter().position(|f| *f == Figure::PositionM).unwrap();
         let [whole, without] = [0, 1].map(|row: usize| found.rows[row].figures[position]);
