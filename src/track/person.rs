@@ -31,13 +31,13 @@ const STEP_S: f64 = crate::STEP_S;
 const LIKELIHOOD_RATIO: f64 = 20.0;
 /// A track dies when the probability that somebody is there falls below this: about four frames missed in full view.
 const EXISTENCE_MIN: f64 = 0.05;
-/// So many detections confirm a track, within a time: two of three frames at 10 Hz.
-const CONFIRMING_MATCHES: u32 = 2;
-const CONFIRM_WITHIN_S: f64 = 0.25;
-/// Who may be an arm of somebody beside is confirmed by so many in which legs are to be seen, within a longer time. Where legs
-/// would not be seen it takes more, for arms do not stay.
-const CONFIRMING_MATCHES_ON_TRIAL: u32 = 8;
-const CONFIRM_WITHIN_ON_TRIAL_S: f64 = 1.0;
+/// What shows somebody adds up to this within a time before a track is confirmed: two frames that show most of a body, or more that
+/// show less, for arms and other parts do not stay.
+const SHOWN_TO_CONFIRM: u32 = 8;
+const CONFIRM_WITHIN_S: f64 = 1.0;
+/// What a frame counts that shows most of what beams would meet of a body, from this share of its returns on; any other counts one.
+const SHOWN_BY_BODY: u32 = 4;
+const BODY_SHARE: f64 = 0.5;
 /// Legs reach up to this share of the height. They would be seen where so many returns of them are expected, and so much of what
 /// they give in free sight.
 const LEGS_SHARE: f64 = 0.4;
@@ -72,8 +72,8 @@ pub(super) struct Person {
     pub(super) confirmed: bool,
     /// Born so near to somebody that it may be an arm.
     on_trial: bool,
-    /// How many matches showed legs.
-    matches_with_legs: u32,
+    /// How much of somebody matches have shown.
+    shown: u32,
     /// Probability that somebody is there.
     pub(super) existence: f64,
     pub(super) matches: u32,
@@ -106,7 +106,7 @@ impl Remembered for Person {
         self.stride.visit(words);
         words.bool(&mut self.confirmed);
         words.bool(&mut self.on_trial);
-        words.u32(&mut self.matches_with_legs);
+        words.u32(&mut self.shown);
         words.f64(&mut self.existence);
         words.u32(&mut self.matches);
         words.f64(&mut self.doubled_s);
@@ -141,6 +141,7 @@ impl Person {
         let mut person = Self::new(numbers, id, detection.position_m, variance, time_ns);
         person.origin = Origin::new(detection.position_m, time_ns, beside_furniture);
         person.on_trial = on_trial;
+        person.shown = if on_trial { 1 } else { SHOWN_BY_BODY };
         person.see(numbers, detection, &BodyView::default(), None, 0.0);
         person
     }
@@ -157,7 +158,7 @@ impl Person {
             stride: Stride::default(),
             confirmed: false,
             on_trial: false,
-            matches_with_legs: 0,
+            shown: 0,
             existence: EXISTENCE_AT_BIRTH,
             matches: 1,
             doubled_s: 0.0,
@@ -203,20 +204,24 @@ impl Person {
         self.matches += 1;
         self.last_match_ns = time_ns;
         let lowest_m = detection.aabb.min_m.z - visibility.hall.floor_m(self.filter.position_m());
-        self.matches_with_legs += u32::from(lowest_m < LEGS_SHARE * self.height.mean_m());
-        self.confirmed |= self.is_somebody(view);
+        self.shown += self.shown_by(detection.points, lowest_m, lowest_m + detection.aabb.size_m().z, view);
+        self.confirmed |= self.shown >= SHOWN_TO_CONFIRM;
         self.see(numbers, detection, view, Some(visibility), step_s);
     }
 
-    /// Whether enough of it was seen, by this frame's view, to be somebody of his own.
-    fn is_somebody(&self, view: &BodyView) -> bool {
-        if !self.on_trial {
-            return self.matches >= CONFIRMING_MATCHES;
+    /// How much a detection shows of somebody, of so many points from a height above the floor to another. What may be an arm of somebody
+    /// beside has to show legs where beams would meet them.
+    fn shown_by(&self, points: u32, lowest_m: f64, top_m: f64, view: &BodyView) -> u32 {
+        let has_legs = lowest_m < LEGS_SHARE * self.height.mean_m();
+        if self.on_trial && !has_legs {
+            let legs_would_be_seen = view.beams_known
+                && view.returns_of_legs >= LEGS_RETURNS_MIN.max(LEGS_FREE_SHARE * view.returns_of_legs_alone);
+            return u32::from(!legs_would_be_seen);
         }
-        let legs_would_be_seen = view.beams_known
-            && view.returns_of_legs >= LEGS_RETURNS_MIN.max(LEGS_FREE_SHARE * view.returns_of_legs_alone);
-        self.matches_with_legs >= CONFIRMING_MATCHES
-            || !legs_would_be_seen && self.matches >= CONFIRMING_MATCHES_ON_TRIAL
+        // Who is lower than he was taken for gives fewer.
+        let returns = view.returns * (top_m / self.height.mean_m()).min(1.0);
+        let is_body = !view.beams_known || f64::from(points) >= BODY_SHARE * returns;
+        if is_body { SHOWN_BY_BODY } else { 1 }
     }
 
     /// No detection in this frame, although there was one with chance `detection_probability` a step.
@@ -233,11 +238,7 @@ impl Person {
             || spread[0][0] + spread[1][1] >= POSITION_VARIANCE_MAX_M2
             || self.doubled_s > DUPLICATE_AFTER_S
             || self.origin.is_furniture(time_ns) && seconds(self.last_match_ns, time_ns) > FURNITURE_GONE_S
-            || !self.confirmed && self.origin.age_s(time_ns) > self.confirm_within_s()
-    }
-
-    fn confirm_within_s(&self) -> f64 {
-        if self.on_trial { CONFIRM_WITHIN_ON_TRIAL_S } else { CONFIRM_WITHIN_S }
+            || !self.confirmed && self.origin.age_s(time_ns) > CONFIRM_WITHIN_S
     }
 
     /// Where it stands, if it is furniture.
