@@ -301,6 +301,21 @@ fn what_shows_no_legs_beside_somebody_where_they_would_be_seen_is_never_anybody(
 }
 
 #[test]
+fn who_shows_most_of_a_body_is_confirmed_in_two_frames_and_who_shows_less_in_five() {
+    let confirmed_after = |points: u32| {
+        let mut tracker = Tracker::new(&Config::for_mode(Mode::Default).track, &open_site());
+        let mut tracks = Vec::new();
+        let mut is_confirmed = |k: u64| {
+            let views = full_turn(k);
+            tracker.update(&views, &[somebody_at(0.0, points, views.time_ns)], &mut tracks);
+            tracks.iter().any(|track| track.confirmed)
+        };
+        1 + (0..30).position(|k| is_confirmed(k)).expect("somebody")
+    };
+    assert_eq!([confirmed_after(200), confirmed_after(12)], [2, 5]);
+}
+
+#[test]
 fn what_somebody_pushes_is_nobody_and_a_child_ahead_is_somebody() {
     let at_last = |long_m: f64, ahead_m: f64| {
         let seen = |k: u64, time_ns: i64| {
