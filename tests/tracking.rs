@@ -216,11 +216,8 @@ fn who_is_out_of_sight_for_long_is_not_told_but_known_again() {
         if hidden {
             frame.scans.clear(); // the sensor is silent, so nobody can be seen
         }
-        tracker.update(
-            &Views::of(&frame),
-            if hidden { &[] } else { std::slice::from_ref(&seen) },
-            &mut tracks,
-        );
+        let seen = if hidden { &[][..] } else { std::slice::from_ref(&seen) };
+        tracker.update(&Views::of(&frame), seen, &mut tracks);
         told.push(tracks[..].iter().map(|track| (track.id, track.confirmed)).collect::<Vec<_>>());
     }
     assert_eq!(told[22], [(0, true)]);
@@ -249,11 +246,16 @@ fn pieces_of_a_person_keep_a_track_and_start_none() {
 
 /// How many are told of in each of 30 frames in which `seen` is found at a time.
 fn told(seen: impl Fn(u64, i64) -> Vec<Detection>) -> Vec<usize> {
+    told_in(|k| Views::of(&frame(k)), seen)
+}
+
+/// The same in 30 frames of what sensors see.
+fn told_in(views: impl Fn(u64) -> Views, seen: impl Fn(u64, i64) -> Vec<Detection>) -> Vec<usize> {
     let mut tracker = Tracker::new(&Config::for_mode(Mode::Default).track, &open_site());
     let mut tracks = Vec::new();
     let after = |k: u64| {
-        let frame = frame(k);
-        tracker.update(&Views::of(&frame), &seen(k, frame.time_ns), &mut tracks);
+        let views = views(k);
+        tracker.update(&views, &seen(k, views.time_ns), &mut tracks);
         tracks.iter().filter(|track| track.confirmed).count()
     };
     (0..30).map(after).collect()
@@ -285,17 +287,14 @@ fn what_shows_beside_somebody_is_somebody_if_it_shows_legs_or_legs_cannot_be_see
 #[test]
 fn what_shows_no_legs_beside_somebody_where_they_would_be_seen_is_never_anybody() {
     let most = |lowest_m: f64| {
-        let mut tracker = Tracker::new(&Config::for_mode(Mode::Default).track, &open_site());
-        let mut tracks = Vec::new();
-        let after = |k: u64| {
-            let views = full_turn(k);
-            let mut beside = somebody_at(0.7, 12, views.time_ns);
+        let seen = |k: u64, time_ns: i64| {
+            let mut beside = somebody_at(0.7, 12, time_ns);
             beside.aabb.min_m.z = lowest_m;
-            let seen = [somebody_at(0.0, 100, views.time_ns), beside];
-            tracker.update(&views, if k < 5 { &seen[..1] } else { &seen }, &mut tracks);
-            tracks.iter().filter(|track| track.confirmed).count()
+            let mut seen = vec![somebody_at(0.0, 100, time_ns)];
+            seen.extend((k >= 5).then_some(beside));
+            seen
         };
-        (0..30).map(after).max().unwrap()
+        told_in(full_turn, seen).into_iter().max().unwrap()
     };
     assert_eq!([most(1.0), most(0.1)], [1, 2]);
 }
@@ -303,14 +302,8 @@ fn what_shows_no_legs_beside_somebody_where_they_would_be_seen_is_never_anybody(
 #[test]
 fn who_shows_most_of_a_body_is_confirmed_in_two_frames_and_who_shows_less_in_five() {
     let confirmed_after = |points: u32| {
-        let mut tracker = Tracker::new(&Config::for_mode(Mode::Default).track, &open_site());
-        let mut tracks = Vec::new();
-        let mut is_confirmed = |k: u64| {
-            let views = full_turn(k);
-            tracker.update(&views, &[somebody_at(0.0, points, views.time_ns)], &mut tracks);
-            tracks.iter().any(|track| track.confirmed)
-        };
-        1 + (0..30).position(|k| is_confirmed(k)).expect("somebody")
+        let told = told_in(full_turn, |_, time_ns| vec![somebody_at(0.0, points, time_ns)]);
+        1 + told.iter().position(|&people| people == 1).expect("somebody")
     };
     assert_eq!([confirmed_after(200), confirmed_after(12)], [2, 5]);
 }
@@ -333,15 +326,20 @@ fn what_somebody_pushes_is_nobody_and_a_child_ahead_is_somebody() {
     assert_eq!(at_last(0.8, 2.0), 2, "out of arms' reach");
 }
 
-#[test]
-fn somebody_who_leaves_is_forgotten_within_half_a_second() {
-    let config = Config::for_mode(Mode::Default).track;
-    let mut tracker = Tracker::new(&config, &open_site());
+/// A tracker and its tracks after so many frames of somebody who stands.
+fn stood(frames: u64) -> (Tracker, Vec<Track>) {
+    let mut tracker = Tracker::new(&Config::for_mode(Mode::Default).track, &open_site());
     let mut tracks = Vec::new();
-    for index in 0..20 {
+    for index in 0..frames {
         let frame = frame(index);
         tracker.update(&Views::of(&frame), &[detection(DVec2::X, frame.time_ns)], &mut tracks);
     }
+    (tracker, tracks)
+}
+
+#[test]
+fn somebody_who_leaves_is_forgotten_within_half_a_second() {
+    let (mut tracker, mut tracks) = stood(20);
     assert_eq!(tracks.len(), 1);
     for index in 20..25 {
         tracker.update(&Views::of(&frame(index)), &[], &mut tracks);
@@ -351,13 +349,7 @@ fn somebody_who_leaves_is_forgotten_within_half_a_second() {
 
 #[test]
 fn somebody_whom_no_sensor_sees_is_kept_for_three_seconds() {
-    let config = Config::for_mode(Mode::Default).track;
-    let mut tracker = Tracker::new(&config, &open_site());
-    let mut tracks = Vec::new();
-    for index in 0..20 {
-        let frame = frame(index);
-        tracker.update(&Views::of(&frame), &[detection(DVec2::X, frame.time_ns)], &mut tracks);
-    }
+    let (mut tracker, mut tracks) = stood(20);
     let blind = |index| Frame { scans: Vec::new(), ..frame(index) };
     for index in 20..50 {
         tracker.update(&Views::of(&blind(index)), &[], &mut tracks);
@@ -388,13 +380,7 @@ fn detections_that_come_without_scans_are_believed_and_missed() {
 
 #[test]
 fn frames_repeated_or_late_change_nothing() {
-    let config = Config::for_mode(Mode::Default).track;
-    let mut tracker = Tracker::new(&config, &open_site());
-    let mut tracks = Vec::new();
-    for index in 0..10 {
-        let frame = frame(index);
-        tracker.update(&Views::of(&frame), &[detection(DVec2::X, frame.time_ns)], &mut tracks);
-    }
+    let (mut tracker, mut tracks) = stood(10);
     let before = tracks.clone();
     for index in [9, 3] {
         let frame = frame(index);
@@ -486,11 +472,8 @@ fn the_heading_is_open_until_somebody_walks_and_again_with_the_time_one_stands()
     for index in 0..90 {
         let frame = frame(index);
         let walked_m = 0.12 * index.clamp(20, 60) as f64;
-        tracker.update(
-            &Views::of(&frame),
-            &[detection(DVec2::new(walked_m - 4.0, 0.0), frame.time_ns)],
-            &mut tracks,
-        );
+        let seen = detection(DVec2::new(walked_m - 4.0, 0.0), frame.time_ns);
+        tracker.update(&Views::of(&frame), &[seen], &mut tracks);
         sigmas_rad.push(tracks[0].heading_sigma_rad);
     }
     assert!(sigmas_rad[15] > 1.0, "standing from the start: {}", sigmas_rad[15]);

@@ -89,7 +89,7 @@ const JOBS: [Job; 57] = [
     job("objects", "objects put in after the empty scan: who is invented, for how long", 6, Needs::Nothing, objects::objects),
     job("standing", "people who stand or sit from the first frame on", 25, Needs::Nothing, standing::standing),
     job("glass", "glass, mirrors, biased ranges, edges, dark cloth: together and each alone", 5, Needs::Nothing, glass::glass),
-    job("gestures", "people who talk with their hands beside a sensor", 10, Needs::Nothing, gestures::gestures),
+    job("gestures", "people who talk with their hands around a sensor, and ten among each other", 10, Needs::Nothing, gestures::gestures),
     job("cut", "what a frame gains that closes as soon as the part with people has", 3, Needs::Nothing, crowds::cut),
     job("network", "what forecasts gain a network: outage, changes, the gap to the oracle", 20, Needs::Nothing, crowds::network),
     job("network-sweeps", "the same over margins, procedures, crowds, access points and models", 10, Needs::Nothing, crowds::network_sweeps),
