@@ -72,7 +72,7 @@ pub(super) struct Person {
     pub(super) confirmed: bool,
     /// Born so near to somebody that it may be an arm.
     on_trial: bool,
-    /// How much of somebody matches have shown.
+    /// How much of somebody matches have shown until it was confirmed.
     shown: u32,
     /// Probability that somebody is there.
     pub(super) existence: f64,
@@ -203,24 +203,25 @@ impl Person {
         self.existence = (there / (there + 1.0 - self.existence)).min(EXISTENCE_MAX);
         self.matches += 1;
         self.last_match_ns = time_ns;
-        let lowest_m = detection.aabb.min_m.z - visibility.hall.floor_m(self.filter.position_m());
-        self.shown += self.shown_by(detection.points, lowest_m, lowest_m + detection.aabb.size_m().z, view);
-        self.confirmed |= self.shown >= SHOWN_TO_CONFIRM;
+        if !self.confirmed {
+            self.shown += self.shown_by(detection, visibility.hall.floor_m(self.filter.position_m()), view);
+            self.confirmed = self.shown >= SHOWN_TO_CONFIRM;
+        }
         self.see(numbers, detection, view, Some(visibility), step_s);
     }
 
-    /// How much a detection shows of somebody, of so many points from a height above the floor to another. What may be an arm of somebody
-    /// beside has to show legs where beams would meet them.
-    fn shown_by(&self, points: u32, lowest_m: f64, top_m: f64, view: &BodyView) -> u32 {
-        let has_legs = lowest_m < LEGS_SHARE * self.height.mean_m();
+    /// How much a detection shows of somebody on a floor of that height. What may be an arm of somebody beside has to show legs where
+    /// beams would meet them.
+    fn shown_by(&self, detection: &Detection, floor_m: f64, view: &BodyView) -> u32 {
+        let has_legs = detection.aabb.min_m.z - floor_m < LEGS_SHARE * self.height.mean_m();
         if self.on_trial && !has_legs {
             let legs_would_be_seen = view.beams_known
                 && view.returns_of_legs >= LEGS_RETURNS_MIN.max(LEGS_FREE_SHARE * view.returns_of_legs_alone);
             return u32::from(!legs_would_be_seen);
         }
         // Who is lower than he was taken for gives fewer.
-        let returns = view.returns * (top_m / self.height.mean_m()).min(1.0);
-        let is_body = !view.beams_known || f64::from(points) >= BODY_SHARE * returns;
+        let returns = view.returns * (detection.top_m / self.height.mean_m()).min(1.0);
+        let is_body = !view.beams_known || f64::from(detection.points) >= BODY_SHARE * returns;
         if is_body { SHOWN_BY_BODY } else { 1 }
     }
 

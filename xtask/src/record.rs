@@ -1,6 +1,7 @@
 //! `record`: every figure that a document quotes comes from a file of `record/`, and this makes those files. Each
 //! begins with the command it comes from and the commit it was made from.
 
+mod bare_hall;
 mod book;
 mod calibrate;
 mod crowds;

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use std::ffi::OsString;
 use std::fs;
 
+use super::bare_hall::{BareHall, SMALL_HALL};
 use super::book::Book;
 use super::living::{Row, draws, read, simulated, table, walked};
 use crate::tools::Result;
@@ -26,10 +27,12 @@ const KEPT_M: f64 = 0.3;
 /// Sensors on a stand in the middle of the default hall: model and height.
 const SENSORS: [(&str, f64); 3] = [("vlp-16", 1.5), ("hdl-32e", 2.5), ("os0-32", 1.8)];
 
-/// Halls in which ten stop, queue and meet: length, width and height, with two sensors on the short walls, so high, that look down by so
-/// many degrees.
-const HALLS: [[f64; 5]; 3] =
-    [[30.0, 18.0, 6.0, 5.0, 19.0], [20.0, 12.0, 4.0, 3.2, 15.0], [9.0, 7.0, 3.0, 2.4, 27.0]];
+/// Halls in which ten stop, queue and meet.
+const HALLS: [BareHall; 3] = [
+    BareHall { length_m: 30.0, width_m: 18.0, height_m: 6.0, sensors_up_m: 5.0, sensors_down_deg: 19.0 },
+    SMALL_HALL,
+    BareHall { length_m: 9.0, width_m: 7.0, height_m: 3.0, sensors_up_m: 2.4, sensors_down_deg: 27.0 },
+];
 const PEOPLE_IN_HALL: u32 = 10;
 /// No other record draws these.
 const HALL_SEED: &str = "233000";
@@ -56,34 +59,18 @@ fn head(book: &mut Book, [first, second]: [&str; 2]) {
 
 fn among_others(book: &mut Book) -> Result<()> {
     head(book, ["hall, m", "crowd"]);
-    for [length_m, width_m, height_m, up_m, down_deg] in HALLS {
-        let site = book.scratch(&format!("hall-{length_m}.toml"));
-        let sensor = |name: &str, x_m: f64, yaw_deg: f64| {
-            format!(
-                "[[site.sensors]]\nname = \"{name}\"\nposition_m = [{x_m:.1}, 0.0, {up_m:.1}]\n\
-                 rotation_deg = {{ yaw = {yaw_deg:.1}, pitch = {down_deg:.1}, roll = 0.0 }}\n"
-            )
-        };
-        let wall_m = 0.5 * length_m - 0.4;
-        let text = format!(
-            "[site]\nname = \"hall\"\npillars = []\nfurniture = []\n[site.hall]\nlength_m = {length_m:.1}\n\
-             width_m = {width_m:.1}\nheight_m = {height_m:.1}\n[[site.access_points]]\nname = \"wall\"\n\
-             position_m = [0.0, {:.1}, {:.1}]\n{}{}",
-            0.5 * width_m - 0.2,
-            height_m - 1.0,
-            sensor("east", wall_m, 180.0),
-            sensor("west", -wall_m, 0.0)
-        );
-        fs::write(&site, text).map_err(|e| e.to_string())?;
+    for hall in HALLS {
+        let size = format!("{} x {}", hall.length_m, hall.width_m);
+        let site = book.scratch(&format!("hall-{size}.toml").replace(' ', ""));
+        fs::write(&site, hall.site(&["hdl-32e", "hdl-32e"])).map_err(|e| e.to_string())?;
         for bodies in ["gesturing", "plain"] {
             let mut words: Vec<String> =
                 ["--scenes", &SCENES.to_string(), "--seed", HALL_SEED, "--preset", "mixed"]
                     .map(str::to_owned)
                     .to_vec();
             words.extend(["--site", &site.to_string_lossy(), "--bodies", bodies].map(str::to_owned));
-            let sim = simulated(book, &format!("{length_m}-{bodies}"), &words)?;
-            let what = format!("{:<12} {:>9} {bodies:<10}", format!("{length_m} x {width_m}"), "mixed");
-            row(book, &what, &sim, PEOPLE_IN_HALL)?;
+            let sim = simulated(book, &format!("{size}-{bodies}").replace(' ', ""), &words)?;
+            row(book, &format!("{size:<12} {:>9} {bodies:<10}", "mixed"), &sim, PEOPLE_IN_HALL)?;
         }
     }
     Ok(())

@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
 
+use super::bare_hall::SMALL_HALL;
 use super::book::Book;
 use super::living::{Row, draws, read, rings, simulated, stools, table, walked, way, with_stools};
 use crate::tools::{Result, argument, root};
@@ -27,30 +28,6 @@ const STANDING: u64 = 4;
 const CLOUD_SCENES: u64 = 8;
 const CLOUDS_S: f64 = 20.0;
 
-/// Hall of 20 x 12 m, the sensors on its short walls. The second sensor is left out where one of model `points` is meant.
-const SMALL_HALL: &str = r#"[site]
-name = "small"
-pillars = []
-furniture = []
-[site.hall]
-length_m = 20.0
-width_m = 12.0
-height_m = 4.0
-[[site.access_points]]
-name = "wall"
-position_m = [0.0, 5.8, 3.0]
-[[site.sensors]]
-name = "lidar_east"
-MODEL
-position_m = [9.6, 0.0, 3.2]
-rotation_deg = { yaw = 180.0, pitch = 15.0, roll = 0.0 }
-"#;
-const SECOND_SENSOR: &str = r#"[[site.sensors]]
-name = "lidar_west"
-position_m = [-9.6, 0.0, 3.2]
-rotation_deg = { yaw = 0.0, pitch = 15.0, roll = 0.0 }
-"#;
-
 /// One table: the share of frames in which those who stand or sit are followed.
 pub fn standing(book: &mut Book) -> Result<()> {
     book.command("cargo xtask record standing");
@@ -62,9 +39,9 @@ pub fn standing(book: &mut Book) -> Result<()> {
         let file = book.scratch(name);
         fs::write(&file, text).map_err(|e| e.to_string()).map(|()| file.to_string_lossy().into_owned())
     };
-    let small = site("small.toml", &(SMALL_HALL.replace("MODEL", "model = \"hdl-32e\"") + SECOND_SENSOR))?;
-    let beams = site("one.toml", &SMALL_HALL.replace("MODEL", "model = \"hdl-32e\""))?;
-    let clouds = site("points.toml", &SMALL_HALL.replace("MODEL", "model = \"points\""))?;
+    let small = site("small.toml", &SMALL_HALL.site(&["hdl-32e", "hdl-32e"]))?;
+    let beams = site("one.toml", &SMALL_HALL.site(&["hdl-32e"]))?;
+    let clouds = site("points.toml", &SMALL_HALL.site(&["points"]))?;
     let stools = site("stools.toml", &with_stools()?)?;
 
     let beams_and_clouds = ["--clouds", "--site", beams.as_str()];
