@@ -47,13 +47,13 @@ pub(crate) struct Outline {
     to_rx_m: f64,
     /// From the lowest up: right and left edge, bottom and top, from the path.
     stripes: Vec<[f64; 4]>,
-    extents: Vec<[f64; 2]>,
 }
 
 /// The mesh of a body at an instant, with what does not depend on the path that it is looked at along.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
-    vertices_m: Vec<DVec3>,
+    /// Its vertices from above, by stripe from the lowest up.
+    stripes_m: Vec<Vec<DVec2>>,
     middle_m: DVec2,
     bottom_m: f64,
     top_m: f64,
@@ -67,7 +67,12 @@ impl Body {
         let [bottom_m, top_m] =
             vertices_m.iter().fold([first.z; 2], |[low, high], v| [low.min(v.z), high.max(v.z)]);
         let middle_m = sum_m.truncate() / vertices_m.len() as f64;
-        Some(Self { vertices_m, middle_m, bottom_m, top_m })
+        let count = ((top_m - bottom_m) / STRIPE_M).ceil().max(1.0) as usize;
+        let mut stripes_m = vec![Vec::new(); count];
+        for v in vertices_m {
+            stripes_m[(((v.z - bottom_m) / STRIPE_M) as usize).min(count - 1)].push(v.truncate());
+        }
+        Some(Self { stripes_m, middle_m, bottom_m, top_m })
     }
 }
 
@@ -90,19 +95,17 @@ impl Outline {
         if path_m > top_m + 1.0 {
             return false;
         }
-        let count = ((top_m - bottom_m) / STRIPE_M).ceil().max(1.0) as usize;
-        self.extents.clear();
-        self.extents.resize(count, [f64::MAX, f64::MIN]);
         let of_rx_m = along.perp_dot(rx_m.truncate());
-        for v in &body.vertices_m {
-            let across_m = along.x * v.y - along.y * v.x - of_rx_m;
-            let extent = &mut self.extents[(((v.z - bottom_m) / STRIPE_M) as usize).min(count - 1)];
-            *extent = [extent[0].min(across_m), extent[1].max(across_m)];
-        }
         self.stripes.clear();
-        for (i, [right_m, left_m]) in self.extents.iter().enumerate().filter(|(_, [r, l])| r < l) {
-            let at_m = |edge: usize| (bottom_m + edge as f64 * STRIPE_M).min(top_m) - path_m;
-            self.stripes.push([*right_m, *left_m, at_m(i), at_m(i + 1)]);
+        for (i, stripe_m) in body.stripes_m.iter().enumerate() {
+            let [right_m, left_m] = stripe_m.iter().fold([f64::MAX, f64::MIN], |[right, left], v| {
+                let across_m = along.perp_dot(*v) - of_rx_m;
+                [right.min(across_m), left.max(across_m)]
+            });
+            if right_m < left_m {
+                let at_m = |edge: usize| (bottom_m + edge as f64 * STRIPE_M).min(top_m) - path_m;
+                self.stripes.push([right_m, left_m, at_m(i), at_m(i + 1)]);
+            }
         }
         !self.stripes.is_empty()
     }
