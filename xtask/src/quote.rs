@@ -17,7 +17,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use crate::answers;
-use crate::record::{ANSWERS, COMMIT, RADIO, TOOK};
+use crate::record::{ANSWERS, COMMIT, MACHINE, RADIO, TOOK};
 use crate::tools::{Result, files_below, root};
 
 /// What a comment of a quoted block begins with.
@@ -163,7 +163,7 @@ fn cut(record: &str, rules: &[&str]) -> (String, Vec<String>) {
         }
         block += first.trim_end();
         block.push('\n');
-        let head = |line: &&str| [COMMIT, ANSWERS, TOOK].iter().any(|head| line.starts_with(head));
+        let head = |line: &&str| [COMMIT, ANSWERS, MACHINE, TOOK].iter().any(|head| line.starts_with(head));
         let paragraph = lines.filter(|line| !head(line)).take_while(|line| !line.trim().is_empty());
         let paragraph: Vec<&str> = paragraph.collect();
         for line in paragraph.iter().filter(|line| further.iter().any(|glob| begins(line, glob))) {
@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn the_head_of_a_record_is_not_quoted() {
-        let record = RECORD.replacen('\n', "\n# commit 1\n# answers 2\n# took 3 s\n", 1);
+        let record = RECORD.replacen('\n', "\n# commit 1\n# answers 2\n# machine 4\n# took 3 s\n", 1);
         let (block, _) = cut(&record, &["$ umbracast | *"]);
         assert_eq!(block, "$ umbracast evaluate\nmode   F1\npaper  .80\nours   .94\n");
     }

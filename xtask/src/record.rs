@@ -24,7 +24,7 @@ use std::fs;
 use crate::answers::{self, ASKED};
 use crate::quote::{self, Digests};
 use crate::tools::{Result, Scratch, built, data, output, root, target};
-pub use book::{ANSWERS, COMMIT, TOOK};
+pub use book::{ANSWERS, COMMIT, MACHINE, TOOK};
 use book::{Bench, Book, took_s};
 
 /// One file of `record/`, `NAME.txt`, with the pictures that belong to it.

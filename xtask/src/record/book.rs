@@ -9,9 +9,10 @@ use std::time::Instant;
 use crate::tools::{Result, Scratch, data, root};
 
 /// What the lines of a record's head begin with, right below its first command: the commit that it was made from, the digest
-/// of the program's answers, and the seconds that it took. Documents do not quote them.
+/// of the program's answers, the machine, and the seconds that it took. Documents do not quote them.
 pub const COMMIT: &str = "# commit ";
 pub const ANSWERS: &str = "# answers ";
+pub const MACHINE: &str = "# machine ";
 pub const TOOK: &str = "# took ";
 
 /// What every job works with.
@@ -156,7 +157,7 @@ impl Book {
         let before = if self.adds { fs::read_to_string(&place).unwrap_or_default() } else { String::new() };
         let between = if before.is_empty() { "" } else { "\n" };
         let seconds = self.begun.elapsed().as_secs();
-        let text = headed(&self.text, &self.commit, &self.answers, seconds);
+        let text = headed(&self.text, &self.commit, &self.answers, &machine(), seconds);
         fs::write(&place, before + between + &text).map_err(|e| format!("{name}: {e}"))?;
         Ok(format!("{name}: {seconds} s"))
     }
@@ -180,9 +181,21 @@ pub fn spoken(words: &[OsString]) -> String {
 }
 
 /// A record with its head below the first line, whatever that is.
-fn headed(text: &str, commit: &str, answers: &str, seconds: u64) -> String {
+fn headed(text: &str, commit: &str, answers: &str, machine: &str, seconds: u64) -> String {
     let (first, rest) = text.split_once('\n').unwrap_or((text, ""));
-    format!("{first}\n{COMMIT}{commit}\n{ANSWERS}{answers}\n{TOOK}{seconds} s\n{rest}")
+    format!("{first}\n{COMMIT}{commit}\n{ANSWERS}{answers}\n{MACHINE}{machine}\n{TOOK}{seconds} s\n{rest}")
+}
+
+/// What times depend on: the processor, its cores, and whether it has the vectors that the networks of the stages use where they can.
+fn machine() -> String {
+    let about = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let of =
+        |key: &str| about.lines().find(|line| line.starts_with(key)).and_then(|line| line.split_once(": "));
+    let model = of("model name").map_or("unknown processor", |(_, model)| model.trim());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let avx512 =
+        if of("flags").is_some_and(|(_, flags)| flags.contains("avx512f")) { "with" } else { "without" };
+    format!("{model}, cores {cores}, {avx512} AVX-512")
 }
 
 /// Seconds that a record took; of several looks, the last.
@@ -197,8 +210,11 @@ mod tests {
 
     #[test]
     fn a_record_says_what_it_is_of_and_what_it_took() {
-        let record = headed("$ umbracast\n\nF1\n", "12ab", "99ff", 312);
-        assert_eq!(record, "$ umbracast\n# commit 12ab\n# answers 99ff\n# took 312 s\n\nF1\n");
+        let record = headed("$ umbracast\n\nF1\n", "12ab", "99ff", "EPYC", 312);
+        assert_eq!(
+            record,
+            "$ umbracast\n# commit 12ab\n# answers 99ff\n# machine EPYC\n# took 312 s\n\nF1\n"
+        );
         assert_eq!(took_s(&record), Some(312.0));
         assert_eq!(took_s(&(record.clone() + &record.replace("312", "4"))), Some(4.0));
         assert_eq!(took_s("$ umbracast\nF1\n"), None);
