@@ -186,15 +186,16 @@ fn headed(text: &str, commit: &str, answers: &str, machine: &str, seconds: u64) 
     format!("{first}\n{COMMIT}{commit}\n{ANSWERS}{answers}\n{MACHINE}{machine}\n{TOOK}{seconds} s\n{rest}")
 }
 
-/// What times depend on: the processor, its cores, and whether it has the vectors that the networks of the stages use where they can.
+/// What times depend on: the processor, its cores, and whether it has the vectors that forecasts use where they can.
 fn machine() -> String {
     let about = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let of =
-        |key: &str| about.lines().find(|line| line.starts_with(key)).and_then(|line| line.split_once(": "));
-    let model = of("model name").map_or("unknown processor", |(_, model)| model.trim());
+    let of = |key: &str| {
+        let line = about.lines().find(|line| line.starts_with(key))?;
+        line.split_once(':').map(|(_, value)| value.trim())
+    };
+    let model = of("model name").unwrap_or("unknown processor");
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let avx512 =
-        if of("flags").is_some_and(|(_, flags)| flags.contains("avx512f")) { "with" } else { "without" };
+    let avx512 = if of("flags").unwrap_or_default().contains("avx512f") { "with" } else { "without" };
     format!("{model}, cores {cores}, {avx512} AVX-512")
 }
 
