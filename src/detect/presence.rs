@@ -63,10 +63,11 @@ impl Presence {
     pub(super) fn near(&self, at_m: DVec3) -> Near {
         let mut near = Near::Nobody;
         for expected in self.around(at_m).filter(|expected| !expected.is_furniture) {
-            if expected.walked {
-                return Near::Walker;
-            }
-            near = Near::Unsure;
+            near = match (near, expected.walked) {
+                (Near::Nobody | Near::Unsure, false) => Near::Unsure,
+                (Near::Nobody | Near::Walker, true) => Near::Walker,
+                _ => return Near::Both,
+            };
         }
         near
     }
@@ -152,10 +153,12 @@ mod tests {
                 let reach_m = |of: &&Prior| FREEZE_M + of.position_sigma_m.min(FREEZE_M);
                 let people: Vec<&Prior> =
                     priors.iter().filter(|of| !of.is_furniture && within(of, reach_m(of))).collect();
-                let near = match (people.is_empty(), people.iter().any(|of| of.walked)) {
-                    (true, _) => Near::Nobody,
-                    (false, false) => Near::Unsure,
+                let any = |walked: bool| people.iter().any(|of| of.walked == walked);
+                let near = match (any(false), any(true)) {
+                    (false, false) => Near::Nobody,
+                    (true, false) => Near::Unsure,
                     (false, true) => Near::Walker,
+                    (true, true) => Near::Both,
                 };
                 assert_eq!(presence.near(at_m), near, "{n} {at_m}");
                 assert_eq!(presence.is_somebodys(at_m), !people.is_empty());
