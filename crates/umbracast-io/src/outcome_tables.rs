@@ -40,6 +40,17 @@ impl OutcomeRows {
         self.bindings.extend(rows::bindings(scene, outcome));
         self.decisions.extend(rows::decisions(scene, outcome));
     }
+
+    /// Of memory.
+    pub fn bytes(&self) -> usize {
+        let Self { detections, tracks, links, losses, bindings, decisions } = self;
+        size_of_val(&**detections)
+            + size_of_val(&**tracks)
+            + size_of_val(&**links)
+            + size_of_val(&**losses)
+            + size_of_val(&**bindings)
+            + size_of_val(&**decisions)
+    }
 }
 
 /// The tables of a run; those of the radio where the site has one.

@@ -26,8 +26,10 @@ use crate::progress::bar;
 use crate::run_json::{Ranges, RunJson, Stopwatch};
 use crate::{say, setup};
 
-/// Frames of a scene that runs ahead of an earlier one, whose rows wait for the tables.
-const AHEAD: usize = 512;
+/// Rows of scenes that run ahead of an earlier one wait for the tables, at most so many bytes of all scenes together.
+const AHEAD_BYTES: usize = 1 << 30;
+/// A scene hands so many over at once.
+const PIECE_BYTES: usize = 1 << 20;
 /// So large a share of doubled detections tells that a sensor hangs elsewhere: next to none are where both hang right, a sixth
 /// and more where one is off by 2 degrees and 10 cm.
 const DOUBLED_SHARE_MAX: f64 = 0.02;
@@ -41,6 +43,13 @@ struct Step {
     rows: OutcomeRows,
     heard: Vec<Report>,
     doubled: usize,
+}
+
+impl Step {
+    /// Of memory.
+    fn bytes(&self) -> usize {
+        size_of::<Self>() + self.rows.bytes() + size_of_val(&*self.heard)
+    }
 }
 
 /// What every scene is run with.
@@ -94,13 +103,13 @@ pub fn run(args: &Run, common: &Common) -> Result<Ending, Error> {
         std::thread::scope(|scope| -> Result<(), Error> {
             let mut running = Vec::new();
             for &(number, input) in some {
-                let (results, coming) = mpsc::sync_channel(AHEAD);
+                let (results, coming) = mpsc::sync_channel((AHEAD_BYTES / PIECE_BYTES / at_once).max(1));
                 let method = &method;
                 running.push((scope.spawn(move || run_scene(number, input, method, &results)), coming));
             }
             for (scene, coming) in running {
                 let mut numbers = Ranges::default();
-                for step in coming {
+                for step in coming.into_iter().flatten() {
                     steps.add(step.took);
                     numbers.push(step.frame);
                     detected += step.rows.detections.len();
@@ -235,7 +244,7 @@ fn run_scene(
     scene: u32,
     input: &Input,
     method: &Method,
-    results: &SyncSender<Step>,
+    results: &SyncSender<Vec<Step>>,
 ) -> Result<(Health, u64, Vec<String>), Error> {
     let Method { config, weights, empty, threads, reports, recordings } = method;
     let mut reports = inputs::heard(scene, input, *reports, &config.site)?;
@@ -244,6 +253,10 @@ fn run_scene(
     empty.iter().for_each(|frame| pipeline.learn_empty(frame));
     let mut recording = recordings.map(|(folder, points)| Recording::new(folder, scene, config, points));
     let (mut health, mut stage_health, mut returns) = (Health::default(), Health::default(), 0);
+    let (mut piece, mut bytes) = (Vec::new(), 0);
+    let hand_over = |piece: &mut Vec<Step>| {
+        results.send(std::mem::take(piece)).map_err(|_| Error::new("the tables ended before their rows"))
+    };
     let lost = input.frames(&config.site, &mut health, |frame| {
         returns += returns_of(frame);
         let watch = Stopwatch::start();
@@ -258,8 +271,17 @@ fn run_scene(
         if let Some(recording) = &mut recording {
             recording.write(&step, outcome)?;
         }
-        results.send(step).map_err(|_| Error::new("the tables ended before their rows"))
-    })?;
+        bytes += step.bytes();
+        piece.push(step);
+        if bytes < PIECE_BYTES {
+            return Ok(());
+        }
+        bytes = 0;
+        hand_over(&mut piece)
+    });
+    // What came before an input's error stays.
+    hand_over(&mut piece)?;
+    let lost = lost?;
     recording.map_or(Ok(()), Recording::finish)?;
     // Returns that packets hold out of range are in no frame.
     returns += health.points_invalid;
