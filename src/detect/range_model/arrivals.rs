@@ -56,6 +56,7 @@ impl RangeModel {
             return false;
         }
         match (stay.came, near()) {
+            // Whoever may have stood there is gone, and who walked there since does not stay.
             (Near::Unsure, Near::Nobody | Near::Walker) => true,
             // Whoever brought it has left it there.
             (Near::Walker | Near::Both, Near::Nobody) => {

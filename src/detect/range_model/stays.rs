@@ -35,6 +35,6 @@ pub enum Near {
     /// Who may be a person, but was never seen to walk; or what is there was hidden before.
     Unsure,
     Walker,
-    /// One of each.
+    /// A walker, and beside him somebody who was never seen to walk.
     Both,
 }
