@@ -50,9 +50,26 @@ impl<const IN: usize, const OUT: usize> Layer<IN, OUT> {
     #[inline(always)]
     pub(crate) fn of(&self, inputs: &[f32; IN]) -> [f32; OUT] {
         let mut sums = self.bias;
+        let (whole, rest) = sums.as_chunks_mut::<AT_ONCE>();
+        for (chunk, sums) in whole.iter_mut().enumerate() {
+            // A copy stays in registers while all weights pass.
+            let mut kept = *sums;
+            for (weights, input) in self.weights.iter().zip(inputs) {
+                add(&mut kept, &weights.as_chunks::<AT_ONCE>().0[chunk], input);
+            }
+            *sums = kept;
+        }
         for (weights, input) in self.weights.iter().zip(inputs) {
-            sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * input);
+            add(rest, weights.as_chunks::<AT_ONCE>().1, input);
         }
         sums
     }
+}
+
+/// Sums that the registers of a processor hold: eight of AVX2.
+const AT_ONCE: usize = 64;
+
+#[inline(always)]
+fn add(sums: &mut [f32], weights: &[f32], input: &f32) {
+    sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * input);
 }

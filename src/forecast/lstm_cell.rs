@@ -1,8 +1,8 @@
 //! One LSTM step for several people at once, on weights packed for streaming.
 //!
 //! A step reads all 4.7 MB of weights, so they are laid out in the order in which they are read: blocks of
-//! [`LANES`] units, each row by row of the input, all gates side by side. People go in groups of [`GROUP`], whose sums stay in
-//! registers while a block streams by.
+//! [`LANES`] units, in each the gates whose sums are in registers at once, row by row of the input. People go in groups of
+//! [`GROUP`], whose sums stay in registers while the weights stream by.
 
 use crate::elementary::{multiply_add_f32, sigmoid_f32, tanh_f32};
 
@@ -24,8 +24,10 @@ pub(super) struct PackedCell {
     pub inputs: usize,
     /// Hidden units, a multiple of [`LANES`].
     pub units: usize,
-    /// Per block of [`LANES`] units: one row of all gates for each input, then for each hidden unit.
-    blocks: Vec<[Lanes; GATES]>,
+    /// Gates whose sums are in registers at a time: one or all.
+    at_once: usize,
+    /// Per block of [`LANES`] units, and there per gates at once: one row of these for each input, then for each hidden unit.
+    blocks: Vec<Lanes>,
     /// Per block: both biases added.
     biases: Vec<[Lanes; GATES]>,
 }
@@ -34,17 +36,34 @@ impl PackedCell {
     /// From `weight_ih` [4 units, inputs], `weight_hh` [4 units, units] and the summed `bias` [4 units], rows in
     /// the gates' order i f g o.
     pub fn pack(inputs: usize, units: usize, weight_ih: &[f32], weight_hh: &[f32], bias: &[f32]) -> Self {
+        Self::pack_for(gates_at_once(), inputs, units, weight_ih, weight_hh, bias)
+    }
+
+    fn pack_for(
+        at_once: usize,
+        inputs: usize,
+        units: usize,
+        weight_ih: &[f32],
+        weight_hh: &[f32],
+        bias: &[f32],
+    ) -> Self {
         let (mut blocks, mut biases) = (Vec::new(), Vec::new());
         for block in 0..units / LANES {
-            let gates = |of: &dyn Fn(usize) -> f32| -> [Lanes; GATES] {
-                let row = |gate: usize, lane: usize| gate * units + block * LANES + lane;
-                std::array::from_fn(|gate| Lanes(std::array::from_fn(|lane| of(row(gate, lane)))))
+            let lanes = |gate: usize, of: &dyn Fn(usize) -> f32| {
+                Lanes(std::array::from_fn(|lane| of(gate * units + block * LANES + lane)))
             };
-            biases.push(gates(&|row| bias[row]));
-            blocks.extend((0..inputs).map(|k| gates(&|row| weight_ih[row * inputs + k])));
-            blocks.extend((0..units).map(|k| gates(&|row| weight_hh[row * units + k])));
+            biases.push(std::array::from_fn(|gate| lanes(gate, &|row| bias[row])));
+            for first in (0..GATES).step_by(at_once) {
+                let gates = || first..first + at_once;
+                for k in 0..inputs {
+                    blocks.extend(gates().map(|gate| lanes(gate, &|row| weight_ih[row * inputs + k])));
+                }
+                for k in 0..units {
+                    blocks.extend(gates().map(|gate| lanes(gate, &|row| weight_hh[row * units + k])));
+                }
+            }
         }
-        Self { inputs, units, blocks, biases }
+        Self { inputs, units, at_once, blocks, biases }
     }
 }
 
@@ -70,20 +89,33 @@ impl GroupState {
     }
 }
 
+/// As many gates' sums as this processor's registers hold.
+fn gates_at_once() -> usize {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx512f") {
+        return GATES;
+    }
+    1
+}
+
 /// Eq. (1b): every group's hidden state after its input, in place. `first`: the states are zero still, so that eight of
 /// nine weights are not read.
 pub(super) fn step(cell: &PackedCell, groups: &mut [GroupState], first: bool) {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx512f") {
+    if cell.at_once == GATES && is_x86_feature_detected!("avx512f") {
         // SAFETY: `step_avx512` needs nothing but the feature that the line above has found, and what it includes.
         unsafe { step_avx512(cell, groups, first) };
         return;
-    } else if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+    } else if cell.at_once == 1 && is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: `step_avx2` needs nothing but the two features that the line above has found.
         unsafe { step_avx2(cell, groups, first) };
         return;
     }
-    step_with::<false, 1>(cell, groups, first);
+    if cell.at_once == GATES {
+        step_with::<false, GATES>(cell, groups, first);
+    } else {
+        step_with::<false, 1>(cell, groups, first);
+    }
 }
 
 /// With registers of sixteen lanes and all gates at once, 5 x 4 sums, 4 weights and 1 input fill 25 of 32 of them: 1.5 ms for ten
@@ -109,14 +141,16 @@ fn step_with<const FUSED: bool, const AT_ONCE: usize>(
     groups: &mut [GroupState],
     first: bool,
 ) {
-    let block_rows = cell.inputs + cell.units;
-    let rows = if first { cell.inputs } else { block_rows };
-    for (block, (weights, biases)) in cell.blocks.chunks_exact(block_rows).zip(&cell.biases).enumerate() {
+    let all_rows = cell.inputs + cell.units;
+    let rows = if first { cell.inputs } else { all_rows };
+    for (block, (weights, biases)) in cell.blocks.chunks_exact(GATES * all_rows).zip(&cell.biases).enumerate()
+    {
+        let weights = weights.as_chunks::<AT_ONCE>().0.chunks_exact(all_rows);
+        let of_gates = weights.zip(biases.as_chunks::<AT_ONCE>().0);
         for group in groups.iter_mut() {
             let mut sums = [[Lanes([0.0; LANES]); GROUP]; GATES];
-            for gate in (0..GATES).step_by(AT_ONCE) {
-                let of_gates = weighted_sums::<FUSED, AT_ONCE>(gate, weights, &group.rows[..rows], biases);
-                sums[gate..gate + AT_ONCE].copy_from_slice(&of_gates);
+            for ((weights, biases), sums) in of_gates.clone().zip(sums.as_chunks_mut::<AT_ONCE>().0) {
+                *sums = weighted_sums::<FUSED, AT_ONCE>(&weights[..rows], &group.rows[..rows], biases);
             }
             let next_hidden = &mut group.next_hidden[block * LANES..][..LANES];
             update::<FUSED>(&sums, &mut group.cell[block], next_hidden);
@@ -127,26 +161,25 @@ fn step_with<const FUSED: bool, const AT_ONCE: usize>(
     }
 }
 
-/// Some gates of [`LANES`] units, from `first` on, for [`GROUP`] people, before their non-linearity.
+/// Some gates of [`LANES`] units for [`GROUP`] people, before their non-linearity.
 #[inline(always)]
 fn weighted_sums<const FUSED: bool, const AT_ONCE: usize>(
-    first: usize,
-    weights: &[[Lanes; GATES]],
+    weights: &[[Lanes; AT_ONCE]],
     rows: &[[f32; GROUP]],
-    biases: &[Lanes; GATES],
+    biases: &[Lanes; AT_ONCE],
 ) -> [[Lanes; GROUP]; AT_ONCE] {
-    let mut sums: [[Lanes; GROUP]; AT_ONCE] = std::array::from_fn(|gate| [biases[first + gate]; GROUP]);
+    let mut sums: [[Lanes; GROUP]; AT_ONCE] = std::array::from_fn(|gate| [biases[gate]; GROUP]);
     for (weights, inputs) in weights.iter().zip(rows) {
         // Written out, for in a loop round loops the compiler leaves the sums in memory.
-        match &mut sums[..] {
-            [a, b, c, d] => {
-                add::<FUSED>(a, &weights[0], inputs);
-                add::<FUSED>(b, &weights[1], inputs);
-                add::<FUSED>(c, &weights[2], inputs);
-                add::<FUSED>(d, &weights[3], inputs);
+        match (&mut sums[..], &weights[..]) {
+            ([a, b, c, d], [of_a, of_b, of_c, of_d]) => {
+                add::<FUSED>(a, of_a, inputs);
+                add::<FUSED>(b, of_b, inputs);
+                add::<FUSED>(c, of_c, inputs);
+                add::<FUSED>(d, of_d, inputs);
             }
-            sums => {
-                (0..AT_ONCE).for_each(|gate| add::<FUSED>(&mut sums[gate], &weights[first + gate], inputs))
+            (sums, weights) => {
+                sums.iter_mut().zip(weights).for_each(|(sums, weights)| add::<FUSED>(sums, weights, inputs))
             }
         }
     }
@@ -191,11 +224,12 @@ fn update<const FUSED: bool>(
 mod tests {
     use super::*;
 
-    fn small_cell() -> (PackedCell, Vec<GroupState>) {
+    fn small_cell(at_once: usize) -> (PackedCell, Vec<GroupState>) {
         let (inputs, units) = (5, 2 * LANES);
         let values =
             |count: usize| -> Vec<f32> { (0..count).map(|i| (i as f32 * 0.7).sin() * 0.2).collect() };
-        let cell = PackedCell::pack(
+        let cell = PackedCell::pack_for(
+            at_once,
             inputs,
             units,
             &values(GATES * units * inputs),
@@ -209,40 +243,28 @@ mod tests {
 
     #[test]
     fn every_processor_agrees() {
-        let (cell, mut plain) = small_cell();
-        let [mut all_read, mut fused, mut as_here] = [(); 3].map(|()| plain.clone());
+        let (cell, mut plain) = small_cell(1);
+        let (cell_of_all, _) = small_cell(GATES);
+        let [mut all_read, mut at_once, mut fused, mut as_here, mut all_as_here] =
+            [(); 5].map(|()| plain.clone());
         for k in 0..17 {
             step_with::<false, 1>(&cell, &mut plain, k == 0);
             step_with::<false, 1>(&cell, &mut all_read, false);
+            step_with::<false, GATES>(&cell_of_all, &mut at_once, k == 0);
             step_with::<true, 1>(&cell, &mut fused, k == 0);
             step(&cell, &mut as_here, k == 0);
+            step(&cell_of_all, &mut all_as_here, k == 0);
         }
-        assert!(plain.iter().zip(&all_read).all(|(a, b)| a.rows == b.rows), "zeros add nothing");
-        for ((plain, fused), here) in plain.iter().zip(&fused).zip(&as_here) {
-            assert!(
-                here.rows == fused.rows || here.rows == plain.rows,
-                "the same bits, however wide the registers"
-            );
+        let same = |a: &[GroupState], b: &[GroupState]| a.iter().zip(b).all(|(a, b)| a.rows == b.rows);
+        assert!(same(&plain, &all_read), "zeros add nothing");
+        assert!(same(&plain, &at_once), "however the weights are laid out");
+        for here in [&as_here, &all_as_here] {
+            assert!(same(here, &fused) || same(here, &plain), "the same bits, however wide the registers");
+        }
+        for (plain, fused) in plain.iter().zip(&fused) {
             for (plain, fused) in plain.rows.as_flattened().iter().zip(fused.rows.as_flattened()) {
                 assert!((plain - fused).abs() < 1e-6, "{plain} and {fused}");
             }
         }
-    }
-
-    /// A processor with AVX-512 takes no other way.
-    #[test]
-    #[cfg(target_arch = "x86_64")]
-    fn narrower_registers_give_the_same_bits() {
-        if !is_x86_feature_detected!("avx2") || !is_x86_feature_detected!("fma") {
-            return;
-        }
-        let (cell, mut groups) = small_cell();
-        let mut as_here = groups.clone();
-        for k in 0..17 {
-            // SAFETY: the processor has just said that it has both.
-            unsafe { step_avx2(&cell, &mut groups, k == 0) };
-            step(&cell, &mut as_here, k == 0);
-        }
-        assert!(groups.iter().zip(&as_here).all(|(a, b)| a.rows == b.rows));
     }
 }
