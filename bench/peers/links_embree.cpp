@@ -98,7 +98,6 @@ class Placed {
 
     void cast(const Question &question, Lost &links, RTCIntersectContext &context, size_t sample, size_t step, size_t first) {
         alignas(64) int valid[LANES] = {};
-        RTCRay16 rays;
         for (unsigned lane = 0; lane < LANES && first + lane < question.people; lane++) {
             const size_t person = first + lane;
             if (links.lost[person * question.samples + sample]) continue;
@@ -118,6 +117,8 @@ class Placed {
 
     RTCScene scene;
     std::vector<RTCGeometry> instances;
+    // Embree looks at lanes that are not asked about, too, on processors without AVX-512, and takes no ray that is no number.
+    RTCRay16 rays = {};
 };
 
 // Each body's own tree is asked, in the body's frame, by those rays alone that pass within its reach.
@@ -173,7 +174,7 @@ class Culled {
 
     const std::vector<RTCScene> &bodies;
     const std::vector<float> &reach_m;
-    RTCRay16 rays;
+    RTCRay16 rays = {};
     size_t sample_of[LANES];
     unsigned count = 0;
 };
