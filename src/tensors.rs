@@ -50,26 +50,57 @@ impl<const IN: usize, const OUT: usize> Layer<IN, OUT> {
     #[inline(always)]
     pub(crate) fn of(&self, inputs: &[f32; IN]) -> [f32; OUT] {
         let mut sums = self.bias;
-        let (whole, rest) = sums.as_chunks_mut::<AT_ONCE>();
-        for (chunk, sums) in whole.iter_mut().enumerate() {
-            // A copy stays in registers while all weights pass.
-            let mut kept = *sums;
-            for (weights, input) in self.weights.iter().zip(inputs) {
-                add(&mut kept, &weights.as_chunks::<AT_ONCE>().0[chunk], input);
-            }
-            *sums = kept;
-        }
         for (weights, input) in self.weights.iter().zip(inputs) {
-            add(rest, weights.as_chunks::<AT_ONCE>().1, input);
+            add(&mut sums, weights, *input);
         }
         sums
     }
 }
 
-/// Sums that the registers of a processor hold: eight of AVX2.
-const AT_ONCE: usize = 64;
+/// Inputs that a [`WideLayer`] takes at once, and sums of each that are in registers at a time: ten of AVX2's sixteen hold sums.
+pub(crate) const SEVERAL: usize = 5;
+const WIDTH: usize = 16;
+
+/// A layer whose weights take longer to read than to multiply by. They are read once for several inputs, in the order in which they lie.
+#[derive(Debug, Clone)]
+pub(crate) struct WideLayer<const IN: usize, const OUT: usize> {
+    /// Of [`WIDTH`] outputs after another, by input.
+    weights: Vec<[[f32; WIDTH]; IN]>,
+    bias: [f32; OUT],
+}
+
+impl<const IN: usize, const OUT: usize> WideLayer<IN, OUT> {
+    /// As [`Layer::read`].
+    pub(crate) fn read(file: &SafeTensors<'_>, name: &str) -> Result<Self, Error> {
+        const { assert!(OUT.is_multiple_of(WIDTH)) };
+        let Layer { weights, bias } = Layer::<IN, OUT>::read(file, name)?;
+        let of_chunk = |chunk| from_fn(|input| from_fn(|k| weights[input][chunk * WIDTH + k]));
+        Ok(Self { weights: (0..OUT / WIDTH).map(of_chunk).collect(), bias })
+    }
+
+    #[inline(always)]
+    pub(crate) fn of(&self, inputs: [&[f32; IN]; SEVERAL]) -> [[f32; OUT]; SEVERAL] {
+        let mut sums = [[0.0; OUT]; SEVERAL];
+        for (chunk, (weights, bias)) in self.weights.iter().zip(self.bias.as_chunks::<WIDTH>().0).enumerate()
+        {
+            // Written out, for sums in an array of arrays stay in memory.
+            let [mut a, mut b, mut c, mut d, mut e] = [*bias; SEVERAL];
+            for (input, weights) in weights.iter().enumerate() {
+                add(&mut a, weights, inputs[0][input]);
+                add(&mut b, weights, inputs[1][input]);
+                add(&mut c, weights, inputs[2][input]);
+                add(&mut d, weights, inputs[3][input]);
+                add(&mut e, weights, inputs[4][input]);
+            }
+            for (sums, of_chunk) in sums.iter_mut().zip([a, b, c, d, e]) {
+                sums.as_chunks_mut().0[chunk] = of_chunk;
+            }
+        }
+        sums
+    }
+}
 
 #[inline(always)]
-fn add(sums: &mut [f32], weights: &[f32], input: &f32) {
+fn add<const N: usize>(sums: &mut [f32; N], weights: &[f32; N], input: f32) {
     sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * input);
 }

@@ -3,6 +3,7 @@
 
 use super::canopy::{OVERHEAD_M, Overhead};
 use super::evidence::FULL_BODY_TOP_M;
+use super::looks::{Look, Looks};
 use super::outline::{LEVELS, Reach, reaches};
 use super::point_network::PointNetwork;
 use super::pose_view::{PoseView, Seen};
@@ -91,8 +92,8 @@ pub struct Measurer {
     is_taken: Vec<bool>,
     /// Points that hang over people, above the floor, with their sensors.
     overhead_m: Vec<(DVec3, u16)>,
-    /// A person's points, moved.
-    seen: Vec<Seen>,
+    /// Of the frame's people.
+    looks: Looks,
     /// Memory of the last frame's detections.
     spare: Vec<Vec<Reach>>,
 }
@@ -118,7 +119,7 @@ impl Measurer {
             pose: pose::shipped(),
             is_taken: Vec::new(),
             overhead_m: Vec::new(),
-            seen: Vec::new(),
+            looks: Looks::default(),
             spare: Vec::new(),
         }
     }
@@ -146,7 +147,8 @@ impl Measurer {
         detections: &mut Vec<Detection>,
     ) {
         self.spare.extend(detections.drain(..).map(|detection| detection.reaches));
-        let mut seen = std::mem::take(&mut self.seen);
+        let mut looks = std::mem::take(&mut self.looks);
+        looks.clear();
         self.look_up(points, clusters);
         for cluster in clusters {
             let aabb = self.above_floor(points, cluster).1;
@@ -154,15 +156,24 @@ impl Measurer {
             // Legs are somebody only where nobody is known.
             let full_body = self.has_size_of_person(cluster.len(), &aabb)
                 && !(expected && aabb.max_m.z < FULL_BODY_TOP_M);
+            looks.full_body.push((full_body || expected).then_some(full_body));
             if full_body || expected {
-                let mut reaches = self.spare.pop().unwrap_or_default();
-                reaches.clear();
-                reaches.reserve(LEVELS * self.sensors_m.len());
-                let detection = self.detection_within(&mut seen, reaches, points, cluster, priors);
-                detections.push(Detection { full_body, ..detection });
+                self.look(points, cluster, priors, &mut looks);
             }
         }
-        self.seen = seen;
+        self.find_poses(&mut looks);
+        let somebody = clusters
+            .iter()
+            .zip(&looks.full_body)
+            .filter_map(|(cluster, full_body)| Some((cluster, (*full_body)?)));
+        for (person, (cluster, full_body)) in somebody.enumerate() {
+            let mut reaches = self.spare.pop().unwrap_or_default();
+            reaches.clear();
+            reaches.reserve(LEVELS * self.sensors_m.len());
+            let detection = self.detection_within(looks.of(person), reaches, points, cluster, priors);
+            detections.push(Detection { full_body, ..detection });
+        }
+        self.looks = looks;
     }
 
     /// Finds what hangs over people: no cluster has it.
@@ -229,12 +240,15 @@ impl Measurer {
     /// Of points that are one person's, whatever their size; at least one.
     #[doc(hidden)] // For scores that know whose points they are.
     pub fn detection(&self, points: &[Point], cluster: &[u32], priors: &[Prior]) -> Detection {
-        self.detection_within(&mut Vec::new(), Vec::new(), points, cluster, priors)
+        let mut looks = Looks::default();
+        self.look(points, cluster, priors, &mut looks);
+        self.find_poses(&mut looks);
+        self.detection_within(looks.of(0), Vec::new(), points, cluster, priors)
     }
 
     fn detection_within(
         &self,
-        seen: &mut Vec<Seen>,
+        look: Look<'_>,
         mut all_reaches: Vec<Reach>,
         points: &[Point],
         cluster: &[u32],
@@ -249,22 +263,18 @@ impl Measurer {
         let late_ns: i64 = of().map(|p| p.time_ns - first_ns).sum();
         let who = nearest(mean_m.truncate(), priors);
         let (mut facing, mut gait) = (None, None);
-        let (position_m, z_m, covariance_m2) = match self.position {
-            PositionMethod::BoxCenter => (aabb.center_m().truncate(), aabb.center_m().z, None),
-            PositionMethod::ShiftedMean => {
-                (self.pose_view_within(seen, points, cluster, &[]).base_m, mean_m.z, None)
-            }
-            PositionMethod::Fitted => {
-                let view = self.pose_view_within(seen, points, cluster, priors);
-                let pose = pose::pose(&self.pose, &view);
+        let (position_m, z_m, covariance_m2) = match (look.pose, look.view) {
+            (Some(pose), _) => {
                 // Who is not known may walk or stand.
                 (facing, gait) = (pose.facing.filter(|_| who.is_some()), pose.gait);
                 (pose.position_m, mean_m.z, Some(pose.covariance_m2))
             }
+            (None, Some(view)) => (view.base_m, mean_m.z, None),
+            (None, None) => (aabb.center_m().truncate(), aabb.center_m().z, None),
         };
         let mut bands = [Moments::default(); BANDS];
         if covariance_m2.is_some() {
-            seen.iter().for_each(|s| bands[band_of(s.z_m)].add(s.at_m - position_m));
+            look.seen.iter().for_each(|s| bands[band_of(s.z_m)].add(s.at_m - position_m));
         }
         let of_top = places_m().filter(|p| p.z >= aabb.max_m.z - HEAD_M);
         let axes = match self.position {
@@ -293,6 +303,22 @@ impl Measurer {
             top_diagonal_m: diagonal_m(&Aabb::around(of_top)),
             aabb: aabb.raised_by(floor_m),
             obb: obb(places_m(), mean_m, axes).raised_by(floor_m),
+        }
+    }
+
+    /// Looks at one more person, as the method asks.
+    fn look(&self, points: &[Point], cluster: &[u32], priors: &[Prior], looks: &mut Looks) {
+        let priors = match self.position {
+            PositionMethod::BoxCenter => return,
+            PositionMethod::ShiftedMean => &[],
+            PositionMethod::Fitted => priors,
+        };
+        looks.add(|seen| self.pose_view_within(seen, points, cluster, priors));
+    }
+
+    fn find_poses(&self, looks: &mut Looks) {
+        if self.position == PositionMethod::Fitted {
+            looks.find_poses(&self.pose);
         }
     }
 

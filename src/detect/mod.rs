@@ -31,6 +31,7 @@ pub mod point_network;
 pub mod pose;
 #[doc(hidden)] // What the fit of the usual outline reads.
 pub mod outline;
+mod looks;
 mod measure;
 mod clocks;
 mod doubled;

@@ -11,7 +11,7 @@ use safetensors::SafeTensors;
 use super::pose_view::{OF_BODY, OF_POINT, PoseView};
 use crate::Error;
 use crate::elementary::wide;
-use crate::tensors::Layer;
+use crate::tensors::{Layer, SEVERAL, WideLayer};
 
 /// Units of the layers that each point goes through, then of those of the whole body; the last gives [`OUTPUTS`].
 pub const POINT_UNITS: [usize; 3] = [32, 32, 64];
@@ -29,8 +29,8 @@ struct Layers {
     first: Layer<OF_POINT, { POINT_UNITS[0] }>,
     second: Layer<{ POINT_UNITS[0] }, { POINT_UNITS[1] }>,
     third: Layer<{ POINT_UNITS[1] }, { POINT_UNITS[2] }>,
-    fourth: Layer<POOLED, { BODY_UNITS[0] }>,
-    fifth: Layer<{ BODY_UNITS[0] }, { BODY_UNITS[1] }>,
+    fourth: WideLayer<POOLED, { BODY_UNITS[0] }>,
+    fifth: WideLayer<{ BODY_UNITS[0] }, { BODY_UNITS[1] }>,
     head: Layer<{ BODY_UNITS[1] }, OUTPUTS>,
 }
 
@@ -46,15 +46,18 @@ impl PointNetwork {
             first: Layer::read(&file, "points.0")?,
             second: Layer::read(&file, "points.1")?,
             third: Layer::read(&file, "points.2")?,
-            fourth: Layer::read(&file, "body.0")?,
-            fifth: Layer::read(&file, "body.1")?,
+            fourth: WideLayer::read(&file, "body.0")?,
+            fifth: WideLayer::read(&file, "body.1")?,
             head: Layer::read(&file, "body.2")?,
         })))
     }
 
-    /// What the network says of a body. Who is seen in a mirror gets the same numbers.
-    pub fn outputs(&self, view: &PoseView) -> [f64; OUTPUTS] {
-        self.0.outputs(view).map(f64::from)
+    /// What the network says of each body. Who is seen in a mirror gets the same numbers.
+    pub fn outputs(&self, views: &[PoseView]) -> impl Iterator<Item = [f64; OUTPUTS]> {
+        views
+            .chunks(SEVERAL)
+            .flat_map(|views| self.0.outputs(views).into_iter().take(views.len()))
+            .map(|outputs| outputs.map(f64::from))
     }
 }
 
@@ -67,18 +70,39 @@ impl fmt::Debug for PointNetwork {
 
 impl Layers {
     wide! {
-        fn outputs(&self, view: &PoseView) -> [f32; OUTPUTS] = outputs_avx2 or outputs_portably
+        /// Of [`SEVERAL`] bodies at most; the others' numbers are nobody's.
+        fn outputs(&self, views: &[PoseView]) -> [[f32; OUTPUTS]; SEVERAL] = outputs_avx2 or outputs_portably
     }
 
     #[inline(always)]
-    fn outputs_portably(&self, view: &PoseView) -> [f32; OUTPUTS] {
+    fn outputs_portably(&self, views: &[PoseView]) -> [[f32; OUTPUTS]; SEVERAL] {
+        let mut pooled = [[0.0; POOLED]; SEVERAL];
+        // Loops in place of closures, which would be compiled for narrower registers.
+        for (pooled, view) in pooled.iter_mut().zip(views) {
+            *pooled = self.pooled(view);
+        }
+        let mut fourth = self.fourth.of(pooled.each_ref());
+        for units in &mut fourth {
+            *units = rectified(units);
+        }
+        let mut fifth = self.fifth.of(fourth.each_ref());
+        for units in &mut fifth {
+            *units = rectified(units);
+        }
+        let mut outputs = [[0.0; OUTPUTS]; SEVERAL];
+        for (outputs, units) in outputs.iter_mut().zip(&fifth) {
+            *outputs = self.head.of(units);
+        }
+        outputs
+    }
+
+    #[inline(always)]
+    fn pooled(&self, view: &PoseView) -> [f32; POOLED] {
         const UNITS: usize = POINT_UNITS[2];
         let (mut largest, mut sums) = ([f32::MIN; UNITS], [0.0; UNITS]);
         for point in view.of_points() {
-            let mut first = self.first.of(point);
-            rectify(&mut first);
-            let mut second = self.second.of(&first);
-            rectify(&mut second);
+            let first = rectified(&self.first.of(point));
+            let second = rectified(&self.second.of(&first));
             let third = self.third.of(&second);
             for u in 0..UNITS {
                 largest[u] = if third[u] > largest[u] { third[u] } else { largest[u] };
@@ -91,19 +115,18 @@ impl Layers {
             (pooled[u], pooled[UNITS + u]) = (largest[u], share * sums[u]);
         }
         pooled[2 * UNITS..].copy_from_slice(&view.of_body);
-        let mut fourth = self.fourth.of(&pooled);
-        rectify(&mut fourth);
-        let mut fifth = self.fifth.of(&fourth);
-        rectify(&mut fifth);
-        self.head.of(&fifth)
+        pooled
     }
 }
 
+/// A copy: changed in place, each register would be written under a mask, which takes some processors long.
 #[inline(always)]
-fn rectify<const N: usize>(units: &mut [f32; N]) {
-    for unit in units {
-        *unit = if *unit > 0.0 { *unit } else { 0.0 };
+fn rectified<const N: usize>(units: &[f32; N]) -> [f32; N] {
+    let mut rectified = [0.0; N];
+    for (rectified, &unit) in rectified.iter_mut().zip(units) {
+        *rectified = if unit > 0.0 { unit } else { 0.0 };
     }
+    rectified
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 
 use std::f64::consts::PI;
 
-use super::point_network::PointNetwork;
+use super::point_network::{OUTPUTS, PointNetwork};
 use super::pose_view::PoseView;
 use crate::gait::Gait;
 use crate::geometry::DVec2;
@@ -55,11 +55,16 @@ pub(super) fn shipped() -> PointNetwork {
         .expect("the embedded file is proven by a test")
 }
 
-/// Reads the pose of a body. The network gives the offset from the view's base along and across, in units of [`UNIT_M`], and the
+/// Reads the poses of bodies.
+pub fn poses(network: &PointNetwork, views: &[PoseView]) -> impl Iterator<Item = Pose> {
+    views.iter().zip(network.outputs(views)).map(|(view, outputs)| pose(outputs, view))
+}
+
+/// The network gives the offset from the view's base along and across, in units of [`UNIT_M`], and the
 /// logarithms of their variances; then four numbers of the heading's density; then the cosine and the sine of the stride's phase
 /// in the view, times its concentration (of a von Mises distribution); then how far the hands swing, left and right in the view, in
 /// units of [`SWING_UNIT`], and the logarithms of their variances.
-pub fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
+fn pose(outputs: [f64; OUTPUTS], view: &PoseView) -> Pose {
     let [
         along,
         across,
@@ -75,7 +80,7 @@ pub fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
         right,
         log_left,
         log_right,
-    ] = network.outputs(view);
+    ] = outputs;
     let offset_m = (DVec2::new(along, across) * UNIT_M).clamp_length_max(OFFSET_LIMIT_M);
     let [along_m2, across_m2] = [log_variance_along, log_variance_across]
         .map(|log| log.clamp(LOG_VARIANCE.0, LOG_VARIANCE.1).exp() * UNIT_M * UNIT_M);

@@ -51,8 +51,8 @@ pub struct Seen {
 }
 
 impl PoseView {
-    /// Looks at a person's points, who stands on a floor at `floor_m`. `velocity_mps` is the person's, where it is known;
-    /// `seen` is memory.
+    /// Looks at a person's points, who stands on a floor at `floor_m`. `velocity_mps` is the person's, where it is known. Appends the
+    /// points, moved, to `seen`.
     pub fn new<'a>(
         seen: &mut Vec<Seen>,
         points: impl Iterator<Item = &'a Point> + Clone,
@@ -61,8 +61,9 @@ impl PoseView {
         shift_m: f64,
         velocity_mps: Option<DVec2>,
     ) -> Self {
-        seen.clear();
+        let before = seen.len();
         seen.extend(moved(points, sensors_m, floor_m, shift_m, velocity_mps));
+        let seen = &seen[before..];
         let n = seen.len().max(1) as f64;
         let base_m = seen.iter().map(|s| s.at_m).sum::<DVec2>() / n;
         let main = main_sensor(seen);
@@ -206,7 +207,7 @@ mod tests {
 
     fn pose_of(points: &[Point], velocity_mps: DVec2) -> Pose {
         let view = PoseView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
-        pose::pose(&pose::shipped(), &view)
+        pose::poses(&pose::shipped(), &[view]).next().unwrap()
     }
 
     #[test]
