@@ -224,9 +224,11 @@ mod tests {
     use super::*;
     use rand::RngExt;
     use umbracast::detect::point_network::PointNetwork;
-    use umbracast::detect::pose::{UNIT_M, pose};
+    use umbracast::detect::pose::UNIT_M;
     use umbracast::detect::{Point, SHIFT_M};
     use umbracast::geometry::{DVec2, DVec3};
+
+    use crate::pose::pose;
 
     /// Somebody of some points on a disc of a radius that its height tells, before a sensor: the axis is the disc's middle.
     fn sample(rng: &mut Pcg64) -> Sample {

@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use umbracast::Error;
 use umbracast::detect::SHIFT_M;
 use umbracast::detect::point_network::{BODY_UNITS, OUTPUTS, POINT_UNITS, PointNetwork};
-use umbracast::detect::pose::{Pose, pose};
-use umbracast::detect::pose_view::{OF_BODY, OF_POINT, POINTS};
+use umbracast::detect::pose::{Pose, poses};
+use umbracast::detect::pose_view::{OF_BODY, OF_POINT, POINTS, PoseView};
 use umbracast::geometry::DVec2;
 
 use crate::point_network::{EPOCHS, SEED, Sample, fit};
@@ -28,6 +28,11 @@ pub fn train_pose(
     let weights = fit(&samples)?;
     let network = PointNetwork::from_safetensors(&weights)?;
     Ok((weights, card(&network, &training, &held_out, commit)))
+}
+
+/// What a network says of one body.
+pub(crate) fn pose(network: &PointNetwork, view: &PoseView) -> Pose {
+    poses(network, std::slice::from_ref(view)).next().expect("one pose a view")
 }
 
 fn card(network: &PointNetwork, training: &[Seen], held_out: &[Seen], commit: &str) -> String {
