@@ -226,6 +226,29 @@ mod tests {
     }
 
     #[test]
+    fn a_body_has_the_same_pose_in_any_company() {
+        let views: Vec<PoseView> = (0..7)
+            .map(|k| {
+                let corners = PERSON.map(|(x, y, z)| (x + 0.02 * f64::from(k), y, z));
+                let velocity_mps = DVec2::from_angle(f64::from(k));
+                PoseView::new(
+                    &mut Vec::new(),
+                    points(&corners).iter(),
+                    &[SENSOR_M],
+                    0.0,
+                    0.1,
+                    Some(velocity_mps),
+                )
+            })
+            .collect();
+        let network = pose::shipped();
+        let together: Vec<Pose> = pose::poses(&network, &views).collect();
+        let alone: Vec<Pose> =
+            views.iter().flat_map(|view| pose::poses(&network, std::slice::from_ref(view))).collect();
+        assert!(together == alone && together[0] != together[6], "{together:?} {alone:?}");
+    }
+
+    #[test]
     fn the_axis_lies_behind_the_side_that_was_seen() {
         // The near half of a body whose axis stands at 0: trunk, neck and head as shares of the height.
         const HEIGHT_M: f64 = 1.75;
