@@ -7,8 +7,8 @@ use super::pose_view::{PoseView, Seen};
 /// Of all people of a frame. It is kept from frame to frame as memory.
 #[derive(Debug, Clone, Default)]
 pub struct Looks {
-    /// By cluster: whether somebody is there, and then whether from head to foot.
-    pub full_body: Vec<Option<bool>>,
+    /// By person: which cluster is theirs, and whether from head to foot.
+    pub people: Vec<(usize, bool)>,
     /// By person.
     views: Vec<PoseView>,
     poses: Vec<Pose>,
@@ -27,8 +27,8 @@ pub struct Look<'a> {
 
 impl Looks {
     pub fn clear(&mut self) {
-        let Self { full_body, views, poses, seen, seen_until } = self;
-        full_body.clear();
+        let Self { people, views, poses, seen, seen_until } = self;
+        people.clear();
         views.clear();
         poses.clear();
         seen.clear();

@@ -150,27 +150,23 @@ impl Measurer {
         let mut looks = std::mem::take(&mut self.looks);
         looks.clear();
         self.look_up(points, clusters);
-        for cluster in clusters {
+        for (c, cluster) in clusters.iter().enumerate() {
             let aabb = self.above_floor(points, cluster).1;
             let expected = self.is_expected(points, cluster, &aabb, priors);
             // Legs are somebody only where nobody is known.
             let full_body = self.has_size_of_person(cluster.len(), &aabb)
                 && !(expected && aabb.max_m.z < FULL_BODY_TOP_M);
-            looks.full_body.push((full_body || expected).then_some(full_body));
             if full_body || expected {
+                looks.people.push((c, full_body));
                 self.look(points, cluster, priors, &mut looks);
             }
         }
         self.find_poses(&mut looks);
-        let somebody = clusters
-            .iter()
-            .zip(&looks.full_body)
-            .filter_map(|(cluster, full_body)| Some((cluster, (*full_body)?)));
-        for (person, (cluster, full_body)) in somebody.enumerate() {
+        for (person, &(c, full_body)) in looks.people.iter().enumerate() {
             let mut reaches = self.spare.pop().unwrap_or_default();
             reaches.clear();
             reaches.reserve(LEVELS * self.sensors_m.len());
-            let detection = self.detection_within(looks.of(person), reaches, points, cluster, priors);
+            let detection = self.detection_within(looks.of(person), reaches, points, &clusters[c], priors);
             detections.push(Detection { full_body, ..detection });
         }
         self.looks = looks;

@@ -55,12 +55,12 @@ pub(super) fn shipped() -> PointNetwork {
         .expect("the embedded file is proven by a test")
 }
 
-/// Reads the poses of bodies.
+/// Reads the poses of bodies, best of all people of a frame at once.
 pub fn poses(network: &PointNetwork, views: &[PoseView]) -> impl Iterator<Item = Pose> {
     views.iter().zip(network.outputs(views)).map(|(view, outputs)| pose(outputs, view))
 }
 
-/// The network gives the offset from the view's base along and across, in units of [`UNIT_M`], and the
+/// What the network's numbers say of one body: the offset from the view's base along and across, in units of [`UNIT_M`], and the
 /// logarithms of their variances; then four numbers of the heading's density; then the cosine and the sine of the stride's phase
 /// in the view, times its concentration (of a von Mises distribution); then how far the hands swing, left and right in the view, in
 /// units of [`SWING_UNIT`], and the logarithms of their variances.

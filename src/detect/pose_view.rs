@@ -205,9 +205,12 @@ mod tests {
         corners.iter().map(point).collect()
     }
 
+    fn view_of(points: &[Point], velocity_mps: DVec2) -> PoseView {
+        PoseView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps))
+    }
+
     fn pose_of(points: &[Point], velocity_mps: DVec2) -> Pose {
-        let view = PoseView::new(&mut Vec::new(), points.iter(), &[SENSOR_M], 0.0, 0.1, Some(velocity_mps));
-        pose::poses(&pose::shipped(), &[view]).next().unwrap()
+        pose::poses(&pose::shipped(), &[view_of(points, velocity_mps)]).next().unwrap()
     }
 
     #[test]
@@ -230,15 +233,7 @@ mod tests {
         let views: Vec<PoseView> = (0..7)
             .map(|k| {
                 let corners = PERSON.map(|(x, y, z)| (x + 0.02 * f64::from(k), y, z));
-                let velocity_mps = DVec2::from_angle(f64::from(k));
-                PoseView::new(
-                    &mut Vec::new(),
-                    points(&corners).iter(),
-                    &[SENSOR_M],
-                    0.0,
-                    0.1,
-                    Some(velocity_mps),
-                )
+                view_of(&points(&corners), DVec2::from_angle(f64::from(k)))
             })
             .collect();
         let network = pose::shipped();

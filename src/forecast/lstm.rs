@@ -88,7 +88,14 @@ impl Weights {
         let bias: Vec<f32> = bias_ih.iter().zip(&bias_hh).map(|(ih, hh)| ih + hh).collect();
         let network = Network {
             embedding: emb_weight.chunks_exact(2).zip(&emb_bias).map(|(w, &b)| [w[0], w[1], b]).collect(),
-            cell: PackedCell::pack(embedded, units, &weight_ih, &weight_hh, &bias),
+            cell: PackedCell::pack(
+                lstm_cell::gates_at_once(),
+                embedded,
+                units,
+                &weight_ih,
+                &weight_hh,
+                &bias,
+            ),
             head: (0..units).map(|k| std::array::from_fn(|row| dec_weight[row * units + k])).collect(),
             head_bias: std::array::from_fn(|row| dec_bias[row]),
         };

@@ -34,12 +34,8 @@ pub(super) struct PackedCell {
 
 impl PackedCell {
     /// From `weight_ih` [4 units, inputs], `weight_hh` [4 units, units] and the summed `bias` [4 units], rows in
-    /// the gates' order i f g o.
-    pub fn pack(inputs: usize, units: usize, weight_ih: &[f32], weight_hh: &[f32], bias: &[f32]) -> Self {
-        Self::pack_for(gates_at_once(), inputs, units, weight_ih, weight_hh, bias)
-    }
-
-    fn pack_for(
+    /// the gates' order i f g o. `at_once`: [`gates_at_once`] of the processor.
+    pub fn pack(
         at_once: usize,
         inputs: usize,
         units: usize,
@@ -90,7 +86,7 @@ impl GroupState {
 }
 
 /// As many gates' sums as this processor's registers hold.
-fn gates_at_once() -> usize {
+pub(super) fn gates_at_once() -> usize {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx512f") {
         return GATES;
@@ -228,7 +224,7 @@ mod tests {
         let (inputs, units) = (5, 2 * LANES);
         let values =
             |count: usize| -> Vec<f32> { (0..count).map(|i| (i as f32 * 0.7).sin() * 0.2).collect() };
-        let cell = PackedCell::pack_for(
+        let cell = PackedCell::pack(
             at_once,
             inputs,
             units,
@@ -266,5 +262,20 @@ mod tests {
                 assert!((plain - fused).abs() < 1e-6, "{plain} and {fused}");
             }
         }
+    }
+    /// A processor with AVX-512 takes no other way.
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn narrower_registers_give_the_same_bits() {
+        if !is_x86_feature_detected!("avx2") || !is_x86_feature_detected!("fma") {
+            return;
+        }
+        let ((cell, mut groups), (cell_as_here, mut as_here)) = (small_cell(1), small_cell(gates_at_once()));
+        for k in 0..17 {
+            // SAFETY: the processor has just said that it has both.
+            unsafe { step_avx2(&cell, &mut groups, k == 0) };
+            step(&cell_as_here, &mut as_here, k == 0);
+        }
+        assert!(groups.iter().zip(&as_here).all(|(a, b)| a.rows == b.rows));
     }
 }
