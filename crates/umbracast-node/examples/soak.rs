@@ -33,6 +33,8 @@ mod halls;
 mod legs;
 #[path = "soak/live.rs"]
 mod live;
+#[path = "soak/memory.rs"]
+mod memory;
 #[path = "soak/page.rs"]
 mod page;
 #[path = "soak/play.rs"]

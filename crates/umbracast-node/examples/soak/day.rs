@@ -15,8 +15,9 @@ use umbracast_live::latency::Latencies;
 
 use super::halls::{HALLS, Hall};
 use super::legs;
+use super::memory::resident_mib;
 use super::play::{HOUR_NS, Play, Played, S_NS};
-use super::tally::{Tally, resident_mib};
+use super::tally::Tally;
 use super::verdict::Verdict;
 
 /// In so many frames that begin or end a leg nobody is near: what then shows of a thing is not learned.

@@ -21,10 +21,11 @@ use umbracast_node::mqtt::{Hears, Mqtt, Sender};
 
 use super::broker::{Broker, Said};
 use super::legs;
+use super::memory::{InUse, resident_mib};
 use super::page::{Client, Saw};
 use super::play::{HOUR_NS, MINUTE_NS, Play, S_NS};
 use super::recorded::{Found, Opener};
-use super::tally::{Tally, resident_mib};
+use super::tally::Tally;
 use super::verdict::Verdict;
 
 /// So many times as fast as the host's clock.
@@ -75,7 +76,7 @@ struct Account {
 
 /// A row that was told.
 struct Row {
-    mib: f64,
+    in_use_mib: f64,
     latency_ms: [f64; 2],
     followed: f64,
     nobodys_s: f64,
@@ -160,8 +161,10 @@ pub fn run(folder: &Path, hours: f64) -> Result<Verdict, Error> {
     let mut is_early = true;
     let (mut rows, mut before, mut number, mut hung_up, mut again) =
         (Vec::new(), Account::default(), 0, 0, 0);
+    let mut in_use = InUse::default();
     while !done.load(Ordering::Relaxed) && live.is_well() {
         std::thread::sleep(TICK);
+        in_use.look();
         let gone_ns = clock.now_ns() - from_ns;
         if is_early && gone_ns >= i64::from(RATE) * S_NS {
             println!("{:>20.1}  a second later", resident_mib());
@@ -178,7 +181,7 @@ pub fn run(folder: &Path, hours: f64) -> Result<Verdict, Error> {
         if gone_ns >= (number + 1) * PART_NS {
             number += 1;
             let now = Account::of(&live.summary(), &client.saw, &broker.said);
-            rows.push(told.tell(number, &before, &now));
+            rows.push(told.tell(number, std::mem::take(&mut in_use), &before, &now));
             before = now;
         }
     }
@@ -238,24 +241,26 @@ impl Told {
         }
     }
 
-    fn tell(&self, number: i64, before: &Account, now: &Account) -> Row {
+    fn tell(&self, number: i64, mut in_use: InUse, before: &Account, now: &Account) -> Row {
         let mut part = lock(&self.part);
         let tally = part.tally.followed_on();
         let Part { latencies, steps, tally } =
             std::mem::replace(&mut *part, Part { tally, ..Part::default() });
         drop(part);
         let row = Row {
-            mib: resident_mib(),
+            in_use_mib: in_use.exceeded_by_mib(0.5),
             latency_ms: [0.5, 0.99].map(|share| latencies.quantile_ms(share)),
             followed: tally.share_followed(),
             nobodys_s: tally.nobodys_s(),
         };
         println!(
-            "{:5.2} {:7} {:6.1} {:11.2} {:9.2} {:10.2} {:9.2} {:7.1} {:9.4} {:14.1} {:12.1} \
+            "{:5.2} {:7} {:6.1} {:7.1} {:7.1} {:11.2} {:9.2} {:10.2} {:9.2} {:7.1} {:9.4} {:14.1} {:12.1} \
              {:8} {:8} {:9} {:7} {:8} {:9}",
             number as f64 * PART_NS as f64 / HOUR_NS as f64,
             tally.frames,
-            row.mib,
+            resident_mib(),
+            row.in_use_mib,
+            in_use.exceeded_by_mib(0.0),
             row.latency_ms[0],
             row.latency_ms[1],
             1e3 * latencies.longest().as_secs_f64(),
@@ -294,7 +299,7 @@ fn tell_head(hours: f64) {
          MQTT"
     );
     println!(
-        "hours  frames    MiB  median, ms  99 %, ms  worst, ms  step, ms  people  followed  outlasting, s  nobody's, s  \
+        "hours  frames    MiB  in use  at most  median, ms  99 %, ms  worst, ms  step, ms  people  followed  outlasting, s  nobody's, s  \
          numbers  skipped  lost pkts    page     MQTT  warnings"
     );
     println!("{:>20.1}  before the first packet", resident_mib());
@@ -335,7 +340,11 @@ impl Ended {
         let lost = (sent.packets - summary.packets.min(sent.packets) + summary.packets_lost) as f64;
         verdict.expect("share of packets that were lost", lost / sent.packets as f64, ..0.001);
         if let (Some(first), Some(last)) = (rows.first(), rows.last()) {
-            verdict.expect("memory, last part / first", last.mib / first.mib, ..1.08);
+            verdict.expect(
+                "memory in use at the median, last part / first",
+                last.in_use_mib / first.in_use_mib,
+                ..1.08,
+            );
             verdict.expect(
                 "median latency, last part / first",
                 last.latency_ms[0] / first.latency_ms[0],
