@@ -248,7 +248,7 @@ impl Told {
             std::mem::replace(&mut *part, Part { tally, ..Part::default() });
         drop(part);
         let row = Row {
-            in_use_mib: in_use.exceeded_by_mib(0.5),
+            in_use_mib: in_use.exceeded_by_mib(0.9),
             latency_ms: [0.5, 0.99].map(|share| latencies.quantile_ms(share)),
             followed: tally.share_followed(),
             nobodys_s: tally.nobodys_s(),
@@ -341,7 +341,7 @@ impl Ended {
         verdict.expect("share of packets that were lost", lost / sent.packets as f64, ..0.001);
         if let (Some(first), Some(last)) = (rows.first(), rows.last()) {
             verdict.expect(
-                "memory in use at the median, last part / first",
+                "memory in use where nothing waits, last part / first",
                 last.in_use_mib / first.in_use_mib,
                 ..1.08,
             );

@@ -38,7 +38,8 @@ impl InUse {
         self.looks_mib.push(in_use_mib());
     }
 
-    /// MiB that no more than this share of the looks exceed: the median is .5, the most 0.
+    /// MiB that no more than this share of the looks exceed: the median is .5, the most 0. A backlog only adds, so the last
+    /// tenth of the looks says what is held where none waits.
     pub fn exceeded_by_mib(&mut self, share: f64) -> f64 {
         self.looks_mib.sort_by(|a, b| b.total_cmp(a));
         let at = (share * self.looks_mib.len() as f64) as usize;
