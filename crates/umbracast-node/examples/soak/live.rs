@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use umbracast::geometry::DVec2;
 use umbracast::{Config, Error, STEP_NS};
+use umbracast_eval::score::bootstrap::quantile;
 use umbracast_live::latency::Latencies;
 use umbracast_live::receive::{Arrived, Door};
 use umbracast_live::record::RecordSettings;
@@ -21,7 +22,7 @@ use umbracast_node::mqtt::{Hears, Mqtt, Sender};
 
 use super::broker::{Broker, Said};
 use super::legs;
-use super::memory::{InUse, resident_mib};
+use super::memory::{in_use_mib, resident_mib};
 use super::page::{Client, Saw};
 use super::play::{HOUR_NS, MINUTE_NS, Play, S_NS};
 use super::recorded::{Found, Opener};
@@ -45,6 +46,8 @@ const AHEAD_NS: i64 = 2 * S_NS;
 const REMEMBERED: usize = 64;
 /// More seconds of tracks that are nobody's than this are not borne in a part.
 const NOBODYS_S: f64 = 30.0;
+/// A backlog only adds to what is in use, so that so small a share of the moments with least says what is held where none waits.
+const IDLE_SHARE: f64 = 0.1;
 const TICK: Duration = Duration::from_millis(20);
 
 /// Who was where at the end of a frame.
@@ -161,10 +164,10 @@ pub fn run(folder: &Path, hours: f64) -> Result<Verdict, Error> {
     let mut is_early = true;
     let (mut rows, mut before, mut number, mut hung_up, mut again) =
         (Vec::new(), Account::default(), 0, 0, 0);
-    let mut in_use = InUse::default();
+    let mut in_use = Vec::new();
     while !done.load(Ordering::Relaxed) && live.is_well() {
         std::thread::sleep(TICK);
-        in_use.look();
+        in_use.push(in_use_mib());
         let gone_ns = clock.now_ns() - from_ns;
         if is_early && gone_ns >= i64::from(RATE) * S_NS {
             println!("{:>20.1}  a second later", resident_mib());
@@ -241,14 +244,16 @@ impl Told {
         }
     }
 
-    fn tell(&self, number: i64, mut in_use: InUse, before: &Account, now: &Account) -> Row {
+    /// `in_use` holds MiB at many moments of the part.
+    fn tell(&self, number: i64, mut in_use: Vec<f64>, before: &Account, now: &Account) -> Row {
+        in_use.sort_unstable_by(f64::total_cmp);
         let mut part = lock(&self.part);
         let tally = part.tally.followed_on();
         let Part { latencies, steps, tally } =
             std::mem::replace(&mut *part, Part { tally, ..Part::default() });
         drop(part);
         let row = Row {
-            in_use_mib: in_use.exceeded_by_mib(0.9),
+            in_use_mib: quantile(&in_use, IDLE_SHARE),
             latency_ms: [0.5, 0.99].map(|share| latencies.quantile_ms(share)),
             followed: tally.share_followed(),
             nobodys_s: tally.nobodys_s(),
@@ -260,7 +265,7 @@ impl Told {
             tally.frames,
             resident_mib(),
             row.in_use_mib,
-            in_use.exceeded_by_mib(0.0),
+            quantile(&in_use, 1.0),
             row.latency_ms[0],
             row.latency_ms[1],
             1e3 * latencies.longest().as_secs_f64(),

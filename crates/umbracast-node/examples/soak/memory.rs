@@ -21,28 +21,7 @@ pub fn resident_mib() -> f64 {
 }
 
 /// MiB that were asked for and are not given back.
-fn in_use_mib() -> f64 {
+pub fn in_use_mib() -> f64 {
     let stats = COUNTED.stats();
     stats.bytes_allocated.wrapping_sub(stats.bytes_deallocated) as f64 / MIB
-}
-
-/// What was in use at many moments, in MiB.
-#[derive(Debug, Default)]
-pub struct InUse {
-    looks_mib: Vec<f64>,
-}
-
-impl InUse {
-    /// Looks once.
-    pub fn look(&mut self) {
-        self.looks_mib.push(in_use_mib());
-    }
-
-    /// MiB that no more than this share of the looks exceed: the median is .5, the most 0. A backlog only adds, so the last
-    /// tenth of the looks says what is held where none waits.
-    pub fn exceeded_by_mib(&mut self, share: f64) -> f64 {
-        self.looks_mib.sort_by(|a, b| b.total_cmp(a));
-        let at = (share * self.looks_mib.len() as f64) as usize;
-        self.looks_mib.get(at).copied().unwrap_or(f64::NAN)
-    }
 }
