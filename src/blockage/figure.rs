@@ -177,12 +177,19 @@ impl Figure {
         self.tops.clear();
         self.tops.extend(self.slices[..n.saturating_sub(1)].chunks(REGISTER).map(tops));
         self.rods_up = self.rods.map(|rod| rod.between());
-        let stretches = (0..n).flat_map(|low| (0..n).map(move |high| (low, high)));
-        let of_stretch = stretches.flat_map(|(low, high)| (0..RODS).map(move |rods| (low, high, rods)));
-        let mut plans = std::mem::take(&mut self.plans);
-        plans.clear();
-        plans.extend(of_stretch.map(|(low, high, rods)| self.plan(low, high, rods)));
-        self.plans = plans;
+        let arms: [_; RODS] = std::array::from_fn(|rods| self.arms(rods));
+        let sway = (self.sway_ahead + self.sway_left) as f32;
+        self.plans.clear();
+        for low in 0..n {
+            let mut trunk = Extent::of(&self.slices[low]);
+            for high in 0..n {
+                // Nobody asks for those that end below their beginning.
+                if high > low {
+                    trunk.take(&self.slices[high]);
+                }
+                self.plans.extend(arms.map(|arms| trunk.with(arms, sway)));
+            }
+        }
     }
 
     /// What of the body is within a band: one of [`Figure::plans`].
@@ -204,13 +211,8 @@ impl Figure {
         band.low >= 0.0 && band.high <= self.top()
     }
 
-    /// Of slices `low` to `high`, and of those rods whose bit is set.
-    fn plan(&self, low: usize, high: usize, rods: usize) -> Plan {
-        let slices = &self.slices[low.min(high)..=high];
-        let most = |of: fn(&Slice) -> f64| slices.iter().map(of).fold(f64::MIN, f64::max);
-        let least = |of: fn(&Slice) -> f64| slices.iter().map(of).fold(f64::MAX, f64::min);
-        let [foremost, hindmost] = [most(|slice| slice.ahead), least(|slice| slice.ahead)];
-        let [leftmost, rightmost] = [most(|slice| slice.left), least(|slice| slice.left)];
+    /// Joints and radius of a plan with those rods whose bit is set.
+    fn arms(&self, rods: usize) -> ([[f32; 4]; 3], f32) {
         let [upper, fore] = &self.rods;
         let ends = match rods {
             0b11 => [upper.upper, upper.lower, fore.lower],
@@ -218,17 +220,44 @@ impl Figure {
             _ => [fore.upper, fore.lower, fore.lower],
         };
         let radius = if rods == 0 { NOWHERE } else { upper.radius.max(fore.radius) as f32 };
+        (ends.map(|joint| [joint.ahead, joint.swing, joint.out[0], joint.out[1]].map(|x| x as f32)), radius)
+    }
+}
+
+/// The most and the least of slices: half depth, half width, how far ahead and left of the axis.
+struct Extent {
+    most: [f64; 4],
+    least: [f64; 4],
+}
+
+impl Extent {
+    fn of(slice: &Slice) -> Self {
+        let all = [slice.half_depth, slice.half_width, slice.ahead, slice.left];
+        Self { most: all, least: all }
+    }
+
+    fn take(&mut self, slice: &Slice) {
+        let other = Self::of(slice);
+        for i in 0..4 {
+            self.most[i] = self.most[i].max(other.most[i]);
+            self.least[i] = self.least[i].min(other.least[i]);
+        }
+    }
+
+    fn with(&self, (joints, radius): ([[f32; 4]; 3], f32), sway: f32) -> Plan {
+        let [most, least] = [self.most, self.least];
+        let middle = |i: usize| (0.5 * (most[i] + least[i])) as f32;
+        let by = |i: usize| (0.5 * (most[i] - least[i])) as f32;
         Plan {
-            around: [most(|slice| slice.half_depth) as f32, most(|slice| slice.half_width) as f32],
-            within: [least(|slice| slice.half_depth) as f32, least(|slice| slice.half_width) as f32],
-            ahead: (0.5 * (foremost + hindmost)) as f32,
-            ahead_by: (0.5 * (foremost - hindmost)) as f32,
-            left: (0.5 * (leftmost + rightmost)) as f32,
-            left_by: (0.5 * (leftmost - rightmost)) as f32,
-            joints: ends
-                .map(|joint| [joint.ahead, joint.swing, joint.out[0], joint.out[1]].map(|x| x as f32)),
+            around: [most[0], most[1]].map(|m| m as f32),
+            within: [least[0], least[1]].map(|m| m as f32),
+            ahead: middle(2),
+            ahead_by: by(2),
+            left: middle(3),
+            left_by: by(3),
+            joints,
             radius,
-            sway: (self.sway_ahead + self.sway_left) as f32,
+            sway,
         }
     }
 }

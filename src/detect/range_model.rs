@@ -213,24 +213,27 @@ impl RangeModel {
         (bin + WHOLE).to_bits() & 0x7f_ffff
     }
 
-    /// The first pixel of a column whose beams look between two azimuths, if all of them look into the same bin, as those of most
-    /// sensors do nearly always: its pixels follow one another.
+    /// The first pixels of the bins of a column whose beams look between two azimuths, where that is one bin, then named twice, or two
+    /// neighbours, as with an HDL-32E.
     #[inline(always)]
-    pub fn shared_bin(&self, [least_cdeg, most_cdeg]: [f32; 2]) -> Option<usize> {
-        let [first, last] = [least_cdeg, most_cdeg].map(|azimuth_cdeg| self.bin(azimuth_cdeg));
-        (first == last && most_cdeg - least_cdeg < 18_000.0).then(|| first as usize * self.rows)
+    pub fn one_or_two_bins(&self, [least_cdeg, most_cdeg]: [f32; 2]) -> Option<[usize; 2]> {
+        let [first, last] = [least_cdeg, most_cdeg].map(|azimuth_cdeg| self.bin(azimuth_cdeg) as usize);
+        let are_neighbours = last == first || last == if first + 1 < self.bins { first + 1 } else { 0 };
+        (are_neighbours && most_cdeg - least_cdeg < 18_000.0)
+            .then(|| [first, last].map(|bin| bin * self.rows))
     }
 
-    /// [`RangeModel::any_new`] of a column whose pixels follow one another from this one on.
+    /// Whether a return of a column in those bins may be new: true wherever [`RangeModel::any_new`] is, and where a return would be new in
+    /// the other bin. It does not ask which beam looks into which, and so runs in vector registers.
     #[inline(always)]
-    pub fn any_new_from(&self, first: usize, ranges_m: &[f32]) -> bool {
-        let n = ranges_m.len().min(self.rows);
-        let (limits_m, ranges_m) = (&self.limit_m[first..][..n], &ranges_m[..n]);
-        let mut new = 0;
-        for i in 0..n {
-            new |= u32::from(!is_known(limits_m[i], ranges_m[i]));
-        }
-        new != 0
+    pub fn may_be_new(&self, bins: [usize; 2], ranges_m: &[f32]) -> bool {
+        // Without an index: its check would leave the last thirty-two beams of a column, which are all, to be asked one by one.
+        let [limits_m, others_m] = bins.map(|first| self.limit_m[first..][..self.rows].iter());
+        let is_new = |((&limit_m, &other_m), &range_m): ((&f32, &f32), &f32)| {
+            let farther_m = if other_m > limit_m { other_m } else { limit_m };
+            u32::from(!is_known(farther_m, range_m))
+        };
+        limits_m.zip(others_m).zip(ranges_m).map(is_new).fold(0, |any, new| any | new) != 0
     }
 
     /// Whether any return of a column is new, or is one that cannot be told, as NaN.

@@ -33,19 +33,26 @@ fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
         [510.0, 520.0, 580.0, 590.0],
         [590.0, 595.0, 600.0, 605.0],
         [35_990.0, 36_010.0, 35_900.0, 0.0],
+        [35_990.0, 35_995.0, 36_005.0, 36_010.0],
+        [-10.0, -5.0, 5.0, 10.0],
+        [550.0, 600.0, 650.0, 700.0],
         [0.0, 500.0, 9e3, 2e4],
     ];
     for azimuths_cdeg in columns {
         let mut pixels = [0; ROWS];
         model.pixels(&azimuths_cdeg, &mut pixels);
         let limits_m = pixels.map(|pixel| model.limit_m(pixel as usize));
-        // What is told of a column whose beams share a bin is the same.
-        let outermost = [azimuths_cdeg[0], azimuths_cdeg[ROWS - 1]];
+        // What is told of all beams at once, of those columns of which it is.
+        let bins_of_pixels = pixels.map(|pixel| pixel as usize / ROWS);
+        let [first, last] = [bins_of_pixels[0], bins_of_pixels[ROWS - 1]];
+        let bins = model.one_or_two_bins([azimuths_cdeg[0], azimuths_cdeg[ROWS - 1]]);
+        assert_eq!(bins.is_some(), (last + model.bins - first) % model.bins <= 1, "{azimuths_cdeg:?}");
+        assert!(bins.is_none() || bins_of_pixels.iter().all(|bin| *bin == first || *bin == last));
         let any_new = |ranges_m: &[f32; ROWS]| {
             let new = model.any_new(&pixels, ranges_m);
-            let shared = model.shared_bin(outermost);
-            assert_eq!(shared.is_some(), pixels[ROWS - 1] == pixels[0] + ROWS as u32 - 1);
-            assert!(shared.is_none_or(|first| model.any_new_from(first, ranges_m) == new));
+            let may_be = bins.is_none_or(|bins| model.may_be_new(bins, ranges_m));
+            assert!(may_be || !new, "{azimuths_cdeg:?}");
+            assert!(may_be == new || first != last, "{azimuths_cdeg:?}: one bin leaves no doubt");
             new
         };
         assert!(!any_new(&limits_m), "{azimuths_cdeg:?}");

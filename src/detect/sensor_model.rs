@@ -288,15 +288,15 @@ impl SensorModel {
             let clockwise = column.azimuth_rate_cdeg_per_ns >= 0.0;
             let outermost =
                 |i: usize| azimuth_cdeg(column, turned_ns[if clockwise { i } else { 1 - i }], offset_cdeg[i]);
-            let shared = if may_skip { ranges.shared_bin([outermost(0), outermost(1)]) } else { None };
-            if shared.is_some_and(|first| !ranges.any_new_from(first, ranges_m)) {
+            let bins = if may_skip { ranges.one_or_two_bins([outermost(0), outermost(1)]) } else { None };
+            if bins.is_some_and(|bins| !ranges.may_be_new(bins, ranges_m)) {
                 continue;
             }
             for (azimuth, [turned_ns, offset_cdeg]) in azimuths_cdeg.iter_mut().zip(&*turned) {
                 *azimuth = azimuth_cdeg(column, *turned_ns, *offset_cdeg);
             }
             ranges.pixels(azimuths_cdeg, pixels);
-            if may_skip && shared.is_none() && !ranges.any_new(pixels, ranges_m) {
+            if may_skip && bins.is_none() && !ranges.any_new(pixels, ranges_m) {
                 continue;
             }
             for (b, &range_m) in ranges_m.iter().enumerate() {
