@@ -4,6 +4,7 @@
 mod movers;
 mod stays;
 mod arrivals;
+mod columns;
 
 pub use stays::Near;
 use stays::Stays;
@@ -186,14 +187,6 @@ impl RangeModel {
         self.bin(azimuth_cdeg) as usize * self.rows + row
     }
 
-    /// The same of a column: the first azimuth is that of row 0.
-    #[inline(always)]
-    pub fn pixels(&self, azimuths_cdeg: &[f32], pixels: &mut [u32]) {
-        for (row, (pixel, azimuth_cdeg)) in (0_u32..).zip(pixels.iter_mut().zip(azimuths_cdeg)) {
-            *pixel = self.bin(*azimuth_cdeg) * self.rows as u32 + row;
-        }
-    }
-
     /// The bin of an azimuth, which is a turn off at most: one comparison takes the place of a remainder in the hot loop. There is no
     /// call of `floor` and no conversion that asks for NaN either, for vector registers have neither on every processor.
     #[inline(always)]
@@ -211,36 +204,6 @@ impl RangeModel {
         let below = if bin < bins { bin } else { bins - 1.0 };
         let bin = if below > 0.0 { below } else { 0.0 };
         (bin + WHOLE).to_bits() & 0x7f_ffff
-    }
-
-    /// The first pixels of the bins of a column whose beams look between two azimuths, where that is one bin, then named twice, or two
-    /// neighbours, as with an HDL-32E.
-    #[inline(always)]
-    pub fn one_or_two_bins(&self, [least_cdeg, most_cdeg]: [f32; 2]) -> Option<[usize; 2]> {
-        let [first, last] = [least_cdeg, most_cdeg].map(|azimuth_cdeg| self.bin(azimuth_cdeg) as usize);
-        let are_neighbours = last == first || last == if first + 1 < self.bins { first + 1 } else { 0 };
-        (are_neighbours && most_cdeg - least_cdeg < 18_000.0)
-            .then(|| [first, last].map(|bin| bin * self.rows))
-    }
-
-    /// Whether a return of a column in those bins may be new: true wherever [`RangeModel::any_new`] is, and where a return would be new in
-    /// the other bin. It does not ask which beam looks into which, and so runs in vector registers.
-    #[inline(always)]
-    pub fn may_be_new(&self, bins: [usize; 2], ranges_m: &[f32]) -> bool {
-        // Without an index: its check would leave the last thirty-two beams of a column, which are all, to be asked one by one.
-        let [limits_m, others_m] = bins.map(|first| self.limit_m[first..][..self.rows].iter());
-        let is_new = |((&limit_m, &other_m), &range_m): ((&f32, &f32), &f32)| {
-            let farther_m = if other_m > limit_m { other_m } else { limit_m };
-            u32::from(!is_known(farther_m, range_m))
-        };
-        limits_m.zip(others_m).zip(ranges_m).map(is_new).fold(0, |any, new| any | new) != 0
-    }
-
-    /// Whether any return of a column is new, or is one that cannot be told, as NaN.
-    #[inline(always)]
-    pub fn any_new(&self, pixels: &[u32], ranges_m: &[f32]) -> bool {
-        let known = |(&pixel, &range_m): (&u32, &f32)| is_known(self.limit_m(pixel as usize), range_m);
-        !pixels.iter().zip(ranges_m).fold(true, |all, of| all & known(of))
     }
 
     /// Returns nearer than this are new. Zero, so that nothing is, until the scene is known.
@@ -477,12 +440,6 @@ fn widened<T: Copy + Default>(old: &[T], [old_rows, rows]: [usize; 2], bins: usi
         }
     }
     wide
-}
-
-/// Whether a return is none or lies no nearer than its pixel's limit.
-#[inline(always)]
-fn is_known(limit_m: f32, range_m: f32) -> bool {
-    (range_m == 0.0) | (range_m >= limit_m)
 }
 
 /// The nearest range that came back in at least `least` revolutions. Where none did although the pixel often
