@@ -56,6 +56,8 @@ fn a_column_is_new_where_one_of_its_pixels_is_however_its_beams_lie() {
             new
         };
         assert!(!any_new(&limits_m), "{azimuths_cdeg:?}");
+        let far_m = [100.0; ROWS];
+        assert!(bins.is_none_or(|bins| !model.may_be_new(bins, &far_m)), "{azimuths_cdeg:?}: told at once");
         assert!(!any_new(&[0.0; ROWS]), "nothing came back");
         for row in 0..ROWS {
             for nearer_m in [limits_m[row] - 0.001, f32::NAN] {
